@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every test starts with an empty file and the add-on just enabled, and disables it after."""
+"""Every test starts with an empty file and the add-on just enabled, and disables it afterwards."""
 
 import os
 import shutil
@@ -19,7 +19,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 @pytest.fixture(scope="session")
 def installed():
-    """Whether run.py installed a package; otherwise copy the tree into a temporary folder."""
+    """None if run.py installed a package; otherwise the folder with a copy of the add-on."""
     if os.environ.get("RISORIUS_TEST_INSTALLED"):
         return None
     target = Path(os.environ["RISORIUS_TEST_USER"]) / "extensions" / "user_default" / "risorius"
@@ -31,10 +31,10 @@ def installed():
 
 @pytest.fixture(scope="session", autouse=True)
 def kept_wheels():
-    """Keep the files of the wheels: Blender deletes them when an extension is disabled and unpacks
-    them again.
+    """Keep the files of wheels, which Blender deletes when an extension is disabled.
 
-    This takes longer than most tests; test_extension.py tests it in other processes.
+    Unpacking them again takes longer than most tests; test_extension.py tests it in other
+    processes.
     """
     import addon_utils
 
@@ -51,17 +51,16 @@ def kept_wheels():
 
 @pytest.fixture(autouse=True)
 def tracebacks():
-    """Exceptions that Blender printed from our handlers, timers and operators; a test with one
-    fails.
+    """Exceptions that Blender printed from our handlers, timers and operators.
 
-    Blender prints them and goes on, so that no test would notice. A test that plants an exception
-    removes it from this list.
+    A test with such an exception fails, because Blender only prints it and goes on. A test that
+    plants an exception removes it from this list.
     """
     printed = []
 
     def note(kind, error, trace):
         files = [frame.filename for frame in traceback.extract_tb(trace)]
-        if any("user_default" in Path(file).parts for file in files):  # not Blender's exporters
+        if any("user_default" in Path(file).parts for file in files):  # ignores Blender's exporters
             printed.append("".join(traceback.format_exception(kind, error, trace)))
         sys.__excepthook__(kind, error, trace)
 
@@ -88,7 +87,7 @@ def addon(installed, tracebacks):
 
 
 def _repository(installed):
-    """Factory settings forget the repository's folder."""
+    """Set the folder of the extension repository, which factory settings remove."""
     import addon_utils
 
     repos = bpy.context.preferences.extensions.repos
@@ -103,13 +102,16 @@ def _repository(installed):
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """Direct mode, and real keys on posed bones. Files that test frames add a live key on these."""
+    """The mode of the face: Direct mode, or real keys on posed bones.
+
+    Tests of frames add a live key.
+    """
     return request.param
 
 
 @pytest.fixture
 def dna_file(tmp_path):
-    """A small face-like DNA file of our own making."""
+    """A small DNA file like a face, made by our own code."""
     from support.faces import small_face
 
     path = tmp_path / "small.dna"
@@ -118,7 +120,7 @@ def dna_file(tmp_path):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """List the tests of a longer run."""
+    """List the tests that were skipped because their data or programs are missing."""
     reasons = {report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])}
     for reason in sorted(r.removeprefix("Skipped: ") for r in reasons):
         if reason.startswith("EXTRA NOT RUN"):

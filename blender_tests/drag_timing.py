@@ -20,7 +20,7 @@ DRAGS = 100
 
 
 def main(file: str) -> None:
-    """Install the add-on from the tree, load a face, and drag its vertices."""
+    """Install the add-on from the source folder, load a face, and drag its vertices."""
     user = Path(os.environ["BLENDER_USER_RESOURCES"]) / "extensions" / "user_default"
     user.mkdir(parents=True)
     (user / "risorius").symlink_to(PROJECT / "addon" / "risorius")
@@ -60,7 +60,7 @@ def main(file: str) -> None:
 
 
 def surface_vertices(surface, live, mesh):
-    """A hundred vertices over the mesh with the largest motion by controls."""
+    """A hundred vertices over the mesh that controls move most."""
     raw = np.array(live.rests, np.float32)
     some = np.linspace(0, surface.vertex_counts[mesh] - 1, 2000).astype(int)
     reach = np.linalg.norm(surface.jacobian(raw, mesh, some), axis=(1, 2))

@@ -32,12 +32,12 @@ sys.path.append(str(HERE.parent / "packaging" / "check"))
 import limits  # noqa: E402
 
 MODULE = "bl_ext.user_default.risorius"
-MAX_GROWTH = 0.03  # of the memory in use, over the second half of the run
-SECONDS_PER_ACTION = 1.0  # of CPU, in the mean, before the child counts as hung
+MAX_GROWTH = 0.03  # share of the used memory that it may grow in the second half of the run
+SECONDS_PER_ACTION = 1.0  # mean CPU time after which the child counts as hung
 
 
 def arguments(given):
-    """The command line, as a namespace."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0], allow_abbrev=False)
     parser.add_argument("--actions", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=None)
@@ -51,7 +51,7 @@ def arguments(given):
     return parser.parse_args(given)
 
 
-# -- parent ---------------------------------------------------------------------------------
+# -- parent process -------------------------------------------------------------------------
 
 
 def command(options, folder):
@@ -69,7 +69,7 @@ def command(options, folder):
 
 
 def parent(options):
-    """Run the child to its end or its death, and write the log. Returns the exit code."""
+    """Run the child until it ends or dies, and write the log. Returns the exit code."""
     if options.seed is None:
         options.seed = random.SystemRandom().randrange(10**6)
     print(f"seed {options.seed}, {options.actions} actions", flush=True)
@@ -95,7 +95,7 @@ def parent(options):
 
 
 def report(options, folder, ending, seconds):
-    """The log's text, and whether the run failed."""
+    """The text of the log, and whether the run failed."""
     result = {}
     if (folder / "result.json").is_file():
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
@@ -126,11 +126,11 @@ def report(options, folder, ending, seconds):
     return "\n".join(lines) + "\n", bool(errors)
 
 
-# -- child ----------------------------------------------------------------------------------
+# -- child process --------------------------------------------------------------------------
 
 
 class Output:
-    """Everything that this process prints, at the level of file descriptors, in one file."""
+    """Redirects everything that this process prints, also from C code, to a file."""
 
     def __init__(self, path):
         self.path, self.read = path, 0
@@ -163,7 +163,7 @@ def memory():
 
 
 def growth(values):
-    """Fitted growth over the second half of a row of samples, in the unit of the samples."""
+    """Fitted growth over the second half of the samples, in their unit."""
     half = values[len(values) // 2 :]
     if len(half) < 4:
         return 0.0
@@ -175,7 +175,7 @@ def growth(values):
 
 
 def prepare(folder):
-    """Install the add-on from the tree into the throw-away user folder."""
+    """Install the add-on from the source folder into the temporary user folder."""
     import addon_utils
     import bpy
 
@@ -202,7 +202,7 @@ class Run:
         self.checks, self.worst, self.finished = 0, 0.0, False
 
     def act(self, number, kind):
-        """One action; whatever it prints or raises is looked at."""
+        """Do one action; printed tracebacks and exceptions are recorded as errors."""
         from support.soak_actions import NOT_PUSHED
 
         self.world.random = random.Random(f"{self.options.seed} {number}")
@@ -221,7 +221,7 @@ class Run:
             self.fail(number, kind, printed[-3000:])
 
     def check(self, number, kind):
-        """All faces against the oracle."""
+        """Compare all faces with the oracle."""
         self.checks += 1
         try:
             self.worst = max(self.worst, self.world.check())
@@ -229,11 +229,11 @@ class Run:
             self.fail(number, kind, traceback.format_exc())
 
     def fail(self, number, kind, text):
-        """Note an error."""
+        """Record an error with the number and kind of its action."""
         self.errors.append(f"action {number} ({kind}): {text}")
 
     def sample(self, number):
-        """Memory of a freshly loaded file, and datablocks that no character needs."""
+        """Record the memory of a freshly loaded file, and datablocks that no character uses."""
         self.world.random = random.Random(f"{self.options.seed} calm {number}")
         self.world.calm()
         counts = self.world.leftovers()
@@ -245,7 +245,7 @@ class Run:
         self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
-        """Sentences about growth; too much growth is an error."""
+        """Sentences about growth; too much growth is recorded as an error."""
         found = []
         for name, row in self.samples.items():
             if name == "at action" or len(row) < 8:
@@ -268,7 +268,7 @@ class Run:
 
 
 def plant(world, number):
-    """At the fifth action the trouble that RISORIUS_SOAK_PLANT asks for, to test the soak."""
+    """At the fifth action cause the fault that RISORIUS_SOAK_PLANT names, to test the soak."""
     kind = os.environ.get("RISORIUS_SOAK_PLANT") if number == 5 else None
     if kind == "face":
         block = world.rigs()[0]["risorius_mesh_000"].data.shape_keys.reference_key
@@ -282,7 +282,7 @@ def plant(world, number):
 
 
 def child(options):
-    """Do the actions in this Blender; the result goes to a file."""
+    """Do the actions in this Blender and write the result to a file."""
     folder = options.child
     for place in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
         if place:

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# From nothing to a face that speaks, smiles and shouts: builds, makes the sample person, installs the
-# extension into Blender (bpy 4.5, or BLENDER=/path/to/blender), keys some acting and renders it.
+# Makes a film of a face that speaks, smiles and shouts. Builds the wheel, the extension and the sample
+# person, installs the extension into Blender (bpy 4.5, or BLENDER=/path/to/blender), keys the acting of
+# films/acting.py and renders it.
 set -euo pipefail
 source "$(dirname "$0")/films/film.sh"
 
 begin_film demo
 step "sample person"
-# It is the man whom the zip carries: to find his joints twice would take a minute or two more.
+# The demo copies the man of the zip, because building him again would take one or two minutes.
 sample=$(sample_face)
 cp "$sample/man.dna" "$out/sample.dna"
 rm -rf "$out/sample_textures" && cp -r "$sample/man_textures" "$out/sample_textures"

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# release.sh: everything that is published of a version, from a clean tree whose HEAD has the tag
-# vVERSION: the page of `risorius web` (web.sh), wheels and sdist (wheels.sh), one extension for each
-# platform and one with all, a repository of extensions with a page, an SBOM, notes and checksums. They
-# lie in build/release/VERSION; nothing is uploaded and nothing signed. Needs the sample's data (48 MB,
-# once).
+# release.sh: makes all published files of a version in build/release/VERSION: the page of
+# `risorius web` (web.sh), wheels and sdist (wheels.sh), one extension for each platform and one for all
+# platforms, a repository of extensions with a page, an SBOM, notes and checksums. Requires a clean tree
+# whose HEAD has the tag vVERSION. Uploads and signs nothing. Downloads the data of the sample face
+# (48 MB) the first time.
 #
 #   RISORIUS_PEOPLE="man woman ..." adds these sample people, each as a zip of its own
 #
 #   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
-#   release.sh VERSION [--trial]   VERSION: 1.2.3, or its tag v1.2.3; --trial: also of a tree that could
-#                                  not be released; says why not, and takes the wheels that there are
+#   release.sh VERSION [--trial]   VERSION: 1.2.3, or its tag v1.2.3; --trial: go on if the tree may not
+#                                  be released, print the reasons, and use the wheels already built
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 version=${1:-}
@@ -25,10 +25,10 @@ out="$project/build/release/$version"
 
 # shellcheck disable=SC2086
 checked() { "$python" $make check "$version" >&2 || { [ -n "$trial" ] && echo "A trial: not to be published." >&2; }; }
-gather_wheels() { # of wheels.sh; a trial does with what was built for this machine
+gather_wheels() { # sets `wheels` and `sdist`: wheels.sh builds them; a trial uses those in build/wheels or build/dist
   shopt -s nullglob
   if [ -z "$trial" ]; then
-    packaging/ship/web.sh # the wheels that are built now have it
+    packaging/ship/web.sh # before the wheels, because they contain its page
     rm -rf "$project/build/wheels"
     packaging/ship/wheels.sh
   fi
@@ -45,7 +45,7 @@ checked
 step "wheels"
 compgen -G "$project/build/dist/risorius-$version-cp311-*.whl" > /dev/null || build_wheel
 gather_wheels
-step "sample face" # made by what is released: the venv may hold a wheel of another day
+step "sample face" # built with the released wheels, because the venv may have an older wheel
 released=$(printf '%s\n' "${wheels[@]}" | grep -- '-cp311-cp311-.*linux.*x86_64' | head -n 1)
 build_people_wheel "$(dirname "$released")"
 people=("$(dirname "$released")/risorius_people-$version"-*.whl)

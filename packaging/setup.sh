@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
-# Sourced by the scripts of packaging/: tools, a private venv, the wheel and
-# the extension's zip. Sets: project, venv, python, step "text" (says what begins and how long the
-# last step took).
+# Sourced by the scripts of packaging/. Sets the variables project (the clone's folder), venv and
+# python, and defines functions that install packages and build the wheel and the extension's zip.
+# `step TITLE` prints the title of the step that begins and the duration of the step before.
 
 project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$project/.venv"
 python="$venv/bin/python"
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONDONTWRITEBYTECODE=1
 export CCACHE_DIR="${CCACHE_DIR:-$HOME/.cache/ccache}"
-# Builds in build/*/ share their objects, though each writes the files that it compiles together itself.
+# With a base folder, ccache shares compiled objects between the build folders build/*/. The sources of
+# unity builds are written by each build folder itself, so they do not keep the objects apart.
 export CCACHE_BASEDIR="$project"
 unset PYTHONPATH
 
@@ -16,9 +17,9 @@ _begin=$SECONDS
 _last=$SECONDS
 _title=
 _cpu=0
-stages= # a file: where `step` writes a row `time` for each stage, if it is named
-# cpu_seconds: into `_now`, of this shell and of all that it waited for. `times` speaks of the shell
-# that runs it, so it cannot stand in a substitution.
+stages= # path of a file; if set, `step` appends a row `time TITLE SECONDS CPU_SECONDS` for each step
+# cpu_seconds: sets `_now` to the CPU seconds of this shell and of the children that it waited for.
+# `times` reports the shell that runs it, so it must not run in a command substitution.
 cpu_seconds() {
   local file
   file=$(mktemp)
@@ -40,8 +41,8 @@ step() {
   return 0
 }
 
-# shown LOG COMMAND...: what the command says goes into LOG; its lines that are indented, its progress,
-# are seen at once, and the end of LOG if it fails.
+# shown LOG COMMAND...: writes the output of the command to LOG. Prints indented lines at once, because
+# they report progress. Prints the last 30 lines of LOG if the command fails.
 shown() {
   local log=$1
   shift
@@ -51,11 +52,12 @@ shown() {
   fi
 }
 
-# limited CPU_SECONDS COMMAND...: killed when it and its children have used so much CPU, or stand still.
-# What has no limit by the clock passes on a busy machine too; bpy sometimes hangs at exit.
+# limited CPU_SECONDS COMMAND...: kills the command if it and its children use more CPU than that, or
+# if they use none for a while, because bpy sometimes hangs at exit. A limit of CPU time instead of
+# wall time lets the command pass on a busy machine too.
 limited() { python3 "$project/packaging/check/limits.py" "$@"; }
 
-install_packages() { # install_packages [MORE...]: what every build needs, and more
+install_packages() { # install_packages [MORE...]: the Debian packages that every build needs, and MORE
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev libbenchmark-dev \
     nlohmann-json3-dev libxxhash-dev libeigen3-dev espeak-ng ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 \
@@ -72,7 +74,7 @@ install_packages() { # install_packages [MORE...]: what every build needs, and m
   DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "${missing[@]}" > /dev/null
 }
 
-mirror() { # the Debian mirror that this machine's apt already uses, or nothing: debootstrap's own
+mirror() { # prints the Debian mirror of this machine's apt, or nothing: debootstrap then uses its default
   apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2> /dev/null |
     grep -E '/debian/?$' | head -n 1 || true
 }
@@ -81,7 +83,7 @@ make_venv() {
   local stamp
   stamp="$venv/.$(sha256sum "$project/packaging/requirements.txt" | cut -c1-16)"
   [ -e "$stamp" ] && return 0
-  # bpy 4.5 is made for Python 3.11, Debian bookworm's own.
+  # bpy 4.5 needs Python 3.11, the Python of Debian bookworm.
   local base=python3.11
   command -v $base > /dev/null || base=python3
   "$base" -m venv "$venv"
@@ -89,15 +91,16 @@ make_venv() {
   touch "$stamp"
 }
 
-quality_tools() { # clang-tidy, coverage.py and gcovr, which test.sh does without
+quality_tools() { # installs clang-tidy, coverage.py and gcovr, which test.sh does not need
   local stamp
   stamp="$venv/.quality-$(sha256sum "$project/packaging/check/quality_requirements.txt" | cut -c1-16)"
   [ -e "$stamp" ] && return 0
   "$python" -m pip install -q --no-compile -r "$project/packaging/check/quality_requirements.txt" && touch "$stamp"
 }
 
-# bpy_venv VERSION [SECONDS]: prints the Python of a venv with this bpy and pytest; it is made
-# unless that takes longer. The project's own venv has the bpy of requirements.txt.
+# bpy_venv VERSION [SECONDS]: prints the Python of a venv with this version of bpy and with pytest.
+# Makes the venv if it is missing, and fails if pip takes longer than SECONDS (default 600). If
+# requirements.txt has the same version of bpy, this is the project's own venv.
 bpy_venv() {
   local folder="$project/build/venv-bpy-$1" pytest
   grep -qx "bpy==$1" "$project/packaging/requirements.txt" && echo "$python" && return 0
@@ -121,13 +124,14 @@ build_wheel() {
     cp "$project"/build/wheel-cp311-*/tests/bench/rig_bench "$venv/bin/"
 }
 
-# build_people_wheel FOLDER: the wheel of the sample people, the same for every system
+# build_people_wheel FOLDER: builds the wheel of the sample people, one for all systems, into FOLDER
 build_people_wheel() {
   rm -f "$1"/risorius_people-*.whl
   "$python" -m pip wheel -q --no-build-isolation --no-deps -w "$1" "$project/native/python/risorius_people"
 }
 
-# sample_face: prints the folder of the face that each zip carries; made again when its code changed.
+# sample_face: prints the folder with the sample face that every extension zip contains. Builds the
+# face again if the hash of its code changed.
 sample_face() {
   local folder="$project/build/sample" code stamp
   code=$(cat "$project"/native/python/{risorius_people,risorius/author}/{,*/}*.{py,toml,npz} \
@@ -140,8 +144,8 @@ sample_face() {
   echo "$folder"
 }
 
-# build_extension: a zip without the sample face is better than none where its data cannot be had;
-# tests and release.sh say so.
+# build_extension: builds the zip without the sample face if the data of the face cannot be downloaded,
+# because such a zip still serves development. release.sh fails without the sample face.
 build_extension() {
   local sample
   sample=$(sample_face) || sample=

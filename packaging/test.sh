@@ -1,20 +1,21 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# test.sh: every test, from nothing: native, Python, Blender (all in bpy 4.5 and in each `blender` of
-# 4.2 or newer that is found on PATH or named by BLENDER=; a fast subset in bpy 4.2 and 5.0, where
-# they can be fetched). At the end: seconds of each stage, what ran where, what did not run and why.
-# Exit code 0 only if all passed. packaging/check/blender/matrix.sh runs all Blender tests in all versions.
+# test.sh: builds everything and runs all tests: native, Python and Blender. All Blender tests run in bpy 4.5
+# and in each `blender` of version 4.2 or newer on PATH or in BLENDER=. A fast subset runs in bpy 4.2 and
+# 5.0 if pip can fetch them. At the end, prints the duration of each stage, the results, and the parts that
+# did not run with the reason. Exit code 0 only if all tests passed.
+# packaging/check/blender/matrix.sh runs all Blender tests in all versions.
 #
-#   ./packaging/test.sh            everything; about half an hour on two quiet cores
-#   ./packaging/test.sh --quick    the quick ones of GoogleTest and of the Python tests, and the front
-#                                  door in bpy 4.5 (install, import, controls, frames, a rendering)
+#   ./packaging/test.sh            everything; about half an hour on two idle cores
+#   ./packaging/test.sh --quick    the fast tests of GoogleTest and Python, and the basic tests in bpy 4.5
+#                                  (install, import, controls, frames, a rendering)
 #   ./packaging/test.sh --help     this text
 #
-# Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
-# sanitizers, cross compilers, fuzzers and the C library installed; `python` is the wheel, style, types,
-# pytest, the documentation as a site, the Windows wheel in wine where wheels.sh has made it; `blender` waits
-# for the extension's zip, and is every test inside Blender. The two that end first take a fast subset in an
-# older and a newer Blender.
+# Three lanes run in parallel, because half of the work uses one core only. Lane `native`: GoogleTest,
+# sanitizers, cross compilers, fuzzers, the installed C library. Lane `python`: the wheel, style, types,
+# pytest, the documentation as a site, and the Windows wheel in wine if wheels.sh has built it. Lane
+# `blender`: all tests inside Blender; it waits for the extension's zip. The two lanes that end first run
+# the fast subset in an older and a newer Blender.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -28,17 +29,18 @@ logs="$project/build/logs"
 rm -rf "$logs/rows" "$logs/extension.made" "$logs"/subset-*
 mkdir -p "$logs/rows"
 source packaging/check/rows.sh
-# Tests that try every byte run under the sanitizers, which see more, and --quick has none of them.
-# What only computes for long is not run under the sanitizers: shorter tests go through the same lines.
-# Of the programs of GoogleTest, those whose subject the compiler's optimisation or the machine may change,
-# or that need unspoilt memory and time: all others run under the sanitizers alone, or with --quick here.
+# GoogleTest programs that run in the optimised build: optimisation or the machine may change their results,
+# or sanitizers would change their memory and time. All other programs run under the sanitizers only, or in
+# the optimised build with --quick. Tests that try every byte (every_byte) run under the sanitizers only,
+# because these detect more. Long computations (long_sums) do not run under the sanitizers, because shorter
+# tests cover the same lines.
 optimised=(simd rig threads compile clip memory solve author)
-# --quick also leaves out the files of tests that take longest.
-long_sums='Correct.TheSkinInItself|Correct.WhatTwoParts|Fit.WhatIsBound|Fit.WeightsGoOn|Fit.AnotherFace|Fit.JointsLeave'
+long_sums='Correct.TheSkinInItself|Correct.WhatTwoParts|Fit.WhatIsBound|Fit.WeightsGoOn|Fit.AnotherFace|Fit.JointsLeave|Register.WhatLooks|Register.DoesNotDepend'
 every_byte='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|DamagedByte|DamageUnder|Changes.*Reads'
+# Python test files that --quick leaves out, because they take longest.
 slow_python=(batch command_bench command_convert command_diff command_plot edit_regroup rig_nan rig_settle
   rig_thousand sample speech speech_apart)
-# Two lanes share the cores: threads of linear algebra that wait for each other would only burn them.
+# One thread for linear algebra, because the lanes share the cores and waiting threads would use them up.
 export OPENBLAS_NUM_THREADS=1
 
 build_preset() { # build_preset PRESET [TARGET...]
@@ -50,10 +52,10 @@ build_preset() { # build_preset PRESET [TARGET...]
     { cmake --build --preset "$preset" -j"$(nproc)" "${targets[@]}" > "$logs/build-$preset.log" 2>&1 ||
       { tail -n 30 "$logs/build-$preset.log" && false; }; }
 }
-# google_tests NAME PRESET [PATTERN of tests that are left out [PROGRAM...]]
+# google_tests NAME PRESET [EXCLUDED_TESTS_PATTERN [PROGRAM...]]: builds and runs GoogleTest programs
 google_tests() {
   local name=$1 preset=$2 log="$logs/ctest-$2.log" code without=()
-  # What is not built has a placeholder for a test.
+  # CTest has a placeholder test NOT_BUILT for each program that is not built.
   [ $# -lt 3 ] || without=(-E "$3|NOT_BUILT")
   build_preset "$preset" "${@:4}" || { note "$name: does not build" 0 1 && return; }
   rm -f "$logs/ctest-$preset.xml"
@@ -65,7 +67,7 @@ google_tests() {
   grep -ohE 'This CPU has no [a-z0-9]+' "$logs/cmake-$preset.log" | sort -u |
     while read -r line; do say "NOT RUN, $name: ${line,}"; done
 }
-run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are rows
+run_script() { # run_script PATH [OPTION...]: runs a script of packaging/ and takes over its rows
   local script=${1##*/} log code name good bad
   log="$logs/${script%.sh}.log"
   "$project/packaging/$1" "${@:2}" > "$log" 2>&1
@@ -74,7 +76,7 @@ run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are row
     note "$name" "$good" "$bad"
   done < <(grep -P '^row\t' "$log")
   while IFS=$'\t' read -r _ name; do say "$name"; done < <(grep -P '^say\t' "$log")
-  # One that only says that it did not run has passed nothing.
+  # A script that only prints NOT RUN adds no row.
   [ "$code" -eq 0 ] && ! grep -qP '^row\t' "$log" && grep -qP '^say\t' "$log" && return
   check "$script" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
@@ -82,14 +84,14 @@ run_fuzzers() { # run_fuzzers SECONDS
   local code target executions finds
   "$project/packaging/check/fuzz.sh" --each "$1" > "$logs/fuzz.log" 2>&1
   code=$?
-  # A row: target, executions, each second, coverage, corpus, finds.
+  # Columns of a row: target, executions, executions per second, coverage, corpus, finds.
   while read -r target executions _ _ _ finds; do
     note "fuzz $target, $executions runs" $((finds == 0)) $((finds > 0))
   done < <(grep -E '^[a-z_]+ +[0-9]+ +[0-9]+ +[0-9]+/' "$logs/fuzz.log")
   check "fuzz.sh" [ "$code" -eq 0 ] || tail -n 15 "$logs/fuzz.log"
 }
-# The wheel has the same options (build_tested_wheel), so ccache gives it these objects: the python
-# lane waits for them, and does what needs no wheel meanwhile.
+# The wheel is built with the same options (build_tested_wheel), so ccache reuses these objects. The python
+# lane waits for this build, and meanwhile does the work that needs no wheel.
 build_libraries() {
   step "native libraries"
   check "native libraries" build_preset tests risorius_dna_file risorius_edit risorius_clip risorius_author
@@ -103,10 +105,10 @@ native_lane() {
     return 0
   fi
   google_tests "GoogleTest" tests "$every_byte" "${optimised[@]/%/_test}" risorius_shared
-  # What follows keeps any number of cores busy: it takes what the two other lanes leave.
+  # The following steps can use all cores. A lower priority leaves the cores to the other lanes first.
   renice -n 5 "$BASHPID" > /dev/null
   step "GoogleTest with sanitizers"
-  # Short stacks of allocations: full ones take a fourth of the time.
+  # Short allocation stacks, because full stacks would take a quarter of the run time.
   ASAN_OPTIONS=detect_leaks=1:malloc_context_size=6 \
     google_tests "GoogleTest, ASan, UBSan, leaks" asan-ubsan "$long_sums"
   step "one Rig under eight threads"
@@ -115,25 +117,26 @@ native_lane() {
   run_script check/cross.sh
   step "fuzz targets, 5 s each"
   run_fuzzers 5
-  extension_is_there || return # of the same lane as the wheel, which the next step needs
+  extension_is_there || return # the next step needs the wheel, which is ready before the extension
   step "C library for other programs"
   run_script check/host.sh
   run_subsets
 }
-# Waits for the python lane's extension; zip is its path.
+# Waits for the python lane's extension and sets `zip` to its path.
 extension_is_there() {
   step "waiting for the extension" && flock "$logs/extension.lock" true
   check "extension's zip" [ -e "$logs/extension.made" ] || return
   zip=$(ls "$project"/build/dist/risorius-*.zip)
 }
 
-# run_blender NAME FILES COMMAND...: FILES are the test files that must have been run, one a word
+# run_blender NAME FILES COMMAND...: runs Blender tests; FILES are the test files that must run, separated by
+# blanks
 run_blender() {
   local name=$1 files=$2 log user code
   log="$logs/blender-$(echo "$name" | tr -c 'a-zA-Z0-9.\n' '-').log"
   shift 2
   rm -f "$log.xml"
-  # A throw-away user folder: a Blender program reads it before the tests could set it.
+  # A temporary user folder, set here because Blender reads it before the tests could set it.
   user=$(mktemp -d)
   BLENDER_USER_RESOURCES="$user" limited 2400 "$@" --durations 15 --junitxml "$log.xml" \
     > "$log" 2>&1
@@ -147,8 +150,8 @@ some() { # some NAME...: the paths of these files
   local name
   for name; do printf '%s ' blender_tests/*/test_"$name".py; done
 }
-# At the end of each lane: what differs most between versions (installing, building, keys and actions, saved
-# files) in an older and a newer Blender. The lane that ends first takes the one, the next what is left.
+# Runs at the end of each lane: tests of the parts that differ most between Blender versions (installation,
+# building, keys and actions, saved files). The lane that ends first runs bpy 4.2, the next one bpy 5.0.
 run_subsets() {
   local subset version other
   subset=$(some extension controls frames past scenes)
@@ -164,7 +167,7 @@ run_subsets() {
     fi
   done
 }
-run_program() { # run_program BLENDER: a program of 4.2 or newer
+run_program() { # run_program BLENDER: all tests in a Blender program, unless it is older than 4.2
   local version
   version=$(limited 60 "$1" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
   if [ -z "$version" ]; then
@@ -206,7 +209,7 @@ run_pytest() {
   # shellcheck disable=SC2086  # one word a file
   note_report "Python $version" "$logs/pytest.xml" $code --files $files
 }
-# CXX: Python would name g++, CMake finds c++, and to ccache these are two compilers.
+# CXX is set because Python would use g++ but CMake c++, and ccache takes these for two compilers.
 build_tested_wheel() { CXX=c++ SKBUILD_CMAKE_DEFINE=RISORIUS_WARNINGS_AS_ERRORS=ON build_wheel; }
 python_lane() {
   step "Python's tools" && check "Python's tools" make_venv || return

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Risorius: faces from DNA files in Blender. Delegates to registration."""
+"""Risorius: faces from DNA files in Blender. All work is done in `registration`."""
 
 from collections.abc import Mapping
 
 
 def register() -> None:
-    """Add everything to Blender."""
+    """Register the add-on; Blender calls this when it is enabled."""
     from . import registration
 
     registration.register()
 
 
 def unregister() -> None:
-    """Take everything out of Blender again."""
+    """Unregister the add-on; Blender calls this when it is disabled."""
     from . import registration
 
     registration.unregister()
@@ -22,7 +22,7 @@ def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
     """Blender's glTF exporter looks for this name in every add-on and calls it before it writes.
 
     Args:
-        settings: the exporter's.
+        settings: settings of the exporter.
     """
     from . import registration
 
@@ -30,7 +30,7 @@ def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
 
 
 def glTF2_post_export_callback(settings: Mapping[str, object]) -> None:
-    """Blender's glTF exporter calls this after it has written. Args: settings  the exporter's."""
+    """Blender's glTF exporter calls this after it has written. Args: settings  of the exporter."""
     del settings
     from . import registration
 

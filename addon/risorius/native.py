@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The single door to the `risorius` wheel that the extension bundles."""
+"""The only module that imports the `risorius` wheel, which the extension bundles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .logic.base.errors import FaceError
 from .logic.base.face_regions import FaceRegions
 from .logic.base.sentences import told
 
-if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
+if TYPE_CHECKING:  # for annotations only; no other module may import the wheel
     from risorius import (  # noqa: F401  # noqa: F401
         BoneSpace,
         Clip,
@@ -60,7 +60,7 @@ else:
     _reason = ""
 
 _HERE = Path(__file__).parent
-ADDON = str(__package__)  # what Blender calls this add-on, whatever folder asks
+ADDON = str(__package__)  # the name by which Blender knows this add-on
 
 
 @cache
@@ -73,14 +73,14 @@ def addon_version() -> str:
 
 @cache
 def website() -> str:
-    """The address of the documentation, with a slash at its end, where the manifest has one."""
+    """The address of the documentation with a final slash, or "" if the manifest has none."""
     text = (_HERE / "blender_manifest.toml").read_text(encoding="utf-8")
     found = re.search(r'^website = "([^"]+)"', text, re.MULTILINE)
     return found.group(1).rstrip("/") + "/" if found else ""
 
 
 def other_copy() -> str:
-    """The module of a copy of this add-on, from another repository, that is in use; else empty."""
+    """The module of an enabled copy of this add-on from another repository; "" if there is none."""
     last = ADDON.rpartition(".")[2]
     for name, module in list(sys.modules.items()):
         same = name.startswith("bl_ext.") and name.count(".") == 2 and name.endswith(f".{last}")
@@ -90,7 +90,7 @@ def other_copy() -> str:
 
 
 def installed_version() -> str:
-    """The version of the wheel on the disk, which after an update is not the one that runs."""
+    """The version of the wheel on disk; after an update it differs from the loaded version."""
     try:
         return metadata.version("risorius")
     except metadata.PackageNotFoundError:
@@ -98,7 +98,7 @@ def installed_version() -> str:
 
 
 def problem() -> str:
-    """Why the native module cannot be used, in one or two sentences; empty when all is well."""
+    """Why the native module cannot be used, in one or two sentences; "" if it can be used."""
     running = f"{sys.version_info.major}.{sys.version_info.minor}"
     if _risorius is None:
         wheels = sorted(p.name for p in (_HERE / "wheels").glob("*.whl"))
@@ -133,7 +133,7 @@ def module() -> ModuleType:
     """The `risorius` package.
 
     Raises:
-        UnusableError: it is missing or of another version; the text says so.
+        UnusableError: the package is missing or has another version, as the text says.
     """
     trouble = problem()
     if trouble or _risorius is None:
@@ -142,20 +142,20 @@ def module() -> ModuleType:
 
 
 def bundled_sample(person: str) -> Path | None:
-    """The DNA file of a sample person that came with the add-on, or None.
+    """The DNA file of a sample person that is bundled with the add-on, or None.
 
     Args:
-        person: as the package's PEOPLE name them.
+        person: name of the person, as in the package's PEOPLE.
     """
     path = _HERE / "sample" / f"{person}.dna"
     return path if path.is_file() else None
 
 
 def sample_module() -> ModuleType:
-    """The package that makes sample people, loaded only when one is built.
+    """The package that makes sample people; it is loaded only when one is built.
 
     Raises:
-        UnusableError: a wheel is missing or of another version; the text says so.
+        UnusableError: a wheel is missing or has another version, as the text says.
     """
     finder = part("people")
     try:
@@ -165,20 +165,20 @@ def sample_module() -> ModuleType:
 
 
 def part(name: str) -> ModuleType:
-    """A module of the `risorius` package that is loaded only where it is used.
+    """A module of the `risorius` package, loaded at its first use.
 
     Args:
-        name: `importing`, `speech` and the like.
+        name: name of the module inside the package, such as `importing` or `speech`.
 
     Raises:
-        UnusableError: the wheel is missing, of another version, or has no such part; the text says
-            so.
+        UnusableError: the wheel is missing, has another version or lacks the module, as the text
+            says.
     """
     module()
     try:
         return import_module(f"risorius.{name}")
     except ModuleNotFoundError as error:
-        # A folder of the package may be missing as well as the file in it.
+        # The error may name a folder of the package instead of the module.
         if not error.name or not f"risorius.{name}.".startswith(f"{error.name}."):
             raise
         raise UnusableError(
@@ -188,7 +188,7 @@ def part(name: str) -> ModuleType:
 
 @cache
 def regions() -> FaceRegions:
-    """The regions of a face; none without the native module."""
+    """The regions of a face; without regions if the native module is missing."""
     if problem():
         return FaceRegions({}, lambda _: "", lambda _: "")
     known, sides = part("controls.regions"), part("controls.sides")
@@ -199,18 +199,18 @@ def regions() -> FaceRegions:
 
 
 class LiveSource(TypedDict):
-    """A program that sends faces, as live/sources.toml of the wheel has it."""
+    """A program that sends captured faces; a table of live/sources.toml in the wheel."""
 
-    port: int  # of UDP
+    port: int  # UDP port
     title: str
     description: str
 
 
 @cache
 def live_sources() -> dict[str, LiveSource]:
-    """Who sends faces, by name; none without the native module.
+    """Programs that send captured faces, by name; empty without the native module.
 
-    Blender asks for them as it starts, so nothing that receives is loaded for it.
+    Blender needs them when it starts, so only the TOML file is read and no receiver is loaded.
     """
     if problem():
         return {}
@@ -219,14 +219,14 @@ def live_sources() -> dict[str, LiveSource]:
 
 
 def dna_error() -> type[Exception]:
-    """The class of errors of bad files, or one that is never raised without the module."""
+    """The class of errors about bad DNA files; a class that is never raised without the module."""
     return _risorius.DnaError if _risorius is not None else _Never
 
 
 def user_errors() -> tuple[type[Exception], ...]:
-    """What an operator catches: what a user can mend, of the add-on, the package or the system.
+    """The errors that an operator reports: mendable errors of add-on, package and system.
 
-    Anything else is a fault of the program and is to be seen as one.
+    Any other exception is a fault of the program and must stay visible.
     """
     return FaceError, getattr(_risorius, "RisoriusError", _Never), OSError
 
@@ -236,4 +236,4 @@ class UnusableError(FaceError, RuntimeError):
 
 
 class _Never(Exception):  # noqa: N818
-    """Stands in where the native module is missing."""
+    """A class that is never raised; used if the native module is missing."""

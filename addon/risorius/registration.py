@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One ordered list of classes, and what goes with them; unregistered in reverse."""
+"""Registers all classes, properties and handlers in order, and unregisters them in reverse."""
 
 from collections.abc import Mapping
 
 import bpy
 
 from . import native
-from .language import tables
+from .language import errors, tables
 from .scene.animation import layer_properties, range_properties
 from .scene.base import compat, console, session
 from .scene.events import handlers
@@ -55,7 +55,7 @@ from .ui.see_why import overlay as why_overlay
 from .ui.see_why import panel as why_panel
 from .ui.see_why import properties as why_properties
 
-# Panels of one bl_order stand in the order in which they are registered.
+# Panels with equal bl_order appear in the order of registration.
 CLASSES = (
     *layer_properties.CLASSES,
     *range_properties.CLASSES,
@@ -82,24 +82,27 @@ CLASSES = (
 )
 
 
-# What they keep is read from files of the extension, which are the same until Blender ends.
+# Caches of files of the extension, which do not change before Blender ends.
 session.adopt(
     ("quit",),
     native.addon_version,
     native.website,
     native.regions,
     native.live_sources,
+    errors.best,
+    errors.rows,
     tables.controls,
+    tables.error_rows,
     tables.languages,
     tables.search_words,
     tables.translation,
 )
-# What is registered where another copy is in use.
+# The class that is registered if another copy of the add-on is active.
 _idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
 def _window_properties() -> dict[str, object]:
-    """What goes with the window and not with the file."""
+    """Properties of the window manager, which are not stored in the file."""
     return {
         "risorius_search": bpy.props.StringProperty(
             name="Search",
@@ -132,9 +135,9 @@ def _window_properties() -> dict[str, object]:
 
 
 def register() -> None:
-    """Register classes, menus and handlers; without the native module only words.
+    """Register classes, properties, menus and handlers.
 
-    Where another copy is in use this one stays idle: two would move each face twice.
+    If another copy is active, this one does nothing, because two would move each face twice.
     """
     words.follow_language()
     other = native.other_copy()
@@ -177,10 +180,10 @@ def register() -> None:
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """Called before Blender's own glTF exporter writes.
+    """Handle the start of an export by Blender's glTF exporter.
 
     Args:
-        settings: the exporter's.
+        settings: settings of the exporter.
     """
     if not _idle:
         live_faces.before_gltf(settings)
@@ -188,13 +191,13 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def after_gltf() -> None:
-    """Called after Blender's own glTF exporter has written."""
+    """Handle the end of an export by Blender's glTF exporter."""
     if not _idle:
         ordinary_form.end(ordinary_form.GLTF)
 
 
 def _refresh_once() -> None:
-    """Data cannot be touched while an add-on registers, so faces are brought up after it."""
+    """Update all faces; a timer calls this, because data must not change during registration."""
     handlers.refresh()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The self-test, the list of a face's contents, and reactions in every mode."""
+"""The self-test, the contents of a face, and the timing overlay in every mode."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ def test_the_self_test_says_that_the_module_works(monkeypatch):
     assert works
     assert "works" in text
     assert "Python 3." in text
-    assert "scalar" not in text  # which instructions a processor has is for the self-test
+    assert "scalar" not in text  # the self-test names it
     words = text.partition(": ")[2].split(", ")
     assert all(w.strip(",") == w != "" for w in words), text
 
@@ -165,7 +165,7 @@ def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
     lines = timing.lines()
     assert lines[0].startswith("Risorius, faces: 2")
     assert [line.split()[0] for line in lines[2:6]] == ["controls", "rig", "bones", "shapes"]
-    # Not the lines: a small face takes less than the hundredth of a millisecond that they show.
+    # The lines are not compared, because a small face takes less than the 0.01 ms that they show.
     played = [frame for frame in timing.frames if frame.characters]
     assert len(played) == 6
     assert all(frame.stages[stage] > 0 for frame in played for stage in timing.STAGES)
@@ -180,7 +180,7 @@ def test_times_of_a_frame_are_those_of_the_clock(monkeypatch):
     timing.begin()
     clock[0] = 10.001
     timing.animated()
-    for start in (10.002, 10.020):  # two characters: stages of 1, 2, 3 and 4 ms
+    for start in (10.002, 10.020):  # for each of two characters, stages of 1, 2, 3 and 4 ms
         timing.add([start, start + 0.001, start + 0.003, start + 0.006, start + 0.010])
     clock[0] = 10.035
     timing.drawing_begins()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions of the controls and come back, at any rate and in every way to play them."""
+"""Clips become actions of the controls and are exported again, at any rate and in every target."""
 
 import hashlib
 import importlib.util
@@ -30,7 +30,7 @@ def rig(dna_file):
 
 
 def _clip(**changes):
-    """Half a second at 60 fps that starts at 2 s: a moving jaw, a still brow, a stranger."""
+    """A clip of half a second at 60 fps from 2 s on: moving jaw, still brow, unknown curve."""
     count = 31
     jaw = 0.5 - 0.5 * np.cos(np.arange(count) / 5)
     curves = [jaw, np.full(count, 0.25), np.linspace(0, 1, count)]
@@ -57,7 +57,7 @@ def _table(tmp_path):
 
 
 def test_what_an_import_leaves_as_it_was_is_named_and_can_be_brought_to_rest(rig, tmp_path, capfd):
-    """Importing as a layer reports nothing, because a layer lies above the pose."""
+    """An import as a layer reports nothing, because a layer does not change unmoved controls."""
 
     def bring(**options):
         scene.set_controls(rig, browDownL=0.38, mouthCornerPullL=0.2, jawOpen=0.6)
@@ -132,7 +132,7 @@ def test_a_clip_for_another_thing_is_refused(rig):
 
 
 def test_a_minute_of_a_whole_face_has_all_its_keys(tmp_path):
-    """260 controls at 60 fps, as in a capture."""
+    """Eight controls with random values in all of 3600 frames at 60 fps."""
     from support.faces import CONTROLS, small_face
 
     random = np.random.default_rng(3)
@@ -185,7 +185,7 @@ def test_it_plays_as_a_strip_where_its_keys_are(rig):
     for frame in (11.0, 13.5, 20.0):
         wanted = clip.sample(2.0 + (frame - 10.4) / 24)[0, 0]
         assert _played(rig, frame)[JAW] == pytest.approx(wanted, abs=2e-6)
-    assert _played(rig, 60)[JAW] == pytest.approx(clip.curve(JAW)[-1])  # held
+    assert _played(rig, 60)[JAW] == pytest.approx(clip.curve(JAW)[-1])  # held after the last key
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE"])
@@ -202,11 +202,11 @@ def test_the_head_turns_as_the_clip_says(rig, rotation_mode):
     _played(rig, 12)
     seen = controls.evaluated_get(bpy.context.evaluated_depsgraph_get())
     turn = place.own_turn(seen, seen.pose.bones["head"])
-    # Independent of the add-on's own formula: roll, then pitch, then yaw about Blender's axes.
+    # An independent formula: roll, then pitch, then yaw about Blender's axes.
     wanted = Euler((-0.2, -0.25, 0.45), "YXZ").to_quaternion()
-    assert turn.rotation_difference(wanted).angle < 1e-3  # between keys: the bone's own way
+    assert turn.rotation_difference(wanted).angle < 1e-3  # in the bone's interpolation
     nose, crown = turn @ Vector((0, -1, 0)), turn @ Vector((0, 0, 1))
-    assert nose.x > 0.3  # to its own left
+    assert nose.x > 0.3  # to the face's left
     assert nose.z > 0.1  # up
     assert crown.x < 0.3
 
@@ -244,7 +244,7 @@ EXPECTED = (JAW, PULL, BROW, "CTRL_expressions.eyeLookUpL")
 
 @pytest.fixture
 def capture(tmp_path):
-    """Live Link Face's own form: 30 rows a second on a timecode of 60, a row dropped."""
+    """A take in Live Link Face's form: 30 rows per second, 60 frames in timecodes, one row lost."""
     names = ["JawOpen", "MouthSmileLeft", "BrowDownLeft", "EyeLookUpLeft", "TongueOut", "HeadYaw"]
     lines = [",".join(["Timecode", "BlendShapeCount", *names, "Surprise"])]
     for row in [0, 1, 2, 4, *range(5, 40)]:
@@ -286,13 +286,13 @@ def test_a_capture_lands_on_whole_frames_of_the_scene(rig, capture, fps, fps_bas
     assert _import(capture) == {"FINISHED"}
     action = scene.controls(rig).animation_data.action
     curves = list(_curves(action))
-    assert len(curves) == 8  # of four sliders, and of the head's four numbers
+    assert len(curves) == 8  # four sliders, and the head's quaternion
     for curve in curves:
         frames = np.array([k.co[0] for k in curve.keyframe_points])
         assert np.array_equal(frames, np.rint(frames))
         assert (np.diff(frames) > 0).all()
         assert len(frames) <= 2 * 39
-    # At whole frames the curve equals straight lines between the rows of the file, constant
+    # At whole frames the curve equals straight lines between the rows of the file; it is constant
     # outside.
     rows = np.array([0, 1, 2, 4, *range(5, 40)])
     jaw = next(c for c in curves if "jawOpen" in c.data_path)
@@ -310,7 +310,7 @@ def test_a_long_pause_makes_no_keys(rig, tmp_path):
     path.write_text(f"time,{JAW}\n0.01,0.25\n0.5,0.5\n40000.0,0.75\n", encoding="utf-8")
     assert _import(path) == {"FINISHED"}
     (curve,) = _curves(scene.controls(rig).animation_data.action)
-    frames = [1, 2, 13, 40000 * 24 + 1]  # each sample has the frame before it and the one after
+    frames = [1, 2, 13, 40000 * 24 + 1]  # each sample gives keys on the frames before and after it
     assert [k.co[0] for k in curve.keyframe_points] == frames
     path.write_text(f"time (s),{JAW}\n0,0.25\n1e12,0.5\n", encoding="utf-8")
     with pytest.raises(RuntimeError, match="beyond what Blender can play"):
@@ -329,7 +329,7 @@ def test_a_long_pause_makes_no_keys(rig, tmp_path):
 def test_the_scenes_range_is_extended_fitted_or_kept(rig, capture, choice, before, after):
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = before
     bpy.context.scene.render.fps = 24
-    # 39 thirtieths of a second: 31.2 frames from a begin of 18.9.
+    # 39 thirtieths of a second are 31.2 frames, from frame 18.9 on.
     done = bpy.ops.risorius.import_animation(filepath=str(capture), start=18.9, **choice)
     assert done == {"FINISHED"}
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == after
@@ -378,7 +378,7 @@ def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
 
 
 def _last_jaw(rig):
-    """Frame and value of the last key of the jaw."""
+    """Frame and value of the jaw's last key."""
     action = scene.controls(rig).animation_data.action
     key = next(c for c in _curves(action) if "jawOpen" in c.data_path).keyframe_points[-1]
     return pytest.approx((key.co[0], key.co[1]), abs=1e-3)
@@ -474,7 +474,7 @@ def test_a_capture_as_a_strip_or_a_layer(rig, capture, target):
 
 
 def _arkit_rig():
-    """A mesh of another tool: ARKit's names as shape keys, one with a driver."""
+    """A mesh as from another tool: shape keys with ARKit's names, one of them driven."""
     mesh = bpy.data.meshes.new("Other")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     item = bpy.data.objects.new("Other", mesh)
@@ -522,7 +522,7 @@ WORDS = "Hello, my name is Bob."
 
 @pytest.fixture
 def voice(tmp_path):
-    """A spoken sentence."""
+    """A WAV file with a spoken sentence."""
     program = shutil.which("espeak-ng")
     if program is None or importlib.util.find_spec("pocketsphinx") is None:
         pytest.skip("EXTRA NOT RUN: speech needs the program espeak-ng and PocketSphinx")
@@ -559,7 +559,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 
 def _gives_the_face_back(rig, last):
-    """Before and after a voice the face follows its sliders."""
+    """Check that the face follows its sliders before and after a voice."""
     scene.set_controls(rig, mouthCornerPullL=0.6)
     present = scene.submodule("scene.see_why.present")
     shown = {}
@@ -587,7 +587,7 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
     ended.run()
     assert type(ended.error).__name__ == "CancelledError"
     assert ended.result is None
-    # This file never delivers data; the reading process must be ended all the same.
+    # This pipe never delivers data, but the process that reads it must end.
     os.mkfifo(tmp_path / "endless.wav")
     stuck = listening.SpeechTask(str(tmp_path / "endless.wav"), WORDS)
     stuck.start()
@@ -598,8 +598,10 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
 
 
 def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkeypatch):
-    """A Blender with another libpocketsphinx cannot load the recogniser, so it runs in a process of
-    its own."""
+    """If this Blender cannot load the recogniser, speech still works in a separate process.
+
+    The reason may be another libpocketsphinx in Blender.
+    """
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     monkeypatch.setattr(
         scene.submodule("scene.animation.speech_task"), "has_recogniser", lambda: True
@@ -660,7 +662,7 @@ def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
 
 @pytest.fixture
 def shelf(tmp_path, monkeypatch):
-    """A folder that pip takes packages from, instead of the network."""
+    """A folder from which pip installs packages instead of the network."""
     folder = tmp_path / "shelf"
     folder.mkdir()
     for name in [name for name in os.environ if name.startswith("PIP_")]:
@@ -674,7 +676,7 @@ def shelf(tmp_path, monkeypatch):
 
 
 def put_wheel(shelf):
-    """A package that calls itself PocketSphinx. Returns: its SHA-256."""
+    """Put a package with the name of PocketSphinx on the shelf. Returns its SHA-256."""
     info = "pocketsphinx-5.1.1.dist-info"
     path = shelf / "pocketsphinx-5.1.1-py3-none-any.whl"
     with zipfile.ZipFile(path, "w") as wheel:
@@ -722,7 +724,7 @@ def test_what_was_installed_for_the_add_on_is_found_and_changes_no_search_path(m
 
 def test_without_a_network_the_button_says_so(shelf, monkeypatch):
     monkeypatch.delenv("PIP_NO_INDEX")
-    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")  # nobody listens there
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")  # no server listens there
     with pytest.raises(RuntimeError, match=r"could not be reached \(Connection refused\)"):
         scene.submodule("scene.animation.speech_task").install_recogniser()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers above the sliders: Blender shows the values of the Mixer, which equal those of the NLA."""
+"""Layers above the sliders: Blender shows the values of the Mixer, which equal the NLA's."""
 
 import bpy
 import numpy as np
@@ -24,7 +24,7 @@ def _layers():
 
 
 def _action(rig, name="Wave", interpolation="BEZIER", **curves):
-    """An action with keys: control -> {frame: value}."""
+    """Make an action from control -> {frame: value}."""
     controls, bone = scene.controls(rig), scene.face(rig)
     data = controls.animation_data_create()
     before = data.action
@@ -52,7 +52,7 @@ def _wave(rig, **options):
 
 
 def _raw(rig, frame):
-    """The raw controls of the evaluator at a frame: float32[controls]."""
+    """The raw controls that the evaluator receives at a frame, float32[controls]."""
     bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
     live = scene.submodule("scene.character.runtime").of(rig)
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -66,7 +66,7 @@ def _value(rig, frame, name):
 
 
 def _strip(rig, action, track="Track", **settings):
-    """A strip of Blender's own NLA."""
+    """A strip of Blender's NLA with an action on a new track."""
     data = scene.controls(rig).animation_data_create()
     new = data.nla_tracks.new()
     strip = new.strips.new(track, 1, action)
@@ -135,7 +135,7 @@ BLINK = PREFIX + "eyeBlinkL"
 
 @pytest.fixture
 def blinker(tmp_path):
-    """A face that can blink."""
+    """A face that has the controls of a blink."""
     from support.faces import renumbered, small_face
 
     eyes = [PREFIX + n for n in ("eyeBlinkL", "eyeBlinkR", "eyeSquintInnerL")]
@@ -157,7 +157,7 @@ def _entry(rig, **settings):
 
 
 def _performance(rig, rules):
-    """Speech, an emotion that fades in on a mask, a nod at half speed, a flash: the list."""
+    """Add layers: speech, a masked expression that fades in, a blink, and fired reactions."""
     controls = scene.controls(rig)
     controls.risorius_layer_rules = rules
     _entry(rig, action=_wave(rig, interpolation="LINEAR"), start=3.0, scale=1.5)
@@ -167,11 +167,11 @@ def _performance(rig, rules):
     _entry(rig, action=blink, start=6.0, extend="REPEAT", blend="ADD", controls="eye* -*squint*")
     _layers().fire(controls, "flash", 14.5, 0.9)
     _layers().fire(controls, "flash", 40.0, 0.5)
-    _layers().fire(controls, "blink", 400.0)  # long after the others are over
+    _layers().fire(controls, "blink", 400.0)  # long after all other layers have ended
 
 
 def _mixer(rig, rules):
-    """The same by risorius.Mixer alone, its times in seconds."""
+    """The same layers in risorius.Mixer, with times in seconds."""
     import risorius
 
     names = scene.submodule("scene.character.runtime").of(rig).labels
@@ -216,7 +216,7 @@ def test_what_one_sees_is_what_the_mixer_computes(blinker, rules):
     for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125, 403):
         wanted = mixer.evaluate(frame / 24, base)
         np.testing.assert_allclose(_raw(blinker, frame), wanted, atol=2e-6)
-    assert _value(blinker, 18.5, BLINK) > 0.85  # the flash
+    assert _value(blinker, 18.5, BLINK) > 0.85  # the reaction flash
 
 
 def test_the_mesh_shows_the_layers(rig, dna_file):
@@ -269,7 +269,7 @@ def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
 
 
 def _names(controls):
-    """Of the layers, bottom to top."""
+    """The names of the layers, the lowest first."""
     return [layer.name for layer in _layers().of(controls)]
 
 
@@ -285,15 +285,15 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
             key.interpolation = "LINEAR"
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
     assert _value(rig, 6, JAW) == 1.0
-    assert _value(rig, 3.5, PULL) == pytest.approx(0.25)  # subframes, as motion blur asks
+    assert _value(rig, 3.5, PULL) == pytest.approx(0.25)  # subframes, which motion blur evaluates
     assert bpy.ops.risorius.layer_move(up=False) == {"FINISHED"}
     assert _names(controls) == ["high", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
     assert _value(rig, 6, JAW) == 1.0
     assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
     assert _names(controls) == ["high", "high.001", "low"]
-    assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the half that was left
-    assert _value(rig, 3.5, PULL) == pytest.approx(1.0 - 0.75**2)  # its keys came along
+    assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the remaining half
+    assert _value(rig, 3.5, PULL) == pytest.approx(1.0 - 0.75**2)  # its keys were copied
     controls.risorius_layers_index = 1
     assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
     assert _names(controls) == ["high.001", "low"]
@@ -306,7 +306,7 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
 
 
 def _key_weights(controls, name, *values):
-    """An action with a key for the weight of each layer; no object plays it."""
+    """An action with a key for the weight of each layer, which no object plays."""
     data = controls.animation_data_create()
     data.action = action = bpy.data.actions.new(name)
     for place, value in enumerate(values):
@@ -333,7 +333,7 @@ def _as_meta_strip(controls, action):
 
 
 def _as_linked(controls, action, folder):
-    """The action as another file's."""
+    """Link the action from another .blend and assign it."""
     path = folder / "actions.blend"
     name = action.name
     bpy.data.libraries.write(str(path), {action})
@@ -464,7 +464,7 @@ def test_warp_points_pin_what_is_shown(rig):
     entry = _entry(rig, action=_action(rig, "Ramp", "LINEAR", jawOpen={0: 0.0, 20: 1.0}), start=0)
     _raw(rig, 10)
     assert bpy.ops.risorius.layer_warp() == {"FINISHED"}
-    assert _value(rig, 5, JAW) == pytest.approx(0.25)  # nothing has changed yet
+    assert _value(rig, 5, JAW) == pytest.approx(0.25)  # the pin keeps the current time
     point = next(p for p in entry.warp if p.frame == 10)
     point.frame = 4
     assert _value(rig, 4, JAW) == pytest.approx(0.5)
@@ -560,7 +560,7 @@ def test_layers_on_an_override(rig, tmp_path):
     scene.controls(own).risorius_layers_index = 0
     assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
     assert _value(own, 5, JAW) > 0.3
-    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}  # the library's own
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}  # the layer of the library
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     own = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
@@ -657,7 +657,7 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
 
 
 def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
-    """Other .blend files of the folder use the same file, and it may be a link to a shared one."""
+    """Other .blend files in the folder use the same catalogue file, which may be a link."""
     shared, link = tmp_path / "shared.txt", tmp_path / "blender_assets.cats.txt"
     old = "VERSION 1\n\n6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a12:Props:Props\n"
     shared.write_text(old, encoding="utf-8")
@@ -676,7 +676,7 @@ def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
 def test_idle_life_is_that_of_its_seed(blinker):
     from risorius.anim.idle import idle
 
-    scene.controls(blinker).risorius_lids = 0.0  # else a gaze moves the lids too
+    scene.controls(blinker).risorius_lids = 0.0  # otherwise a gaze moves the lids too
     entry = _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0)
     wanted = idle(7, 10.0)
     for frame in (5, 33, 100, 200.5):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh with a face's own vertices, moved by anything, becomes curves of the face's controls."""
+"""A mesh with the vertices of a face, moved in any way, gives curves of the face's controls."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ def rig(dna_file):
 
 
 def wanted(path, frame):
-    """Vertices of the face's head in Blender's space: two controls go up together."""
+    """Vertices of the head in Blender's space at a frame; two controls rise together."""
     dna = risorius.load(str(path))
     raw = np.zeros(len(dna.raw_control_names), np.float32)
     for name, most in MOVED.items():
@@ -34,7 +34,7 @@ def add_mesh(points, name="Take"):
 
 
 def performer(path, change=lambda points: points):
-    """An object whose shape keys repeat the performance, one key a frame."""
+    """An object whose shape keys repeat the performance, with one key per frame."""
     rest = change(wanted(path, 1))
     item = add_mesh(rest)
     item.shape_key_add(name="Basis")
@@ -72,7 +72,7 @@ def test_shape_keys_become_curves_that_repeat_them(rig, dna_file):
     found = np.empty(len(colours.data) * 4, np.float32)
     colours.data.foreach_get("color", found)
     cold = found.reshape(-1, 4)
-    assert np.ptp(cold, axis=0).max() < 0.05  # nothing is left over
+    assert np.ptp(cold, axis=0).max() < 0.05  # no residual remains
     assert cold[0, 2] > cold[0, 1]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""risorius.Mixer equals Blender's NLA, frame by frame, where the NLA has the same setting."""
+"""risorius.Mixer equals Blender's NLA at every frame, for settings that both have."""
 
 import bpy
 import numpy as np
@@ -8,7 +8,7 @@ from risorius import Clip, Layer, Mixer
 
 RATE = 24.0
 NAMES = ("a", "b", "c", "d")
-FRAMES = 20  # of each clip
+FRAMES = 20  # frames of each clip
 BASE = np.float32([0.1, 0.2, 0.3, 0.4])
 
 
@@ -18,7 +18,7 @@ def clip(names=NAMES, seed=1, high=0.5):
 
 
 def new_curve(action, path, index=0):
-    """An F-curve in an action of any Blender: with slots from 4.4 on."""
+    """A new F-curve of an action; actions have slots from Blender 4.4 on."""
     if not hasattr(action, "slots"):
         return action.fcurves.new(path, index=index)
     if not action.slots:
@@ -29,7 +29,7 @@ def new_curve(action, path, index=0):
 
 
 def keys(curve, frames, values):
-    """Replace keys by linear ones."""
+    """Replace all keys of a curve by linear keys."""
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     pairs = np.column_stack([frames, values]).ravel()
@@ -40,7 +40,7 @@ def keys(curve, frames, values):
 
 
 def action_of(source):
-    """The clip as an action, its frame 0 at frame 0."""
+    """The clip as an action; both begin with frame 0."""
     action = bpy.data.actions.new("Clip")
     for name, values in zip(source.names, source.curves, strict=True):
         keys(new_curve(action, f'["{name}"]'), np.arange(FRAMES), values)
@@ -48,7 +48,7 @@ def action_of(source):
 
 
 def strip_of(face, source, settings):
-    """The strip of a new track on top; settings as Blender names them."""
+    """Add a strip on a new top track; the settings have Blender's names."""
     settings = dict(settings)
     track = face.animation_data.nla_tracks.new()
     action = action_of(source)
@@ -91,7 +91,7 @@ def new_face():
     return face
 
 
-# Each: Blender's strips and our layers, bottom to top.
+# Name -> pairs of Blender's strips and our layers, the lowest first.
 STACKS = {
     "replace": [(1, {}, {})],
     "add": [
@@ -207,7 +207,7 @@ STACKS = {
         ),
     ],
 }
-# Which channels a strip lacks: the mask of its layer.
+# Strip number -> channels that it lacks, which is the mask of its layer.
 LACKS = {2: ("b",), 3: ("a", "d")}
 
 
@@ -229,6 +229,6 @@ def test_mixer_equals_nla(stack):
         scene.frame_set(int(np.floor(time)), subframe=time - np.floor(time))
         now = face.evaluated_get(bpy.context.evaluated_depsgraph_get())
         wanted.append([now[name] for name in NAMES])
-    assert np.ptp(wanted, axis=0).max() > 0.05  # Blender did play something
+    assert np.ptp(wanted, axis=0).max() > 0.05  # Blender has played an animation
     found = mixer.evaluate_batch(np.array(times) / RATE, BASE)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a face are visible in Blender's animation editors, which show selected items only."""
+"""Keys of a face are visible in Blender's animation editors, which show only selected items."""
 
 import bpy
 import pytest
@@ -20,7 +20,7 @@ def _selecting(bone):
 
 
 def _select(rig, *names):
-    """Select these bones of the controls and no other."""
+    """Select these bones of the controls and deselect all others."""
     for bone in scene.controls(rig).pose.bones:
         _selecting(bone).select = bone.name in names
 
@@ -42,8 +42,11 @@ def _other_armature():
 
 
 def test_a_key_is_seen_whatever_was_selected_before(rig):
-    """After an import, with another bone, the head, a body or nothing selected. Outside pose mode
-    keys of head and eyes are visible too, so that moving a column of keys moves all of them."""
+    """Keys stay visible after an import, with another bone, the head, a body or nothing selected.
+
+    Outside pose mode keys of head and eyes are visible too, so that moving a column of keys moves
+    all of them.
+    """
     controls, head, body = scene.controls(rig), scene.meshes(rig)[0], _other_armature()
     bpy.ops.risorius.key()
     assert JAW in seen_paths()

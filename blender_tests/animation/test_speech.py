@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a voice: as few as its curves need, or one on every frame if wanted."""
+"""Keys of a voice: the fewest that its curves need, or one on every frame if chosen."""
 
 import bpy
 import numpy as np
@@ -13,11 +13,11 @@ from support.layout import Recorder, drawn
 JAW = "CTRL_expressions.jawOpen"
 JAW_PATH = f'pose.bones["face"]["{JAW}"]'
 SAID = "SIL HH.hello AH L OW SIL B.bob AA B SIL W.why AY SIL".split()
-LENGTH = 0.1  # seconds of each sound
+LENGTH = 0.1  # seconds per sound
 
 
 def heard():
-    """A voice of 1.3 s: two words, a pause, a third word."""
+    """A voice of 1.3 s with two words, a pause, and a third word."""
     phones = []
     for i, said in enumerate(SAID):
         name, _, word = said.partition(".")
@@ -29,7 +29,7 @@ def heard():
 
 @pytest.fixture
 def rig(dna_file, monkeypatch):
-    """A face in a scene of 24 frames a second, and a recogniser that always hears the same."""
+    """A face in a scene with 24 frames per second, and a recogniser with a fixed result."""
 
     class Task:
         error = None
@@ -49,7 +49,7 @@ def rig(dna_file, monkeypatch):
 
 
 def speak(**options):
-    """The action of the voice, spoken from frame 11 on."""
+    """Speak from frame 11 on. Returns the action of the voice."""
     options = {"target": "ACTION", "start": 11.0, "use_sound": False, **options}
     assert bpy.ops.risorius.speak(filepath="bob.wav", **options) == {"FINISHED"}
     return bpy.context.object.animation_data.action
@@ -82,7 +82,7 @@ def test_a_voice_has_as_few_keys_as_its_curves_need(rig):
 
 
 def test_a_layer_shows_the_voice_at_every_frame(rig):
-    """Mixing, export and bake read curves with handles as well as straight lines."""
+    """Layers, export and bake read curves with handles as exactly as straight lines."""
     wanted = speech.animate(heard(), rate=24.0).curve(JAW)
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers
@@ -96,9 +96,11 @@ def test_a_layer_shows_the_voice_at_every_frame(rig):
 
 
 def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
-    """Visemes beside its file; a viseme with a control that the face lacks belongs to another
-    face."""
-    slider = "CTRL_expressions.eyeLookUpL"  # which no voice of ours moves
+    """A face uses the visemes in the folder of its DNA file.
+
+    A viseme with a control that the face lacks is ignored.
+    """
+    slider = "CTRL_expressions.eyeLookUpL"  # a control that our visemes do not move
     dna = tmp_path / "anna.dna"
     rig["risorius_source"] = str(dna)
     folder = tmp_path / "anna_expressions"
@@ -116,7 +118,7 @@ def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
     assert wanted.max() > 0.3
     frames = 11 + np.arange(len(wanted))
     np.testing.assert_allclose([curve.evaluate(f) for f in frames], wanted, atol=0.006)
-    # A correction is made of the same visemes, wherever the folder is by now.
+    # Corrections use the same visemes, even if the folder is gone.
     (folder / "aa.toml").unlink()
     before = max(k.co.y for k in curve.keyframe_points)
     for sound in action.risorius_spoken.sounds:
@@ -126,7 +128,7 @@ def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
     assert 0.0 < max(k.co.y for k in curve.keyframe_points) < before
 
 
-# ---- corrections ----
+# ---- corrections of sounds ----
 
 
 def sounds(action):
@@ -135,7 +137,7 @@ def sounds(action):
 
 
 def keys(action):
-    """All that is known of the keys of each curve."""
+    """All properties of the keys of each curve."""
     found = {}
     for path, curve in curves(action).items():
         rows = [
@@ -151,7 +153,7 @@ def frame_of(place):
 
 
 def jaw_of(action):
-    """The jaw curve of a new voice with the sounds of the list."""
+    """The jaw curve of a newly made voice with the sounds of the list."""
     said = [*action.risorius_spoken.sounds]
     ends = [sound.begin for sound in said[1:]] + [frame_of(len(SAID))]
     phones = [
@@ -182,7 +184,7 @@ def test_a_voice_keeps_its_words_and_sounds_with_its_action(rig, tmp_path):
 def test_a_replaced_sound_changes_the_mouth_around_it_and_nothing_else(rig):
     action = speak()
     before, frames = keys(action), np.arange(11, 11 + 32)
-    assert bpy.ops.risorius.sound_set(place=7, sound="Oo") == {"FINISHED"}  # in Bob
+    assert bpy.ops.risorius.sound_set(place=7, sound="Oo") == {"FINISHED"}  # in the word "bob"
     assert sounds(action)[7][1:] == ("UH", "")
     after = keys(action)
     assert after.keys() == before.keys()
@@ -192,12 +194,12 @@ def test_a_replaced_sound_changes_the_mouth_around_it_and_nothing_else(rig):
     for path in changed:
         rows = [row[0] for row in after[path] if row not in before[path]]
         rows += [row[0] for row in before[path] if row not in after[path]]
-        assert frame_of(7) - 12 < min(rows), path  # half a second around
+        assert frame_of(7) - 12 < min(rows), path  # half a second before and after
         assert max(rows) < frame_of(8) + 12, path
     found = [curves(action)[JAW_PATH, 0].evaluate(f) for f in frames]
     assert np.abs(found - jaw_of(action)[: len(frames)]).max() < 0.0101
     present = scene.submodule("scene.see_why.present")
-    bpy.context.scene.frame_set(29)  # what is seen
+    bpy.context.scene.frame_set(29)  # the evaluated face
     now = present.of(rig)
     assert now.raw[now.live.labels.index(JAW)] == pytest.approx(found[29 - 11], abs=1e-5)
 
@@ -243,12 +245,12 @@ def test_start_and_length_move_sounds_between_their_neighbours(rig):
     assert [round(rows[i].begin, 2) for i in (6, 7, 8)] == [25.4, 26.0, 30.2]
     rows[7].length = 2.0
     assert round(rows[8].start, 2) == 28.0
-    rows[7].start = 99.0  # the next one stays
+    rows[7].start = 99.0  # the next sound stays
     assert rows[7].begin == pytest.approx(27.75)
-    rows[0].start = 3.0  # the first one begins with the voice
+    rows[0].start = 3.0  # the first sound begins with the voice
     assert rows[0].begin == 11.0
     found = [curves(action)[JAW_PATH, 0].evaluate(f) for f in range(11, 43)]
-    assert np.abs(found - jaw_of(action)[:32]).max() < 0.02  # of four corrections
+    assert np.abs(found - jaw_of(action)[:32]).max() < 0.02  # the tolerance of four corrections
     action.risorius_spoken.active = 8
     assert bpy.context.scene.frame_current == 28
 
@@ -313,17 +315,17 @@ def test_a_correction_is_undone_in_one_step_with_its_keys(rig):
     assert bpy.ops.risorius.sound_remove(place=6) == {"FINISHED"}
 
 
-# ---- markers ----
+# ---- corrections by markers ----
 
 
 def marker(frame):
-    """The only marker at a frame."""
+    """The only marker at this frame."""
     (found,) = [m for m in bpy.context.scene.timeline_markers if m.frame == frame]
     return found
 
 
 def markers():
-    """Frame and name of all."""
+    """Frame and name of all markers, sorted."""
     return sorted((m.frame, m.name) for m in bpy.context.scene.timeline_markers)
 
 
@@ -334,7 +336,7 @@ def test_markers_stand_for_sounds_and_changed_ones_are_followed(rig, capfd):
     shown = markers()
     assert (25, "bob: M B P") in shown
     assert len(shown) == len(SAID) + 1
-    own.frame = 22  # nobody's business
+    own.frame = 22  # the user's own marker
     marker(28).frame = 27
     marker(30).name = "F V"
     with pytest.raises(RuntimeError, match="choose Update Speech first"):
@@ -343,12 +345,12 @@ def test_markers_stand_for_sounds_and_changed_ones_are_followed(rig, capfd):
     assert sounds(action)[7:9] == [(27.0, "AA", ""), (30.2, "F", "")]
     assert {(27, "Ah"), (30, "F V")} <= set(markers())
     bpy.context.scene.timeline_markers.remove(marker(27))
-    bpy.context.scene.timeline_markers.new("Oo", frame=41)  # a copy of another one, or a new one
+    bpy.context.scene.timeline_markers.new("Oo", frame=41)  # a copied or new marker
     assert bpy.ops.risorius.speech_update() == {"FINISHED"}
     assert [name for _, name, _ in sounds(action)] == (
         "SIL HH AH L OW SIL B F SIL W AY SIL UH".split()
     )
-    marker(13).frame = 45  # past all others
+    marker(13).frame = 45  # beyond all others
     capfd.readouterr()
     assert bpy.ops.risorius.speech_update() == {"FINISHED"}
     assert "hello: K G was moved past its neighbour" in capfd.readouterr().out

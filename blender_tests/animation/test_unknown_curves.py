@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves that no mapping knows: named in Blender, kept as a mapping, imported again by it."""
+"""Curves that no mapping contains: assigned in Blender, saved as a mapping, imported again."""
 
 import bpy
 import pytest
@@ -33,7 +33,7 @@ def test_unknown_curves_become_a_mapping_that_is_used_at_once(rig, tmp_path):
     assert panel().poll(bpy.context)
     assert drawn(panel()).labels.count("Choose...") == 2
     assert bpy.ops.risorius.assign_curve(curve="Key 1", becomes="mouthCornerPullL") == {"FINISHED"}
-    assert bpy.ops.risorius.assign_curve(curve="hat") == {"FINISHED"}  # left out
+    assert bpy.ops.risorius.assign_curve(curve="hat") == {"FINISHED"}  # without a control: left out
     assert bpy.ops.risorius.save_curve_mapping(filepath=str(mine)) == {"FINISHED"}
     written = importing.load_mapping(mine)
     assert written.rows["Key 1"] == {PULL: 1.0}
@@ -42,7 +42,7 @@ def test_unknown_curves_become_a_mapping_that_is_used_at_once(rig, tmp_path):
     action = bpy.context.object.animation_data.action
     found = scene.submodule("scene.base.compat").curves_of(action)
     pull = next(c for c in found if PULL in c.data_path)
-    assert pull.keyframe_points[0].co[:] == (5.0, 1.0)  # settings of the import are kept
+    assert pull.keyframe_points[0].co[:] == (5.0, 1.0)  # the settings of the import stay
     assert not panel().poll(bpy.context)
 
 
@@ -57,7 +57,7 @@ def test_a_file_of_which_nothing_is_known_can_be_named_too(rig, tmp_path):
     assert bpy.ops.risorius.save_curve_mapping(filepath=str(mine)) == {"FINISHED"}
     scene.evaluated(scene.meshes(rig)[0])
     assert scene.face(rig)[PULL] == 1.0
-    # Assign the other curve too, on top of the saved mapping.
+    # The saved mapping is extended by the second curve.
     bpy.ops.risorius.assign_curve(curve="Key 1", becomes="jawOpen")
     bpy.ops.risorius.save_curve_mapping(filepath=str(mine))
     assert set(importing.load_mapping(mine).rows) == {"Key 1", "Key 2"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make Rig from Head and Conform Face to Head make faces, refuse bad input, and keep the head."""
+"""Tests of the operators Make Rig from Head and Conform Face to Head."""
 
 import bmesh
 import bpy
@@ -34,7 +34,7 @@ def rigs():
 
 
 def moved_by(rig, control):
-    """How far a control moves the vertices of the first mesh."""
+    """float[V, 3]: displacements of the vertices of the first mesh by a control at 1."""
     mesh = scene.meshes(rig)[0]
     rest = scene.evaluated(mesh)
     scene.set_controls(rig, **{control: 1.0})
@@ -57,11 +57,11 @@ def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_pat
     wanted = to_blender(0.5 * opened(onto.heads[0].parts[0].mesh.positions))
     np.testing.assert_allclose(moved_by(rig, "jawOpen"), wanted, atol=2e-4)
     assert [m.name for m in scene.meshes(rig)[0].data.materials] == ["Skin"]
-    assert rig.matrix_world.translation.x > 2.1  # beside it
+    assert rig.matrix_world.translation.x > 2.1  # the rig is placed beside the head
     assert rig.matrix_world.translation.z == pytest.approx(0.5, abs=1e-4)
     names = {point.name for point in head.children}
-    assert names == {*PLACES, "chin"}  # shown, for the next time
-    assert head.data.shape_keys is None  # it stays as it was
+    assert names == {*PLACES, "chin"}  # found landmarks are shown on the head
+    assert head.data.shape_keys is None  # the head is unchanged
 
 
 def test_a_head_may_be_half_a_mesh_with_a_mirror(head, onto, dna_file, tmp_path):
@@ -103,7 +103,7 @@ def test_landmarks_that_a_person_placed_are_used(head, onto, dna_file, tmp_path)
     used = onto.heads[-1]
     assert list(used.fixed) == ["chin"]
     np.testing.assert_allclose(used.fixed["chin"], [0.0, -10.0, 8.0], atol=1e-4)
-    assert used.named == "Egg"  # who has looked at landmarks has said which mesh is the face
+    assert used.named == "Egg"  # the mesh with landmarks is the face
 
 
 def test_what_cannot_be_used_leaves_nothing(head, onto, dna_file, tmp_path, monkeypatch):
@@ -153,7 +153,7 @@ def test_a_face_takes_the_form_of_a_head(head, onto, dna_file, tmp_path):
     assert len(rigs()) == 2
     new = next(item for item in rigs() if item != rig)
     left = min(scene.evaluated(mesh)[:, 0].min() for mesh in scene.meshes(new).values())
-    assert left > max((head.matrix_world @ v.co).x for v in head.data.vertices)  # beside it
+    assert left > max((head.matrix_world @ v.co).x for v in head.data.vertices)  # beside the head
     ((dna, read),) = onto.asked
     assert dna is scene.submodule("scene.character.runtime").there(rig).dna
     assert len(read.parts[0].mesh.positions) == 506

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks of a head: shown where they were found, moved by hand, asked for by name, saved."""
+"""Tests of landmarks of a head in Blender: finding, moving, placing, saving and undo."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ def head(package):
 
 
 def shown(head):
-    """Name -> Point, as the panel sees them."""
+    """The shown landmarks of a head: name -> Point."""
     return scene.submodule("scene.anyhead.points").of(head)
 
 
@@ -39,7 +39,7 @@ def test_they_stand_on_a_head_that_is_turned_and_scaled(head, package):
     head.location, head.rotation_euler = (1.0, 2.0, 0.5), Euler((0.2, 0.1, 0.9))
     head.scale = (1.5, 1.5, 1.5)
     bpy.context.view_layer.update()
-    # What the package sees stands and is as large as the object.
+    # The package gets the mesh y up and with the scale of the object applied.
     axes = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) * 100.0
     turn = axes @ np.array(head.matrix_world.to_3x3())
     package.places = {name: turn @ to_blender(place) for name, place in PLACES.items()}
@@ -65,7 +65,7 @@ def test_what_is_moved_by_hand_stays_and_is_told_to_the_package(head, package):
     risorius.find_landmarks()
     point = shown(head)["eye_inner_L"].item
     point.location.x += 0.01
-    bpy.context.view_layer.objects.active = point  # whoever moves it has it selected
+    bpy.context.view_layer.objects.active = point  # the user moves a selected empty
     bpy.context.view_layer.update()
     assert shown(head)["eye_inner_L"].state == "MOVED"
     package.places = {name: (x, y + 0.3, z) for name, (x, y, z) in PLACES.items()}
@@ -148,7 +148,7 @@ def test_a_cube_and_a_face_get_no_panel(head, package, dna_file):
     bpy.ops.object.select_all(action="DESELECT")
     bpy.ops.mesh.primitive_cube_add()
     assert not panel.poll(bpy.context)
-    assert risorius.find_landmarks.poll()  # whoever asks for it by name may
+    assert risorius.find_landmarks.poll()  # the operator itself works without the panel
     bpy.ops.object.select_all(action="DESELECT")
     rig = scene.load(dna_file)
     bpy.ops.object.select_all(action="DESELECT")

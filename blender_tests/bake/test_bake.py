@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked faces move as the live ones did, by plain actions alone, and come back as they were."""
+"""Baked faces move like the live ones, by plain actions only, and can be made live again."""
 
 import addon_utils
 import bpy
@@ -9,7 +9,7 @@ from support import scene
 from support.animation import animate
 from support.layout import drawn
 
-NEAR = 1e-5  # of the size: what a bake may move a vertex by
+NEAR = 1e-5  # allowed error of a baked vertex, as a share of the face's size
 FRAMES = (1, 2, 3, 4, 6, 8, 10)
 
 
@@ -20,7 +20,7 @@ def _face(dna_file, mode="AUTO", **options):
 
 
 def _shown(rig, frame, whole=True):
-    """Vertices and maps at a frame."""
+    """Visible vertices and animated maps at a frame."""
     bpy.context.scene.frame_set(int(frame), subframe=frame - int(frame))
     shown = [m for _, m in sorted(scene.meshes(rig).items()) if not m.hide_viewport]
     return np.concatenate([scene.evaluated(m) for m in shown]), list(rig["maps"])
@@ -45,7 +45,7 @@ def _bake(rig=None, **options):
 
 
 def _state(rig):
-    """All that animates a character, and its shape keys, as plain values."""
+    """All animation data of a character, and its shape keys, as plain values."""
     owners = [rig, scene.controls(rig)]
     owners += [m.data.shape_keys for m in scene.meshes(rig).values() if m.data.shape_keys]
     found = []
@@ -80,7 +80,7 @@ def test_a_baked_face_moves_as_the_live_one(mode, dna_file):
     wanted = _film(rig)
     _bake()
     _assert_same(_film(rig), wanted)
-    assert np.abs(wanted[0][0] - wanted[3][0]).max() > 1e-3  # it does move
+    assert np.abs(wanted[0][0] - wanted[3][0]).max() > 1e-3  # the animation moves vertices
 
 
 @pytest.mark.parametrize("options", [{}, {"kind": "CONTROLS", "strip": True}, {"strip": True}])
@@ -91,7 +91,7 @@ def test_a_face_baked_under_time_stretching_moves_as_the_live_one(options, dna_f
     wanted = _film(rig)
     _bake(**options)
     _assert_same(_film(rig), wanted)
-    assert np.abs(wanted[0][0] - wanted[-1][0]).max() > 1e-3  # it does move
+    assert np.abs(wanted[0][0] - wanted[-1][0]).max() > 1e-3  # the animation moves vertices
 
 
 def test_it_plays_without_the_add_on_and_controls_move_it_no_more(mode, dna_file):
@@ -131,7 +131,7 @@ def test_back_to_live_is_exact_also_after_save_and_load(mode, dna_file, tmp_path
 
 
 def _complicate(rig):
-    """NLA, a driver, a constraint, a body, an own bone, own shape keys: all at once."""
+    """Add NLA strips, a driver, a constraint, a body, a bone and shape keys of the user."""
     controls = scene.controls(rig)
     data = controls.animation_data
     base = data.action
@@ -185,7 +185,7 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
     _bake(kind="CONTROLS")
     data = scene.controls(rig).animation_data
     assert not data.use_nla
-    assert tuple(data.action.frame_range) == (1.0, 10.0)  # of what was baked
+    assert tuple(data.action.frame_range) == (1.0, 10.0)  # the baked range
     assert all(c.mute for c in data.drivers)
     paths = {c.data_path for c in scene.curves(scene.controls(rig))}
     assert 'pose.bones["face"]["CTRL_expressions.browDownL"]' in paths
@@ -197,7 +197,7 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
 
 
 def _add_layers(rig):
-    """A layer of an action whose weight is animated, one that turns the head, and a reaction."""
+    """Add a layer with an animated weight, a layer that rotates the head, and a reaction."""
     controls = scene.controls(rig)
     own = controls.animation_data.action
     controls.animation_data.action = None
@@ -280,7 +280,7 @@ def test_controls_first_and_then_the_result(dna_file):
     _assert_same(_film(rig), wanted)
     bpy.ops.risorius.unbake()
     assert (_state(rig), scene.counts()) == (before, counts)
-    assert not bpy.ops.risorius.unbake.poll()  # grey: nothing is baked
+    assert not bpy.ops.risorius.unbake.poll()  # disabled, because nothing is baked
 
 
 def test_onto_an_nla_track(dna_file):
@@ -361,7 +361,7 @@ def test_a_strip_put_beside_the_baked_one_stays(dna_file):
     controls = animate(scene.load(dna_file))
     data, action = controls.animation_data, controls.animation_data.action
     _bake(kind="CONTROLS", strip=True)
-    # Blender 4.3 names it after its action, whatever one asks for.
+    # Blender 4.3 names the strip after its action, whatever name is given.
     mine = data.nla_tracks[-1].strips.new("mine", 100, action).name
     assert bpy.ops.risorius.unbake() == {"FINISHED"}
     assert [[s.name for s in t.strips] for t in data.nla_tracks] == [[mine]]
@@ -392,7 +392,7 @@ def test_reduction_holds_its_bound_on_any_curve():
     frames = np.cumsum(random.uniform(0.2, 2.0, 400))
     values = np.cumsum(random.normal(0, 0.1, (400, 60)), axis=0).astype(np.float32)
     values[:, 40:] = np.sin(frames / 9)[:, None] * np.arange(1, 21) * 50  # large numbers
-    values[:, 0], values[:, 1] = 7.0, frames  # still, and a line
+    values[:, 0], values[:, 1] = 7.0, frames  # a constant and a line
     for error in (1e-6, 1e-3, 0.05, 1.0):
         keep = curves.reduce_keys(frames, values, error)
         for i in range(values.shape[1]):
@@ -409,7 +409,7 @@ def test_reduction_holds_its_bound_on_any_curve():
 def test_where_float32_is_coarser_than_the_bound_all_keys_stay():
     curves = scene.submodule("logic.animation.key_reduction")
     frames = np.arange(400.0)
-    values = (frames[:, None] * [1.0, 1000.5]).astype(np.float32)  # lines, exactly
+    values = (frames[:, None] * [1.0, 1000.5]).astype(np.float32)  # exact lines
     keep = curves.reduce_keys(frames, values, 1e-4)
     first, last = values[0], values[-1]
     part = np.float32((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
@@ -439,7 +439,7 @@ def test_between_baked_frames_lie_straight_lines(dna_file):
 
 
 class _Window:
-    """The window of a modal operator, without Blender's interface."""
+    """A simulated window for a modal operator."""
 
     def __init__(self, job):
         self.window_manager, self.scene = self, bpy.context.scene

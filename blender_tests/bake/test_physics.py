@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulations and other readers see the face of their own frame, without side effects."""
+"""Simulations and other readers see the face of the current frame, without side effects."""
 
 import bpy
 import numpy as np
@@ -17,12 +17,12 @@ HANDLERS = (
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """Direct mode, a live key and real keys, both on posed bones."""
+    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
     return request.param
 
 
 def _has_maps_of_the_frame(rig, item):
-    """The material of a simulated mesh, which carries the maps, reads the maps of each frame."""
+    """Check that the material of a simulated mesh reads the animated maps of each frame."""
     assert "maps" in item
     material, seen = item.data.materials[0], []
     for frame in (1, 4):
@@ -45,7 +45,7 @@ def test_pinned_cloth_is_the_face_of_its_frame(mode, dna_file):
 
 
 def test_a_cache_that_begins_below_0_is_refused(dna_file):
-    """At negative frames Blender reads the last frame of the cache as soon as a face moves."""
+    """At negative frames Blender reads the last frame of the cache whenever a face moves."""
     _rig, item = simulations.moving(dna_file, "LIVE")
     modifier = simulations.cloth(item)
     modifier.point_cache.frame_start = -3
@@ -59,7 +59,7 @@ def test_free_cloth_falls_as_on_a_face_of_plain_actions(mode, dna_file):
     modifier = simulations.cloth(item, pinned=0.5)
     found = simulations.film(
         item, FRAMES[:5]
-    )  # it doubles what the last bits of its mesh are in each frame
+    )  # it amplifies the last bits of its mesh in each frame
     item.modifiers.remove(modifier)
     assert bpy.ops.risorius.bake() == {"FINISHED"}
     simulations.cloth(item, pinned=0.5)
@@ -76,7 +76,7 @@ def test_a_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_fil
 
 
 def test_a_baked_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_file, tmp_path):
-    """Blender caches them after its handlers, so they were never a frame late."""
+    """Blender computes geometry nodes after its handlers, so they are never a frame late."""
     _rig, item = simulations.moving(dna_file, mode, far=0.0)
     shown = simulations.film(item)
     wanted = simulations.mean_places(shown)
@@ -114,7 +114,7 @@ def test_alembic_has_the_cloth_of_each_frame(mode, dna_file, tmp_path):
     simulations.cloth(item)
     if (
         mode != "KEYS"
-    ):  # see docs/measurements/blender.md: a graph of the exporter's own is told afterwards
+    ):  # see docs/measurements/blender.md: the exporter's own depsgraph is updated too late
         assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
     path = str(tmp_path / "face.abc")
     bpy.ops.wm.alembic_export(
@@ -278,14 +278,14 @@ def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
 
 @pytest.fixture
 def onlooker():
-    """Another add-on with a frame handler: it needs posed faces."""
+    """Another add-on with a frame handler, for which faces must be posed."""
 
     def look(*_arguments):
         pass
 
     bpy.app.handlers.frame_change_post.append(look)
     yield
-    if look in bpy.app.handlers.frame_change_post:  # a file that is opened takes it away
+    if look in bpy.app.handlers.frame_change_post:  # opening a file removes it
         bpy.app.handlers.frame_change_post.remove(look)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked simulations: of older files, in other processes, between frames."""
+"""Baked simulations: from older files, in other processes, between frames."""
 
 import json
 
@@ -13,7 +13,7 @@ VERSION = "risorius_version"
 
 
 def _baked(dna_file, mode):
-    """A face with pinned cloth that is baked; and its head mesh."""
+    """A face with pinned and baked cloth, and its head mesh."""
     rig, item = simulations.moving(dna_file, mode)
     simulations.cloth(item)
     assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
@@ -41,7 +41,7 @@ def test_caches_of_older_files_are_told_until_they_are_baked_again(old, dna_file
     assert not _told(rig)
     scene.controls(rig)[VERSION] = old
     path = tmp_path / "old.blend"
-    for _ in range(2):  # and it is told again when the file was saved as it was
+    for _ in range(2):  # the second time, the file was saved without baking again
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
         capsys.readouterr()
         bpy.ops.wm.open_mainfile(filepath=str(path))
@@ -77,11 +77,11 @@ def test_each_frame_in_a_process_of_its_own(dna_file, tmp_path):
 
 
 def test_a_render_with_motion_blur_has_the_face_of_every_part_of_a_frame(mode, dna_file, tmp_path):
-    """Also of a cloth, which Blender has between two frames at the mean of both."""
+    """Cloth too, for which Blender shows the mean of two frames between them."""
     _face, item = _baked(dna_file, mode)
     setup, seen = bpy.context.scene, {}
     setup.render.engine, setup.cycles.samples, setup.cycles.device = "CYCLES", 1, "CPU"
-    setup.cycles.use_denoising = False  # not each Blender can
+    setup.cycles.use_denoising = False  # some Blenders lack the denoiser
     setup.render.resolution_x = setup.render.resolution_y = 8
     setup.render.use_motion_blur, setup.render.motion_blur_shutter = True, 1.0
     setup.render.filepath = str(tmp_path / "blurred.png")

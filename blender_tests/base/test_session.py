@@ -39,7 +39,7 @@ def _frame():
 
 @pytest.fixture
 def probes():
-    """An entry with content for each event."""
+    """For each event a session entry with content."""
     session = _session()
     kept = {word: session.keep(f"probe.{word}", list, (word,)) for word in WORDS}
     yield kept
@@ -70,7 +70,7 @@ def test_an_event_ends_its_words(probes, event, ended):
 
 
 def _fill(dna_file):
-    """A session with a face that is keyed, asked why, copied and shown as a heat map."""
+    """Make a face and use it, so that the session's entries have content."""
     rig = scene.load(dna_file, "LIVE")
     bpy.context.view_layer.objects.active = scene.controls(rig)
     scene.set_controls(rig, jawOpen=0.5, mouthCornerPullL=0.4)
@@ -84,7 +84,7 @@ def _fill(dna_file):
     return rig
 
 
-# Entries that no load ended before there was a registry.
+# Entries that loading a file did not empty before the registry existed.
 MISSED = (
     "caches.late",
     "controls_ahead.edited",
@@ -116,12 +116,12 @@ def test_a_load_leaves_nothing_of_the_file_before(dna_file):
     gc.collect()
     assert live() is None
     panel = scene.submodule("ui.see_why.panel")
-    panel._ask_soon()  # Blender drops the timer with the file: it is asked for again
+    panel._ask_soon()  # Blender removes the timer with the file; it must be registered again
     assert bpy.app.timers.is_registered(panel._ask)
 
 
 def _timers():
-    """The functions of the add-on that Blender calls later."""
+    """Names of the add-on's functions that Blender's timers will call."""
     modules = [m for name, m in sys.modules.items() if name.startswith(f"{MODULE}.")]
     functions = {f for m in modules for f in vars(m).values() if inspect.isfunction(f)}
     return {f.__name__ for f in functions if bpy.app.timers.is_registered(f)}
@@ -144,14 +144,14 @@ def test_registered_again_it_is_as_new(dna_file):
 
 
 class _Holder:
-    """Holds one value. Attributes: it."""
+    """Holds one value, `it`."""
 
     def __init__(self, it):
         self.it = it
 
 
 def test_blender_counts_one_reference_too_few_to_temporary_data():
-    """Fails in the first Blender that counts correctly; then update MISCOUNTED_UNTIL."""
+    """In the first Blender that counts correctly this fails; then update MISCOUNTED_UNTIL."""
     place = scene.submodule("scene.base.stage")
     lender = bpy.data.temp_data()
     lent, control = _Holder(lender.__enter__()), _Holder(object())

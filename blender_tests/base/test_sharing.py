@@ -11,12 +11,12 @@ from support import scene
 from support.faces import small_face
 
 SIDE = 96
-PICTURE = 30_000  # bytes that noise of that size has at least as a PNG
-METADATA = 300_000  # bytes of a file that do not pack
+PICTURE = 30_000  # smallest size in bytes of a PNG with noise
+METADATA = 300_000  # bytes of metadata that cannot be compressed
 
 
 def _picture(path, seed):
-    """A PNG of noise; returns its pixels as Blender reads them."""
+    """Write a PNG with noise. Returns its pixels as Blender reads them."""
     image = bpy.data.images.new("noise", SIDE, SIDE, alpha=False)
     noise = np.random.default_rng(seed).random((SIDE * SIDE, 4), np.float32)
     noise[:, 3] = 1.0
@@ -28,7 +28,7 @@ def _picture(path, seed):
 
 @pytest.fixture
 def textured(tmp_path):
-    """A file with DNA data and images that are hard to compress."""
+    """A DNA file with data and images that are hard to compress."""
     face = small_face()
     noise = np.random.default_rng(3).integers(32, 127, METADATA, np.uint8)
     face.metadata = {
@@ -47,13 +47,13 @@ def textured(tmp_path):
 
 
 def _images(rig):
-    """Label of the node -> image, of the head's material."""
+    """Label of a node -> its image, in the head's material."""
     nodes = scene.meshes(rig)[0].data.materials[0].node_tree.nodes
     return {n.label: n.image for n in nodes if n.type == "TEX_IMAGE"}
 
 
 def _pixels(rig, label="Colour"):
-    """The pixels of a node's image."""
+    """The pixels of the image in a node, float32[n]."""
     image = _images(rig)[label]
     flat = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(flat)
@@ -72,7 +72,7 @@ def _open(path):
 
 def _rigs():
     found = [o for o in bpy.data.objects if "risorius_controls" in o]
-    return sorted(found, key=lambda o: (len(o.name), o.name))  # in the order of their making
+    return sorted(found, key=lambda o: (len(o.name), o.name))  # in the order of their creation
 
 
 def _held_once(rigs):
@@ -100,7 +100,7 @@ def test_equal_faces_are_stored_once(textured, mode, tmp_path):
     _held_once(rigs)
     for rig in rigs:
         assert _exported(rig, tmp_path) == textured.read_bytes()
-    # Without sharing each would bring its file and its images.
+    # Without sharing, each face would have its own file and images.
     once = len(rigs[0]["risorius_dna"]["risorius_bytes"]) + PICTURE
     assert grown < 3 * (alone - once)
     scene.set_controls(rigs[1], jawOpen=0.8)
@@ -128,7 +128,7 @@ def _other_space(image, _folder):
 
 
 def _other_bytes(image, folder):
-    """Noise of the same size: even the packed file is as long as before."""
+    """Replace an image by noise of the same size, with a file of the same length."""
     _picture(folder / "other.png", 99)
     content = (folder / "other.png").read_bytes()
     image.pack(data=content, data_len=len(content))
@@ -208,7 +208,7 @@ def test_a_face_alone_is_painted_without_a_word(textured, tmp_path, capsys):
     scene.update(scene.controls(rig))
     assert _images(rig)["Colour"] == image
     assert image.is_dirty
-    other = scene.load(textured)  # has the file's picture, not the painted one
+    other = scene.load(textured)  # has the picture of the file, not the painted one
     assert _images(other)["Colour"] != image
     assert (_pixels(other) != _pixels(rig)).any()
     assert "as it was" not in capsys.readouterr().out
@@ -240,7 +240,7 @@ def test_another_file_for_one_leaves_the_others_theirs(textured, tmp_path):
     bpy.ops.risorius.replace_dna(filepath=str(other))
     assert rigs[1]["risorius_dna"].name == name
     bpy.context.view_layer.objects.active = scene.controls(rigs[1])
-    bpy.ops.risorius.reload()  # the same file again
+    bpy.ops.risorius.reload()  # reads the same file again
     assert _exported(rigs[0], tmp_path) == other.read_bytes()
     assert _exported(rigs[1], tmp_path) == textured.read_bytes()
     assert len([t for t in bpy.data.texts if "risorius_hash" in t]) == 2
@@ -266,7 +266,7 @@ def test_one_that_is_removed_takes_nothing_from_the_others(textured, tmp_path):
     build.remove(rigs[0])
     _held_once(rigs[1:])
     for item in [o for o in bpy.data.objects if o.name.startswith(rigs[1].name[:9])]:
-        for home in item.users_collection:  # as Delete does
+        for home in item.users_collection:  # as Blender's Delete does
             home.objects.unlink(item)
     _save(tmp_path / "left.blend")
     (rig,) = _open(tmp_path / "left.blend")
@@ -274,7 +274,7 @@ def test_one_that_is_removed_takes_nothing_from_the_others(textured, tmp_path):
     build.remove(rig)
     for text in [t for t in bpy.data.texts if "report" in t.name]:
         bpy.data.texts.remove(text)
-    assert scene.counts() == {**before, "collections": 1}  # the emptied one of Delete
+    assert scene.counts() == {**before, "collections": 1}  # Delete leaves an empty collection
 
 
 def test_undo_and_redo_of_sharing_and_editing(textured, tmp_path):
@@ -329,7 +329,7 @@ def test_appended_beside_an_equal_face(textured, tmp_path):
 
 
 def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
-    """Such a .blend has a Text and images for each face, without our marks on images."""
+    """Such a .blend has a Text and images for each face, without marks on images."""
     first, second = scene.load(textured), scene.load(textured)
     second["risorius_dna"] = first["risorius_dna"].copy()
     for node in scene.meshes(second)[0].data.materials[0].node_tree.nodes:
@@ -350,7 +350,7 @@ def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
 
 
 def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
-    """The hash is looked at, not believed."""
+    """The hash is computed, not taken from a property."""
     first = scene.load(textured)
     text = first["risorius_dna"]
     text["risorius_bytes"] = text["risorius_bytes"][:-9]
@@ -367,7 +367,7 @@ def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
 
 
 def test_a_face_has_one_live_key_where_nothing_else_is_chosen(dna_file):
-    """92 real keys of 17,465 vertices are 19 MB in a .blend, and again for every equal face."""
+    """92 real keys of 17,465 vertices take 19 MB in a .blend, and that for every equal face."""
     rig = scene.load(dna_file)
     scene.set_controls(rig, jawOpen=0.5)
     keys = [[b.name for b in m.data.shape_keys.key_blocks] for m in scene.meshes(rig).values()]

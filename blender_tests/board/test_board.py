@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face board: bones, values, leading side, and switching."""
+"""The face board: bones, values, switching between board and sliders, keys."""
 
 import bpy
 import numpy as np
@@ -9,7 +9,7 @@ from mathutils import Vector
 from support import scene
 from support.faces import small_face
 
-SAME = 1e-4  # of the head's size, as error_against_oracle measures
+SAME = 1e-4  # tolerance as a share of the head's size, see error_against_oracle
 JAW, LOOK, PULL_L, PULL_R = "CTRL_C_jaw", "CTRL_L_eye", "CTRL_L_mouth_pull", "CTRL_R_mouth_pull"
 GUI = [
     "CTRL_C_jaw.ty",
@@ -19,7 +19,7 @@ GUI = [
     "CTRL_L_eye.ty",
     "CTRL_L_brow.ty",
 ]
-# input, output, from, to, slope, cut: a bend, both halves of ways, a range in degrees
+# input, output, from, to, slope, cut: a bent line, both halves of axes, a range in degrees
 ROWS = [
     (0, 0, 0.0, 0.5, 0.5, 0.0),
     (0, 0, 0.5, 1.0, 1.5, -0.5),
@@ -34,7 +34,7 @@ ROWS = [
 
 
 def board_face():
-    """The small face with a board's worth of GUI controls."""
+    """The small face with GUI controls for a board."""
     dna = small_face()
     dna.gui_control_names = GUI
     names = ("input_indices", "output_indices", "from_values", "to_values")
@@ -52,7 +52,7 @@ def board_file(tmp_path_factory):
 
 @pytest.fixture
 def rig(board_file):
-    """The face with its board, which leads."""
+    """A face with a board that moves it."""
     rig = scene.load(board_file)
     scene.add_board()
     return rig
@@ -63,14 +63,14 @@ def handle(rig, name):
 
 
 def put(rig, **places):
-    """Bring handles to places (x, y), as an edit does."""
+    """Move handles to locations (x, y), as the user would."""
     for name, place in places.items():
         handle(rig, name).location = (*place, 0.0)
     scene.update(scene.controls(rig))
 
 
 def raw_by_rows(gui, count=11):
-    """The rows of the table in NumPy: the first matching row of each pair counts."""
+    """Raw controls from ROWS; of rows with one input and output, the first matching row counts."""
     raw, done = np.zeros(count), set()
     for control, out, low, high, slope, cut in ROWS:
         value = gui.get(GUI[control], 0.0)
@@ -90,7 +90,7 @@ def lead(rig):
 
 
 def shown(rig):
-    """The pose of the face according to the add-on, by short names."""
+    """The values of the face according to the add-on, by short names, without zeros."""
     values = scene.submodule("scene.character.sides").values_of(rig)
     return {name.rpartition(".")[2]: round(v, 5) for name, v in values.items() if v}
 
@@ -100,14 +100,14 @@ def test_handles_move_the_face_through_the_table(rig, board_file):
     gui = {"CTRL_C_jaw__ty": 0.75, "CTRL_L_eye__tx": -0.4, "CTRL_L_eye__ty": 0.6}
     gui |= {"CTRL_L_mouth_pull__ty": 0.3, "CTRL_L_brow__ty": 45.0}
     assert error(rig, board_file, **gui) < SAME
-    assert error(rig, board_file) > 0.01  # it does move
+    assert error(rig, board_file) > 0.01  # the pose moves the face
     assert lead(rig) == "BOARD"
 
 
 def test_what_the_board_does_not_lead_to_stays_with_the_sliders(rig, board_file):
     put(rig, **{JAW: (0.0, 1.0)})
     face = scene.face(rig)
-    face["CTRL_expressions.jawOpen"] = 0.2  # it does not lead
+    face["CTRL_expressions.jawOpen"] = 0.2  # has no effect, because the board leads
     face["twice"] = 0.7
     scene.update(scene.controls(rig))
     raw = raw_by_rows({"CTRL_C_jaw.ty": 1.0})
@@ -124,7 +124,7 @@ def test_handles_beyond_their_range_count_as_its_end(rig, board_file):
     local = seen.convert_space(
         pose_bone=jaw, matrix=jaw.matrix, from_space="POSE", to_space="LOCAL"
     )
-    assert np.abs(np.array(local.translation) - [0.0, 1.0, 0.0]).max() < 1e-4  # it is shown there
+    assert np.abs(np.array(local.translation) - [0.0, 1.0, 0.0]).max() < 1e-4  # shown there
 
 
 def test_a_board_that_was_moved_with_its_face_gives_the_same(rig, board_file):
@@ -167,7 +167,7 @@ def test_a_keyed_board_plays_at_any_frame(rig, board_file, hidden):
 
 
 def test_a_keyed_board_renders(rig, board_file, tmp_path):
-    """The frame that a render evaluates has the pose of that frame."""
+    """A rendered frame has the pose of this frame."""
     _key_jaw(rig)
     render = bpy.context.scene.render
     render.engine, render.resolution_x, render.resolution_y = "CYCLES", 8, 8
@@ -200,9 +200,9 @@ def test_switching_keeps_the_pose_and_says_what_is_lost(board_file):
     rig = scene.load(board_file)
     scene.set_controls(rig, jawOpen=0.4, mouthCornerPullL=0.6, eyeLookUpL=0.5, eyeLookDownL=0.3)
     assert "risorius_lead" not in scene.controls(rig)
-    assert len(scene.controls(rig).pose.bones) == 6  # nothing before one asks for it
+    assert len(scene.controls(rig).pose.bones) == 6  # a board is only made on request
     scene.add_board()
-    # Up and down at once is one handle: the greater stays.
+    # Up and down at the same time share a handle; the larger value stays.
     expected = {"jawOpen": 0.4, "mouthCornerPullL": 0.6, "eyeLookUpL": 0.5}
     assert shown(rig) == expected
     keys = scene.submodule("scene.animation.board_keys")
@@ -230,7 +230,7 @@ def test_keys_go_over_to_the_board_and_back(board_file):
         before[frame] = scene.snapshot(rig)
     action = scene.controls(rig).animation_data.action
     scene.add_board()
-    assert lead(rig) == "SLIDERS"  # its keys would stand still else
+    assert lead(rig) == "SLIDERS"  # otherwise the keys of the sliders would have no effect
     for by in ("BOARD", "SLIDERS"):
         assert bpy.ops.risorius.lead(by=by) == {"FINISHED"}
         paths = {c.data_path.partition("]")[0] for c in scene.curves(scene.controls(rig))}
@@ -251,7 +251,7 @@ def test_keys_of_handles_go_into_groups_by_region(rig):
     assert paths == {*(n.rpartition(".")[0] for n in GUI), "face", "neck", "head", "eye_L", "eye_R",
                      "eyes"}  # fmt: skip
     sliders = {path for path, _index in found if '"face"' in path}
-    assert len(sliders) == 3  # those that no handle leads to
+    assert len(sliders) == 3  # the sliders without a handle
     own = {key: group for key, group in found.items() if JAW in key[0] or LOOK in key[0]}
     assert own == {
         (f'pose.bones["{JAW}"].location', 1): "Jaw",
@@ -294,7 +294,7 @@ def test_operators_work_on_the_board_where_it_leads(rig, board_file):
     assert not shown(rig)
     bpy.ops.risorius.paste_pose()
     assert handle(rig, PULL_R).location.y == pytest.approx(0.7, abs=1e-5)
-    assert dict(scene.face(rig).items()) == sliders  # none of them was touched
+    assert dict(scene.face(rig).items()) == sliders  # all sliders are unchanged
     bpy.ops.risorius.select_board(region="EYE")
     bones = scene.controls(rig).pose.bones
     chosen = [b.name for b in bones if (b if hasattr(b, "select") else b.bone).select]
@@ -336,7 +336,7 @@ def test_blenders_pose_pasted_flipped_swaps_sides_on_a_primary_board(primary):
 def test_a_drag_moves_the_board_where_it_leads(rig, board_file):
     put(rig, **{JAW: (0.0, 0.2)})
     sliders = dict(scene.face(rig).items())
-    vertex, item = 12, scene.meshes(rig)[1]  # of the teeth: the jaw's
+    vertex, item = 12, scene.meshes(rig)[1]  # of the teeth, which the jaw moves
     before = scene.evaluated(item)[vertex]
     put(rig, **{JAW: (0.0, 0.8)})
     goal = scene.evaluated(item)[vertex]
@@ -421,7 +421,7 @@ def test_two_faces_and_a_copy_each_have_their_board(rig, board_file, tmp_path):
     for name, value in zip(names, (0.75, 0.25), strict=True):
         assert error(bpy.data.objects[name], board_file, CTRL_C_jaw__ty=value) < SAME
     bpy.context.view_layer.objects.active = scene.controls(bpy.data.objects[names[1]])
-    bpy.ops.risorius.remove_board()  # the copy's; the outlines are shared
+    bpy.ops.risorius.remove_board()  # of the copy; the handles' outlines are shared
     assert handle(bpy.data.objects[names[0]], JAW).custom_shape is not None
 
 
@@ -488,7 +488,7 @@ def test_a_primary_board_moves_the_face_by_its_own_handles(primary, board_file):
     raw = np.zeros(11)
     raw[[0, 1, 4, 7]] = 0.5, 0.3, 0.4, 0.2  # jaw, left corner, look left, look down
     assert scene.error_against_oracle(primary, board_file, raw) < SAME
-    scene.face(primary)["twice"] = 0.7  # no handle leads to it
+    scene.face(primary)["twice"] = 0.7  # a slider without a handle
     raw[9] = 0.7
     scene.update(scene.controls(primary))
     assert scene.error_against_oracle(primary, board_file, raw) < SAME
@@ -524,11 +524,11 @@ def test_one_kind_of_board_takes_the_place_of_the_other_with_pose_and_keys(board
             f'pose.bones["{own}"].location'
         }
         bpy.context.scene.frame_set(9)
-        assert shown(rig)["jawOpen"] == pytest.approx(0.125, abs=1e-3)  # as ROWS bend it
+        assert shown(rig)["jawOpen"] == pytest.approx(0.125, abs=1e-3)  # the bent line of ROWS
         bpy.context.scene.frame_set(5)
-        assert len(bpy.data.actions) == before + 1  # what was played before is kept
+        assert len(bpy.data.actions) == before + 1  # the earlier action is kept
     assert kept.use_fake_user
-    bpy.ops.risorius.add_board()  # without a kind: that which is there
+    bpy.ops.risorius.add_board()  # without a kind, the existing board is restored
     assert JAW in scene.controls(rig).pose.bones
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face follows its control armature, which may hang on a body."""
+"""A face follows its control armature, which may be attached to a body."""
 
 import itertools
 
@@ -19,7 +19,7 @@ NAMES = {
 
 
 def _body(names, scale=1.0, turn=0.0):
-    """An upright chain of bones with rolls, at any scale, in an object turned about x."""
+    """A chain of bones with rolls, at any scale, upright in an object that is rotated about x."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)
@@ -93,7 +93,7 @@ def test_head_and_neck_of_a_body_of_any_name_and_scale(dna_file, names, scale, t
     joint = next(b.name for b in rig.pose.bones if b.bone["dna_joint"] == 2)
     straight = _world(rig, joint).to_quaternion()
     before = _world(body, head).to_quaternion()
-    # The base carries everything; the head bone turns the face's head by as much as the body's.
+    # The base moves the whole face; the body's head bone rotates the face's head equally.
     body.pose.bones[base].matrix_basis = Matrix.Rotation(0.5, 4, "Y")
     scene.update(body)
     bpy.context.view_layer.update()
@@ -137,7 +137,7 @@ def test_the_face_stays_when_it_is_detached(dna_file):
     bpy.context.view_layer.update()
     before = scene.snapshot(rig)
     assert bpy.ops.risorius.detach_body() == {"FINISHED"}
-    assert not bpy.ops.risorius.detach_body.poll()  # grey: it hangs on no body
+    assert not bpy.ops.risorius.detach_body.poll()  # disabled, because the face has no body
     body.pose.bones["chest"].matrix_basis.identity()
     scene.update(body)
     np.testing.assert_allclose(scene.snapshot(rig), before, atol=1e-6)
@@ -223,7 +223,7 @@ def test_faces_are_imported_side_by_side(dna_file):
     assert tuple(scene.controls(rigs[0]).location) == (0.0, 0.0, 0.0)
     for (_left, right), (left, _right) in itertools.pairwise(spans):
         assert left > right
-    # A face that was moved away leaves its spot to the next.
+    # A face that was moved away leaves its place to the next import.
     scene.controls(rigs[0]).location = (0.0, 5.0, 0.0)
     bpy.context.view_layer.update()
     assert tuple(scene.controls(scene.load(dna_file, "LIVE")).location) == (0.0, 0.0, 0.0)

@@ -25,7 +25,7 @@ def test_control_bones_are_told_apart_by_outline_and_colour(dna_file):
     outlines, colours = {}, set()
     for bone in bones:
         line = bone.custom_shape.data
-        # closed: each corner has two edges
+        # a closed line: each corner has two edges
         ends = [v for edge in line.edges for v in edge.vertices]
         assert sorted(ends) == sorted([*range(len(line.vertices))] * 2)
         far = max(vertex.co.length for vertex in line.vertices)
@@ -34,7 +34,7 @@ def test_control_bones_are_told_apart_by_outline_and_colour(dna_file):
         assert bone.color.palette == "CUSTOM"
         colours.add(tuple(round(c, 3) for c in bone.color.custom.normal))
     assert len(colours) == len(bones) == 6
-    assert outlines.pop("eye_R") == outlines["eye_L"]  # the same thing, of another colour
+    assert outlines.pop("eye_R") == outlines["eye_L"]  # the same shape in another colour
     assert len(set(outlines.values())) == 5
 
 
@@ -101,7 +101,8 @@ def test_head_bone_turns_the_head_joint_on_top(mode, dna_file):
 
 @pytest.mark.parametrize("degrees", [5.0, 12.0, 20.0])
 def test_eye_bone_turns_the_eye_by_its_own_angle(dna_file, degrees):
-    # The eye's neutral is oblique, so its look controls turn it by their own measured response.
+    # The eye's neutral pose is oblique, so its look controls rotate it by their own measured
+    # response.
     rig = scene.load(dna_file)
     runtime = scene.submodule("scene.character.runtime").of(rig)
     bone = scene.controls(rig).pose.bones["eye_L"]
@@ -196,7 +197,7 @@ TURN = ["turn.x", "turn.y", "turn.z", "turn.w"]
 
 @pytest.fixture
 def turning(tmp_path):
-    """A face with the four parts of a rotation among its sliders."""
+    """A face with sliders for the four components of a quaternion."""
     dna = small_face()
     dna.raw_control_names = [*CONTROLS[:7], *TURN]
     dna.twist_swing_behavior.twists = [
@@ -234,7 +235,7 @@ def test_layers_and_expressions_leave_a_rotation_its_sign(turning):
     seen = controls.evaluated_get(depsgraph)
     raw = scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[0]
     np.testing.assert_array_equal(raw[7:], np.float32([-0.48, 0.6, -0.64, 0.0]))
-    assert raw[1] > 0.1  # the layer plays
+    assert raw[1] > 0.1  # the layer is active
     given = {"expression": "joy", "strength": 0.5, "only": True}
     assert bpy.ops.risorius.expression(**given) == {"FINISHED"}
     assert [bone[name] for name in TURN] == pytest.approx([-0.24, 0.3, -0.32, 0.5])

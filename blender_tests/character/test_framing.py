@@ -26,12 +26,12 @@ def _state():
 
 
 def _on_screen(points):
-    """Points in the view's region, (0, 0) to (1, 1): through a camera in the view's place."""
+    """Places of points in the view's region, (0, 0) to (1, 1), through a camera in its place."""
     area, view = _area(), _view()
     region = next(r for r in area.regions if r.type == "WINDOW")
     data = bpy.data.cameras.new("view")
     data.lens = area.spaces.active.lens
-    data.sensor_width, data.sensor_fit = 72.0, "AUTO"  # the viewport's is twice a render's
+    data.sensor_width, data.sensor_fit = 72.0, "AUTO"  # twice a render's
     camera = bpy.data.objects.new("view", data)
     turn = view.view_rotation.to_matrix()
     camera.matrix_world = turn.to_4x4()
@@ -49,7 +49,7 @@ def _corners(item):
 
 @pytest.fixture
 def window(monkeypatch):
-    """The import as in a window, where somebody looks."""
+    """Make the import behave as in a window."""
     fake = SimpleNamespace(app=SimpleNamespace(background=False))
     monkeypatch.setattr(scene.submodule("ui.file.import_operators"), "bpy", fake)
 
@@ -78,7 +78,7 @@ def test_the_head_is_whole_and_large(window, unit, tmp_path):
 
 def test_a_view_that_shows_it_or_looks_through_a_camera_stays(window, dna_file):
     first = scene.load(dna_file)
-    scene.controls(first).location.y = 50.0  # the next one stands where it stood
+    scene.controls(first).location.y = 50.0  # the next face is placed at its old place
     scene.update()
     view = _view()
     view.view_distance *= 1.3
@@ -101,7 +101,7 @@ def test_a_profile_is_shown_from_the_front_and_a_straight_view_keeps_its_directi
     view = _view()
     front = Vector((0.0, -1.0, 0.0))
     for perspective, direction, kept in (
-        ("PERSP", (1.0, 0.0, 0.3), False),  # about where a fresh Blender looks from
+        ("PERSP", (1.0, 0.0, 0.3), False),  # the direction of a new file's view
         ("PERSP", (-0.4, -1.0, 0.3), True),
         ("ORTHO", (1.0, 0.0, 0.0), True),
     ):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of detail: chosen for viewport and render, chosen by distance, and combined with the
-user's hiding."""
+"""Levels of detail: chosen for viewport and renders, or by distance.
+
+They are combined with objects that the user hides.
+"""
 
 import bpy
 import numpy as np
@@ -19,7 +21,7 @@ def _shown(rig, flag="hide_viewport"):
 
 
 def _camera(distance):
-    """A camera that far in front of the small face's head bone."""
+    """A camera at this distance in front of the small face's head bone."""
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     bpy.context.scene.collection.objects.link(camera)
     bpy.context.scene.camera = camera
@@ -101,12 +103,15 @@ def test_the_distance_chooses_with_hysteresis_in_the_viewport(mode, dna_file):
 
 @pytest.mark.parametrize("order", [(1, 2, 3), (3, 2, 1), (2,)])
 def test_renders_take_the_level_of_the_distance_alone(dna_file, tmp_path, order):
-    """Frame 2 lies within the viewport's tolerance: in renders it must not depend on earlier
-    frames."""
+    """The level in renders depends only on the distance.
+
+    At frame 2 the distance is within the viewport's tolerance, where the level depends on earlier
+    frames.
+    """
     rig = _load(dna_file)
     camera = _camera(1.0)
     pictures.small_render(camera)
-    camera.data.angle = 0.12  # the face fills the picture from afar
+    camera.data.angle = 0.12  # the distant face fills the picture
     scene.set_controls(rig, jawOpen=0.6)
     bpy.ops.risorius.set_lod(lod=1)
     bpy.ops.risorius.set_lod_by_distance(enable=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raw controls of joint rotations: every rotation of head and neck fills them."""
+"""Raw controls for rotations of joints follow every rotation of head and neck."""
 
 import bpy
 import numpy as np
@@ -10,12 +10,12 @@ from support import oracle, scene
 from support.faces import HEAD, NECK_POSES, SIDE, TURNING, UP, neck_face
 
 NECK = 1
-NEAR = 4e-3  # the arc between two float32 quaternions that are one is off by a thousandth
+NEAR = 4e-3  # tolerance: equal float32 quaternions may differ by an arc of a thousandth
 
 
 @pytest.fixture
 def face(tmp_path):
-    """Imports a face with neck poses: its rig, its Dna."""
+    """Returns a function that imports a face with neck poses and returns its rig and Dna."""
 
     def make(**options):
         path = tmp_path / "neck.dna"
@@ -31,12 +31,12 @@ def _axes(dna):
 
 
 def _rest(dna, joint):
-    """The resting axes of a joint in the file's space."""
+    """The axes of a joint at rest in the file's space, float64[3, 3]."""
     return oracle._world(dna, np.zeros((len(dna.joint_names), 9)))[joint][:3, :3]
 
 
 def _armature_turn(dna, joint, local):
-    """The turn about the armature's axes that a joint's own rotation (x, y, z, w) is."""
+    """Convert a joint's own rotation (x, y, z, w) to a rotation about the armature's axes."""
     x, y, z, w = local
     turn = np.array(Quaternion((w, x, y, z)).to_matrix(), np.float64)
     basis = _axes(dna) @ _rest(dna, joint)
@@ -44,7 +44,7 @@ def _armature_turn(dna, joint, local):
 
 
 def _own_turn(dna, joint, turn):
-    """The inverse: x, y, z, w about the joint's axes, w not below 0."""
+    """The inverse: x, y, z, w about the joint's axes, with w at least 0."""
     basis = _axes(dna) @ _rest(dna, joint)
     local = basis.T @ np.array(turn.to_matrix(), np.float64) @ basis
     w, x, y, z = Matrix(local.tolist()).to_quaternion()
@@ -52,7 +52,7 @@ def _own_turn(dna, joint, turn):
 
 
 def _pose(rig, bone, turn):
-    """Turn a control bone by a rotation about the armature's axes."""
+    """Rotate a control bone about the armature's axes."""
     item = scene.controls(rig).pose.bones[bone]
     rest = item.bone.matrix_local.to_quaternion()
     item.rotation_mode = "QUATERNION"
@@ -60,7 +60,7 @@ def _pose(rig, bone, turn):
 
 
 def _wanted(dna, neck=None, head=None, **sliders):
-    """Channels as the evaluator gives them for these turns about the armature's axes."""
+    """The channels that the evaluator gives for rotations about the armature's axes."""
     rig = risorius.Rig(dna)
     raw = rig.initial_raw_controls.copy()
     names = list(rig.raw_control_names)
@@ -105,7 +105,7 @@ def test_any_turn_gives_what_the_evaluator_gives_for_it(face):
     for _ in range(6):
         turns = [Euler(random.uniform(-0.5, 0.5, 3)).to_quaternion() for _ in range(2)]
         _pose(rig, "neck", turns[0])
-        _pose(rig, "head", -turns[1])  # q and -q are one rotation
+        _pose(rig, "head", -turns[1])  # q and -q are the same rotation
         scene.set_controls(rig, jawOpen=0.3)
         wanted = _wanted(dna, *turns, jawOpen=0.3)
         np.testing.assert_allclose(_shown(rig), wanted, atol=1e-5)
@@ -128,7 +128,7 @@ def test_layers_frames_and_renders_have_them_in_time(face, tmp_path):
     }
     seen, reader = {}, bpy.data.objects.new("reader", None)
     bpy.context.scene.collection.objects.link(reader)
-    for place in (4, 5):  # something of the user's that reads the channels
+    for place in (4, 5):  # an object of the user that reads the channels
         curve = reader.driver_add("location", place - 4)
         variable = curve.driver.variables.new()
         variable.name = curve.driver.expression = "channel"
@@ -139,7 +139,7 @@ def test_layers_frames_and_renders_have_them_in_time(face, tmp_path):
     def look(_scene, depsgraph):
         seen["pre"] = np.array(reader.evaluated_get(depsgraph).location[:2])
 
-    bpy.app.handlers.frame_change_post.insert(0, look)  # before ours: what the frame itself had
+    bpy.app.handlers.frame_change_post.insert(0, look)  # sees the frame itself
     try:
         for frame in (2, 3, 1):
             bpy.context.scene.frame_set(frame)
@@ -151,7 +151,7 @@ def test_layers_frames_and_renders_have_them_in_time(face, tmp_path):
             np.testing.assert_allclose(seen["pre"], wanted[4:], atol=1e-5)
     finally:
         bpy.app.handlers.frame_change_post.remove(look)
-    assert abs(_wanted(dna)[4] - wanted[4]) < 1e-6  # frame 1 rests
+    assert abs(_wanted(dna)[4] - wanted[4]) < 1e-6  # frame 1 is at rest
     bpy.context.scene.frame_set(2)
     assert _shown(rig)[4:].max() > 0.01
 
@@ -163,7 +163,7 @@ def test_a_constraint_on_a_joints_bone_fires_them(face):
     hold.owner_space = "LOCAL"
     hold.use_limit_x = True
     hold.min_x = hold.max_x = np.radians(30)
-    for _ in range(2):  # known once Blender has evaluated the bone
+    for _ in range(2):  # known after Blender has evaluated the bone
         scene.update(rig, scene.controls(rig))
     local = Quaternion((1.0, 0.0, 0.0), np.radians(30))
     basis = np.array(rig.data.bones["head"].matrix_local.to_3x3(), np.float64)
@@ -285,7 +285,7 @@ def test_an_override_of_a_linked_face_fires_them(face, tmp_path):
 
 
 def _nods(rig):
-    """Keys of the head's control bone, of which a constraint on the joint's bone lets half pass."""
+    """Add keys of the head's control bone; a constraint on the joint's bone limits its rotation."""
     bone = scene.controls(rig).pose.bones["head"]
     bone.rotation_mode = "XYZ"
     for frame, angle in ((1, 0.0), (5, 0.8)):
@@ -298,7 +298,7 @@ def _nods(rig):
 
 
 def _seen_turn(rig):
-    """The turn about the armature's axes that Blender shows of the head's joint."""
+    """The rotation about the armature's axes that Blender shows for the head's joint."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones["head"]
     local = seen.convert_space(
@@ -363,7 +363,7 @@ def test_keys_of_a_joints_own_bone_fire_them(face):
 
 
 def _follow(rig, bone, by="parent"):
-    """Let the head's joint turn as an object does that follows a bone of the same armature."""
+    """Make the head's joint follow an object that follows a bone of the same armature."""
     target = bpy.data.objects.new("target", None)
     bpy.context.scene.collection.objects.link(target)
     if by == "parent":

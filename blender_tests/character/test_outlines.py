@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outlines of the control bones: placed beside the face, hidden without hiding keys, never objects
-of a scene."""
+"""Outlines of the control bones are beside the face and are no objects of a scene.
+
+Hiding them keeps keys visible.
+"""
 
 import shutil
 
@@ -17,7 +19,7 @@ def rig(dna_file):
 
 
 def outline(controls, name):
-    """float64[V, 3]: the corners of a bone's outline as Blender draws them, in world space."""
+    """Corners of a bone's outline as Blender draws it, float64[V, 3], in world space."""
     bone = controls.pose.bones[name]
     size = [scale * bone.bone.length for scale in bone.custom_shape_scale_xyz]
     own = Matrix.LocRotScale(bone.custom_shape_translation, bone.custom_shape_rotation_euler, size)
@@ -34,7 +36,7 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
     left, right = (np.array(controls.data.bones[f"eye_{s}"].head_local) for s in "LR")
     apart = abs(left[0] - right[0])
     target = outline(controls, "eyes")
-    assert np.ptp(target[:, 0]) < apart  # it stands straight ahead, between the eyes
+    assert np.ptp(target[:, 0]) < apart  # between the eyes, straight ahead
     skin = np.concatenate([scene.evaluated(item) for item in scene.meshes(rig).values()])
     low, high = skin.min(axis=0), skin.max(axis=0)
     room = 0.75 * (high - low).max()
@@ -47,14 +49,14 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
             assert not over, name
         assert np.all(np.abs(drawn - (low + high) / 2) < room + np.ptp(drawn, axis=0)), name
     collar, neck = outline(controls, "neck"), controls.data.bones["neck"].head_local
-    assert collar[:, 1].max() < neck.y + 1e-4  # behind it, seen from above, lines cross the mouth
+    assert collar[:, 1].max() < neck.y + 1e-4  # behind it, so that it avoids the mouth
     assert np.ptp(collar[:, 1]) > 0.3 * np.ptp(collar[:, 0])
     sides = [outline(controls, f"eye_{side}")[:, 0].mean() for side in "LR"]
     assert (sides[0] - sides[1]) * (left[0] - right[0]) > 0  # each on the side of its eye
 
 
 def test_outlines_of_an_older_file_move_beside_the_face(dna_file, tmp_path):
-    """A file of before saved them over the eyes."""
+    """Older versions saved outlines over the eyes."""
     made = "4.2.23"
     folder = shutil.copytree(past.DATA / made, tmp_path / made)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "bones.blend"))
@@ -91,7 +93,7 @@ def test_appended_outlines_are_not_left_in_the_scene(rig, tmp_path):
     assert controls.users_scene
     assert len(shapes(controls)) > 6
     assert not [shape.name for shape in shapes(controls) if shape.users_collection]
-    own = controls.pose.bones["head"].custom_shape  # somebody wants to draw another one
+    own = controls.pose.bones["head"].custom_shape  # the user wants to draw another outline
     bpy.context.scene.collection.objects.link(own)
     bpy.context.view_layer.update()
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("new", None))
@@ -105,7 +107,7 @@ def rig_name(path):
 
 
 def test_a_copy_that_is_deleted_leaves_the_outlines_to_the_face(rig, tmp_path):
-    """Shift-D shares them, and a save removes the remains of a deleted face."""
+    """Shift-D shares the outlines, and a save removes the remains of a deleted face."""
     held = [b.custom_shape for b in scene.controls(rig).pose.bones]
     for item in bpy.context.view_layer.objects:
         item.select_set(True)
@@ -127,7 +129,7 @@ def test_hidden_outlines_leave_bones_and_sizes_as_they_were(rig):
     controls.pose.bones["neck"].custom_shape_scale_xyz = (3.0, 2.0, 1.0)
     before = {bone.name: bone.custom_shape_scale_xyz[:] for bone in controls.pose.bones}
     assert bpy.ops.risorius.hide_outlines() == {"FINISHED"}
-    bpy.ops.risorius.hide_outlines()  # twice: the remembered state is not lost
+    bpy.ops.risorius.hide_outlines()  # called twice: the stored state is not lost
     for bone in controls.pose.bones:
         assert not bone.bone.hide
         assert np.ptp(outline(controls, bone.name), axis=0).max() < 1e-6
@@ -151,7 +153,7 @@ def test_the_key_of_frame_selected_shows_the_face_where_only_outlines_are_select
         return bpy.ops.risorius.frame_face(instead=True)
 
     assert pressed(controls) == {"FINISHED"}
-    assert pressed(controls, item) == {"PASS_THROUGH"}  # as Blender does it
+    assert pressed(controls, item) == {"PASS_THROUGH"}  # Blender's own action
     assert pressed(controls, rig) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.select_all(action="SELECT")

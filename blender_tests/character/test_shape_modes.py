@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both shape modes, back and forth, with everything that users do to keys; the test override."""
+"""Both shape modes and the switch between them, with all edits of keys; the test of a channel."""
 
 import bpy
 import numpy as np
@@ -38,7 +38,7 @@ def _same_in_both_modes(rig, atol=2e-6):
 
 
 def _own_key(rig, name="own"):
-    """A shape key of the user with all settings that a key can have."""
+    """A shape key of the user with every setting that a key has."""
     head = _head(rig)
     block = head.shape_key_add(name=name, from_mix=False)
     block.points[3].co.z += 0.02
@@ -130,7 +130,7 @@ def test_the_order_of_keys_returns(dna_file):
 
 @pytest.mark.parametrize("name", ["jaw", "pull_l"])
 def test_a_moved_basis_does_not_make_keys_edited(dna_file, name):
-    """Edit mode on the basis moves the keys along; rounding is no edit of theirs."""
+    """Edit mode on the basis moves the keys; rounding is no edit of the keys."""
     rig = scene.load(dna_file, "KEYS")
     _move_in_edit_mode(_head(rig), range(0, 100, 3))
     _same_in_both_modes(rig)
@@ -202,7 +202,7 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """The oracle's vertices with one channel overridden, minus Blender's vertices."""
+    """Differences between the oracle's vertices with one channel overridden, and Blender's."""
     import risorius
     from support import oracle
 

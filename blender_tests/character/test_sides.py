@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Left and right: named as seen, mirrored, copied, linked, pasted flipped; found by words."""
+"""Left and right: names as the viewer sees them, mirroring, copying, linking, pasting flipped."""
 
 import bpy
 import pytest
@@ -57,7 +57,7 @@ def test_a_region_is_copied_and_pasted_flipped(rig):
     assert bpy.ops.risorius.paste_pose(flipped=True) == {"FINISHED"}
     assert value(rig, "mouthCornerPullR") == pytest.approx(0.7)
     assert value(rig, "mouthCornerPullL") == pytest.approx(0.0)
-    assert value(rig, "jawOpen") == pytest.approx(0.9)  # of another region
+    assert value(rig, "jawOpen") == pytest.approx(0.9)  # a control of another region
     assert bpy.ops.risorius.paste_pose() == {"FINISHED"}
     assert value(rig, "mouthCornerPullL") == pytest.approx(0.7)
 
@@ -161,7 +161,7 @@ def test_only_what_is_in_use_is_listed(rig):
         scene.face(rig).keyframe_insert(f'["{PREFIX}jawOpen"]', frame=1)
         assert "Open" in _texts(drawn(panel, bpy.context))
         assert "Corner Pull" not in _texts(drawn(panel, bpy.context))
-        scene.set_controls(rig, mouthCornerPullR=0.2)  # its twin is shown beside it
+        scene.set_controls(rig, mouthCornerPullR=0.2)  # its partner is in the same row
         assert "Corner Pull" in _texts(drawn(panel, bpy.context))
     finally:
         manager.risorius_only_used = False
@@ -183,9 +183,9 @@ def test_a_tooltip_says_what_the_control_does(rig):
     words = scene.face(rig).id_properties_ui(PREFIX + "mouthCornerPullL").as_dict()["description"]
     assert "smile" in words
     assert "your right" in words
-    assert not words.endswith(".")  # Blender sets one
+    assert not words.endswith(".")  # Blender adds the full stop
     other = scene.face(rig).id_properties_ui("twice").as_dict()["description"]
-    assert other == "Twice (twice)"  # nobody knows what it does
+    assert other == "Twice (twice)"  # an unknown control has no description
 
 
 def test_left_is_where_one_sees_it_or_the_characters_own(rig):

@@ -23,12 +23,12 @@ GOLDEN = ROOT / "tests" / "data" / "golden"
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """Direct mode, a live key and real keys, both on posed bones."""
+    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
     return request.param
 
 
 def _load_rig_oracle():
-    """By path, since it is not of this folder and `oracle` is taken."""
+    """Load the oracle by its path, because this folder has another module `oracle`."""
     place = ROOT / "tests" / "python" / "support" / "oracle.py"
     described = importlib.util.spec_from_file_location("rig_oracle", place)
     module = importlib.util.module_from_spec(described)
@@ -40,7 +40,7 @@ RIG_ORACLE = _load_rig_oracle()
 
 
 class _Face:
-    """An imported file and the vertices that it must have."""
+    """An imported file, and the vertices that it must show."""
 
     def __init__(self, path, mode, levels=range(8)):
         self.rig = scene.load(path, mode, lods=tuple(i in levels for i in range(8)))
@@ -48,14 +48,14 @@ class _Face:
         self.labels = scene.submodule("logic.base.names").unique_labels(self.dna.raw_control_names)
 
     def wanted(self, raw, lod):
-        """Mesh index -> float64[V, 3] at raw controls float64[R]."""
+        """Mesh index -> vertices float64[V, 3] for raw controls float64[R]."""
         joints, shapes, _maps, _controls = RIG_ORACLE.evaluate(self.dna, raw, lod, settle=True)
         pose = SimpleNamespace(joints=joints[0].reshape(-1, 9), blend_shapes=shapes[0])
         there = self.dna.lod_mesh_mapping[lod]
         return {int(m): oracle.vertices(self.dna, int(m), pose) for m in there}
 
     def error(self, shown, raw, lod):
-        """Largest distance of shown from wanted vertices, relative to the size of the face."""
+        """The largest distance of shown from wanted vertices, as a share of the face's size."""
         wanted = self.wanted(raw, lod)
         assert set(shown) == set(wanted)
         size = max(np.ptp(points, axis=0).max() for points in wanted.values())
@@ -72,7 +72,7 @@ class _Face:
         scene.update(scene.controls(self.rig))
 
     def animate(self, seed):
-        """Keys at random values on every control; returns frame -> raw controls float64[R]."""
+        """Key every control with random values. Returns frame -> raw controls float64[R]."""
         random = np.random.default_rng(seed)
         bone = scene.face(self.rig)
         for frame in (1, 5, 10):
@@ -88,7 +88,7 @@ class _Face:
 
 @pytest.fixture(params=["small", "medium", "units"])
 def path(request, tmp_path):
-    """Two levels with odd names; four levels, 122 joints and ten meshes; other axes and units."""
+    """Files: two LODs and odd names; four LODs, 122 joints and ten meshes; other axes and units."""
     if request.param == "small":
         small_face().save(str(tmp_path / "small.dna"))
         return tmp_path / "small.dna"

@@ -10,7 +10,7 @@ from support.faces import CONTROLS, small_face
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """Direct mode, a live key and real keys, both on posed bones."""
+    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
     return request.param
 
 
@@ -97,7 +97,7 @@ def test_faces_point_outwards_in_mirrored_files(tmp_path):
         path = tmp_path / f"{number}.dna"
         small_face(axes=axes).save(str(path))
         head = scene.meshes(scene.load(path))[0]
-        # The patch is made counter-clockwise as seen in the file's own right-handed numbers;
-        # where the axes mirror, that is clockwise in space and is turned round.
+        # The patch is counter-clockwise in the file's own right-handed numbers. If the axes mirror,
+        # it is clockwise in space and must be reversed.
         normal = np.mean([p.normal[:] for p in head.data.polygons], axis=0)
         assert normal[1] < -0.3

@@ -23,7 +23,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def man():
-    """The sample face with equal sides, and the corner of its mouth."""
+    """The sample face, and the vertex that the left corner of its mouth moves most."""
     bpy.ops.risorius.add_character()
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     scene.set_controls(rig, mouthCornerPullL=1.0)
@@ -40,7 +40,7 @@ def rest_of(head):
 
 
 def place(rig, vertex=VERTEX, mesh=HEAD):
-    """float64[3]: where Blender shows a vertex."""
+    """The place at which Blender shows a vertex, float64[3]."""
     return scene.evaluated(scene.meshes(rig)[mesh])[vertex]
 
 
@@ -55,7 +55,7 @@ def drag(offset, vertex=VERTEX, **options):
 
 
 def reach(rig, path, vertex=VERTEX, values=POSE):
-    """How far sliders at some values would move a vertex: the oracle's answer, float64[3]."""
+    """The motion of a vertex by sliders according to the oracle, float64[3]."""
     dna = risorius.load(str(path))
     raw = scene.raw_of(rig, path)
     was = oracle.vertices(dna, HEAD, risorius.Rig(dna).evaluate(raw))[vertex]
@@ -112,7 +112,7 @@ def test_a_turned_head_on_a_moved_face_drags_right(rig, dna_file):
     scene.update(rig)
     was = place(rig)
     scene.set_controls(rig, **POSE)
-    offset = place(rig) - was  # the same pose, seen on the turned head
+    offset = place(rig) - was  # the same pose on the rotated head
     scene.set_controls(rig, **dict.fromkeys(POSE, 0.0))
     assert follows(rig, was, np.zeros(3) + 1e-9, share=1e3)
     assert drag(offset, method="LEAST_SQUARES") == {"FINISHED"}
@@ -177,7 +177,7 @@ def test_handles_lie_apart_on_both_sides(man):
 
 
 def two_handles(rig):
-    """The handles that a smile moves most, one on each side of the mouth: mesh and vertex."""
+    """The handles that a smile moves most on each side of the mouth: (mesh, vertex)."""
     rest = {point: place(rig, point[1], point[0]) for point in offered(rig)}
 
     def most(name):
@@ -204,7 +204,7 @@ def test_selected_handles_go_together(man):
     starts = [place(rig, vertex, mesh) for mesh, vertex in (one, other)]
 
     def share(number, point):
-        """How much of the way a handle has gone."""
+        """The part of the drag that a handle has followed."""
         way = place(rig, point[1], point[0]) - starts[number]
         return way @ offset / (offset @ offset)
 
@@ -229,7 +229,7 @@ def test_handles_are_selected_hidden_and_shown_as_bones(man, tmp_path):
     bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1])
     bpy.ops.risorius.select_handle(mesh=other[0], vertex=other[1], extend=True)
     assert list(scene.controls(rig)["risorius_handles_selected"]) == [*one, *other]
-    bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1], extend=True)  # taken out again
+    bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1], extend=True)  # deselected again
     assert list(scene.controls(rig)["risorius_handles_selected"]) == [*other]
     assert bpy.ops.risorius.hide_handles() == {"FINISHED"}
     assert offered(rig) == [point for point in all_of_them if point != other]
@@ -242,7 +242,7 @@ def test_handles_are_selected_hidden_and_shown_as_bones(man, tmp_path):
     assert bpy.ops.risorius.show_handles() == {"FINISHED"}
     assert offered(rig) == all_of_them
     assert list(scene.controls(rig)["risorius_handles_selected"]) == [*other]
-    bpy.ops.risorius.select_handle(vertex=-1)  # a click beside them
+    bpy.ops.risorius.select_handle(vertex=-1)  # a click beside the handles
     assert "risorius_handles_selected" not in scene.controls(rig)
 
 
@@ -288,7 +288,7 @@ def test_the_tool_is_taken_up_and_put_down(rig, mode):
     for operator, _event, _properties in tool._KEYS:
         module, _, name = operator.partition(".")
         assert name in dir(getattr(bpy.ops, module))
-    bpy.ops.risorius.drag_tool()  # and so the add-on is disabled after the test
+    bpy.ops.risorius.drag_tool()  # so that the add-on is disabled after the test
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.objects.active = scene.meshes(rig)[HEAD]
     bpy.ops.object.mode_set(mode="EDIT")
@@ -321,10 +321,10 @@ def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
     assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held + 3) == {"FINISHED"}
     assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held, HEAD, held + 3]
     assert bpy.ops.risorius.clear_pins.poll()
-    for vertex in (held, held + 3):  # and out again
+    for vertex in (held, held + 3):  # set and removed
         assert bpy.ops.risorius.pin(mesh=HEAD, vertex=vertex) == {"FINISHED"}
     assert "risorius_pins" not in scene.controls(rig)
-    assert not bpy.ops.risorius.clear_pins.poll()  # grey: none is left
+    assert not bpy.ops.risorius.clear_pins.poll()  # disabled, because no pin is left
 
 
 def test_keys_are_inserted_on_what_moved_if_auto_key_is_on(rig, dna_file):
@@ -458,14 +458,14 @@ def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
 
 
 def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
-    """On the sample man, whose sides differ: the moving sliders."""
+    """Tests the moving sliders on the sample man, whose sides differ."""
     rig, corner = man
     stroke = scene.submodule("scene.drag.stroke")
     rest = rest_of(scene.meshes(rig)[HEAD])
     scene.set_controls(rig, browDownL=1.0)
     far = np.linalg.norm(scene.evaluated(scene.meshes(rig)[HEAD]) - rest, axis=1)
     scene.set_controls(rig, browDownL=0.0)
-    before = sliders(rig)  # the eyes meet at something
+    before = sliders(rig)  # the gaze is not at rest
     down = stroke.begin(bpy.context, rig, (HEAD, int(np.argmax(far))), stroke.Options())
     down.finish(bpy.context, down.start + np.array((0.0, 0.0, -0.004)), np.array((0.0, 1.0, 0.0)))
     after = {name: v - before[name] for name, v in sliders(rig).items() if v != before[name]}
@@ -480,7 +480,7 @@ def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
     moved = {name.removeprefix(PREFIX): v for name, v in after.items()}
     assert "mouthLeft" not in moved
     assert "mouthRight" not in moved
-    assert 2 <= len(moved) <= 4  # a pair or two
+    assert 2 <= len(moved) <= 4  # one or two pairs
     mirrored = scene.submodule("native").regions().mirrored
     for name, value in moved.items():
         assert moved[mirrored(name)] == pytest.approx(value, abs=1e-6), name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export Game Face: the active face as glTF, or one sentence."""
+"""Export Game Face: writes the active face as glTF, or reports one sentence."""
 
 import json
 import struct

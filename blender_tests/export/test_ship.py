@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported animation re-imports as the same vertices, and the export leaves nothing behind."""
+"""Exported animation is imported again as the same vertices; the scene stays unchanged."""
 
 import contextlib
 import csv
@@ -18,12 +18,12 @@ from support.animation import animate
 
 FRAMES = (1, 3, 5, 8, 10)
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
-# Tolerance relative to the size of the head, by the content of each format.
+# Allowed error of each format, as a share of the head's size.
 NEAR = {
-    "ALEMBIC": 5e-6,  # the vertices themselves: a float32 at 1.6 m is 6e-7 of a head wide
-    "GLTF": 2e-5,  # float32 joints at every frame, weights normalised anew, axes turned
-    "FBX": 2e-5,  # the same, rotations as Euler angles in degrees
-    # Joint scales are half floats: 2**-11 of the distance to the joint, for two joints in a row.
+    "ALEMBIC": 5e-6,  # stores vertices: float32 at 1.6 m rounds by 6e-7 of the head's width
+    "GLTF": 2e-5,  # float32 joints per frame, weights normalised again, axes rotated
+    "FBX": 2e-5,  # the same, with rotations as Euler angles in degrees
+    # Joint scales are half floats: 2**-11 of the distance to the joint, for two successive joints.
     "USD": 1e-3,
 }
 
@@ -37,7 +37,7 @@ def _film(items, frames=FRAMES):
 
 
 def _is_built(kind):
-    """Whether this Blender has the exporter; otherwise the operator reports it."""
+    """Whether this Blender has the exporter; if not, the operator must report it."""
     switch = {"USD": "usd", "ALEMBIC": "alembic"}.get(kind)
     if switch is None or getattr(bpy.app.build_options, switch):
         return True
@@ -56,7 +56,7 @@ def _export(kind, tmp_path, **options):
 
 
 def _import(kind, path):
-    """The meshes of a file."""
+    """Import a file. Returns its meshes."""
     before = set(bpy.data.objects)
     if kind == "GLTF":
         bpy.ops.import_scene.gltf(filepath=str(path), disable_bone_shape=True)
@@ -70,7 +70,7 @@ def _import(kind, path):
 
 
 def _partner(points, wanted):
-    """For each wanted vertex the nearest imported one: some formats split or sort vertices."""
+    """For each wanted vertex the nearest imported one; some formats split or sort vertices."""
     tree = KDTree(len(points))
     for i, point in enumerate(points):
         tree.insert(Vector(point), i)
@@ -79,7 +79,7 @@ def _partner(points, wanted):
 
 
 def _error(film, wanted):
-    """Largest distance over the size of the head; vertices are matched at the first frame."""
+    """The largest distance as a share of the head's size; matched at the first frame."""
     size = max(np.ptp(p, axis=0).max() for p in wanted[0])
     points = [np.concatenate(meshes) for meshes in film]
     target = [np.concatenate(meshes) for meshes in wanted]
@@ -105,7 +105,7 @@ def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
 
 
 def _everywhere(rig):
-    """State that an export must not change."""
+    """The state of the file that an export must not change."""
     layer = bpy.context.view_layer
     return (
         scene.counts(),
@@ -160,7 +160,7 @@ def test_bones_alone(kind, dna_file, tmp_path):
         return
     animate(rig)
     path = _export(kind, tmp_path, wanted={"BONES"})
-    scene.pose_bones(rig)  # the joints deform the skin, also without the shapes
+    scene.pose_bones(rig)  # the joints deform the skin, even without shapes
     shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
     for item in shown:
         for block in item.data.shape_keys.key_blocks[1:]:
@@ -192,7 +192,7 @@ def test_a_face_that_walks_and_a_part_of_the_range(kind, options, dna_file, tmp_
 
 
 def _fbx_tree(path):
-    """Object -> object above it, and object -> kind of its attribute, as the FBX file says."""
+    """Object -> parent object, and object -> kind of its attribute, as stored in the FBX file."""
     from io_scene_fbx import parse_fbx
 
     root, _version = parse_fbx.parse(str(path))
@@ -247,8 +247,8 @@ def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
     found, attributes, keys, paths = parts()
     assert [a["name"] for a in found["animations"]] == ["Small"]
     assert {n["name"] for n in found["nodes"]} >= {"Small", "head_lod0_mesh", "FACIAL_C_Jaw"}
-    assert "JOINTS_1" in attributes  # five joints a vertex
-    assert keys == ["jaw", "pull_l", "y" * 63]  # a corrective's too; the others rest
+    assert "JOINTS_1" in attributes  # five joints per vertex
+    assert keys == ["jaw", "pull_l", "y" * 63]  # also a corrective's shape; the others are at rest
     assert paths == {"translation", "rotation", "scale", "weights"}
     assert "JOINTS_1" not in parts(influences=4)[1]
     assert len(parts(all_shapes=True)[2]) == 6
@@ -284,7 +284,7 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
     assert header[-3:] == ["head.yaw", "head.pitch", "head.roll"]
     assert len(set(header)) == len(header) == 1 + 11 + 3
     rate = bpy.context.scene.render.fps
-    # Second 0 is the scene's first frame, as of a sound that begins there.
+    # Second 0 is the scene's first frame, as for a sound that starts there.
     first = bpy.context.scene.frame_start
     np.testing.assert_allclose(table[:, 0], (np.arange(2, 4.1, 0.5) - first) / rate)
     for row, frame in zip(table, np.arange(2, 4.1, 0.5), strict=True):
@@ -292,7 +292,7 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
         raw = scene.raw_of(rig, dna_file)
         assert np.float32(row[1]) == raw[0]
         assert np.float32(row[header.index("CTRL_expressions.eyeLookUpL")]) == raw[6]
-        # The head bone is upright: its own x and y axes are the armature's x and z.
+        # The head bone is upright: its x and y axes are the armature's x and z axes.
         turn = scene.controls(rig).pose.bones["head"].rotation_euler.to_quaternion()
         rest = scene.controls(rig).data.bones["head"].matrix_local.to_quaternion()
         ahead = (rest @ turn @ rest.inverted()) @ Vector((0, -1, 0))
@@ -325,7 +325,7 @@ def test_a_clip_file_holds_the_same_and_maps_where_wanted(dna_file, tmp_path):
     assert clip.names[-5:] == ("head.yaw", "head.pitch", "head.roll", "flush", "wrinkle")
     for frame in (1, 4, 10):
         bpy.context.scene.frame_set(frame)
-        shown = clip.sample([(frame - 1) / clip.rate])[0]  # the scene begins at 1
+        shown = clip.sample([(frame - 1) / clip.rate])[0]  # the scene begins at frame 1
         assert shown[0] == scene.raw_of(rig, dna_file)[0]
         assert shown[-2:] == pytest.approx(list(rig["maps"]), abs=1e-7)
     assert np.ptp(clip.curve("flush")) > 0.5
@@ -389,11 +389,11 @@ def test_without_room_the_old_file_stays(kind, dna_file, tmp_path, monkeypatch):
 
 @contextlib.contextmanager
 def _no_room(kind, monkeypatch):
-    """Limit every file to a few bytes, as on a full disk."""
+    """Limit every file to some bytes, which simulates a full disk."""
     import resource
     import signal
 
-    if kind == "ALEMBIC":  # Blender's own would end this process
+    if kind == "ALEMBIC":  # Blender's own Alembic exporter would end this process
 
         def export(_operator, _override, path):
             path.write_bytes(b"half")
@@ -405,7 +405,7 @@ def _no_room(kind, monkeypatch):
         return
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Blender 4.3 does not
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Blender 4.3 does not ignore it
     resource.setrlimit(resource.RLIMIT_FSIZE, (4000, before[1]))
     try:
         yield
@@ -464,7 +464,7 @@ def test_a_baked_face_is_not_exported(dna_file, tmp_path):
 
 
 def test_blenders_own_gltf_says_that_live_faces_rest(dna_file, tmp_path, capsys):
-    if bpy.context.preferences.addons.get(scene.MODULE) is None:  # where the exporter looks
+    if bpy.context.preferences.addons.get(scene.MODULE) is None:  # read by the exporter
         bpy.context.preferences.addons.new().module = scene.MODULE
     path = str(tmp_path / "a.glb")
     rig = scene.load(dna_file)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported faces look right elsewhere: read back by programs that are not Blender."""
+"""Exported faces have the right look in programs other than Blender."""
 
 import importlib.util
 import json
@@ -19,12 +19,12 @@ from support.faces import small_face
 READERS = Path(__file__).parents[1] / "support" / "readers.py"
 NEEDS = {"GLTF": "trimesh", "FBX": "PIL", "USD": "pxr", "ALEMBIC": "alembic3d"}
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
-LIP, BROW = (0.69, 0.33, 0.31), (0.19, 0.13, 0.10)  # as stored in the head's picture
+LIP, BROW = (0.69, 0.33, 0.31), (0.19, 0.13, 0.10)  # colours in the head's texture
 SHOWN = ("head", "eyeLeft", "teeth", "eyelashes", "eyeshell")
 
 
 def _face(tmp_path):
-    """A face with a picture on its head, and meshes that nodes paint."""
+    """A face with a texture on its head, and meshes with procedural materials."""
     random = np.random.default_rng(3)
     where = np.array([3.0, 158.0, 9.0])
     meshes = {"head_lod0_mesh": patch(random, (12, 14), 10.0, where * (0, 1, 0), (1, 2, 3), (0,))}
@@ -50,7 +50,7 @@ def _export(kind, folder, **options):
 
 
 def _read(kind, path):
-    """Content of a file as read by another program."""
+    """The content of a file as another program reads it."""
     if importlib.util.find_spec(NEEDS[kind]) is None or bpy.app.binary_path:
         pytest.skip(f"EXTRA NOT RUN: {kind} files read by {NEEDS[kind]}, which is not there")
     if kind == "FBX" and shutil.which("assimp") is None:
@@ -62,19 +62,19 @@ def _read(kind, path):
 
 
 def _outside(kind, found):
-    """Points of a mesh as another program has them, in Blender's axes and metres."""
+    """The points of a mesh read by another program, in Blender's axes and metres."""
     points = np.array(found["points"])
-    if kind == "USD":  # says in the file that z is up
+    if kind == "USD":  # the file states that z is up
         return points
     points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
     return points * 0.01 if kind == "FBX" else points
 
 
 def _everything():
-    """State that an export must keep: datablocks, users of materials, visibility."""
+    """The state that an export must keep: datablocks, users of materials, visibility."""
     kinds = ("objects", "meshes", "scenes", "actions", "shape_keys", "armatures", "images")
     found = {k: sorted(x.name for x in getattr(bpy.data, k)) for k in kinds}
-    # Of materials alone: 4.2 counts a copied material twice at its images.
+    # Users of materials only, because 4.2 counts a copied material twice at its images.
     found["materials"] = sorted((x.name, x.users) for x in bpy.data.materials)
     found["layers"] = {m.name: [y.name for y in m.uv_layers] for m in bpy.data.meshes}
     found["slots"] = {o.name: [s.material.name for s in o.material_slots] for o in bpy.data.objects}
@@ -104,7 +104,7 @@ def test_another_program_finds_colours_names_and_time(kind, tmp_path, capfd):
         assert mesh["material"] == f"Small_{name.removesuffix('_lod0_mesh')}"
         points = _outside(kind, mesh)
         wanted = np.array([v.co for v in rest[name].data.vertices])
-        if kind != "ALEMBIC":  # which holds the moved vertices alone
+        if kind != "ALEMBIC":  # Alembic contains only the moved vertices
             assert points.min(axis=0) == pytest.approx(wanted.min(axis=0), abs=1e-5)
             assert points.max(axis=0) == pytest.approx(wanted.max(axis=0), abs=1e-5)
     _has_names(kind, found["names"])
@@ -112,7 +112,7 @@ def test_another_program_finds_colours_names_and_time(kind, tmp_path, capfd):
 
 
 def _is_quiet(captured):
-    """Whether only the operator's report and the single line of an exporter in C were printed."""
+    """Whether only the operator's report and one line of an exporter in C were printed."""
     lines = [x for x in captured.out.splitlines() if x.strip()]
     assert captured.err == ""
     assert [x for x in lines if not x.startswith("Info: out.")] == []
@@ -125,12 +125,12 @@ def _has_names(kind, names):
     if kind == "ALEMBIC":
         return
     assert {"spine_04", "neck_01", "head", "FACIAL_C_Jaw", "FACIAL_L_Eye"} <= set(names)
-    if kind != "FBX":  # Assimp 5.2 does not hand the names of an FBX file's shapes on
+    if kind != "FBX":  # Assimp 5.2 does not read the names of an FBX file's shapes
         assert "jaw" in names
 
 
 def _has_colors(kind, found):
-    """The head's picture as it was; an iris in the eye; light teeth; lashes that are hairs."""
+    """Check colours: head texture, iris, light teeth, lashes with separate hairs."""
     meshes = {n.removesuffix("_lod0_mesh"): m for n, m in found["meshes"].items()}
     head = np.array(meshes["head"]["colors"])
     x = _outside(kind, meshes["head"])[:, 0]
@@ -148,7 +148,7 @@ def _has_colors(kind, found):
     lashes = np.array(meshes["eyelashes"]["colors"])
     assert lashes[:, :3].max() < 0.35
     assert np.ptp(lashes[:, 3]) > 0.9
-    if found["opaque"]:  # Alembic holds no materials
+    if found["opaque"]:  # Alembic contains no materials
         clear = {n.removeprefix("Small_") for n, value in found["opaque"].items() if not value}
         assert clear == {"eyelashes", "eyeshell"}
 
@@ -215,7 +215,7 @@ def test_a_mesh_without_room_for_a_uv_map_is_one_sentence(tmp_path):
     for mesh in meshes:
         flat = np.empty(2 * len(mesh.loops), np.float32)
         mesh.uv_layers[0].uv.foreach_get("vector", flat)
-        mesh.uv_layers[0].uv.foreach_set("vector", 5 * flat)  # beyond the picture that is baked
+        mesh.uv_layers[0].uv.foreach_set("vector", 5 * flat)  # outside of the baked picture
         while len(mesh.uv_layers) < 8:
             mesh.uv_layers.new(name=f"own{len(mesh.uv_layers)}")
     before = _everything()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export Web Page: the face with its edits, its animation and its sound; or one sentence."""
+"""Export Web Page: the face with edits, animation and sound, or one sentence."""
 
 import base64
 import gzip
@@ -15,7 +15,7 @@ from risorius.web import page as pages
 from support import scene
 from support.animation import animate
 
-EMPTY = "<title>Risorius</title><!--FACE-->"  # the real one is tried in a browser
+EMPTY = "<title>Risorius</title><!--FACE-->"  # a browser tests the real page
 ELEMENT = re.compile(r'id="([^"]*)">([^<]*)</script>')
 
 
@@ -47,7 +47,7 @@ def test_the_page_holds_what_the_face_does_and_says(dna_file, tmp_path, sound, m
     stage.render.fps = 24
     path = tmp_path / "face.html"
     strips = scene.submodule("scene.base.compat").strips_of(stage)
-    # A Blender without sound makes no strip: the page is then silent, as it is without a strip.
+    # A Blender without audio support makes no strip; then the page is silent.
     heard = bpy.app.build_options.audaspace
     if heard:
         strips.new_sound("voice", str(sound), 1, 5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions: mixed in by numbers worked out here, as pictures, as assets, in libraries."""
+"""Expressions: blending compared with numbers calculated by hand; pictures, assets, libraries."""
 
 import tomllib
 
@@ -30,7 +30,7 @@ weights = { jawOpen = 0.8, mouthCornerPullL = 0.6 }
 
 @pytest.fixture
 def folder(tmp_path):
-    """A library of expressions, with two."""
+    """A library folder with expressions."""
     path = tmp_path / "library"
     path.mkdir()
     (path / "own.toml").write_text(OWN, encoding="utf-8")
@@ -65,7 +65,7 @@ def values(face):
 
 
 def other(**changed):
-    """START with other values."""
+    """The sliders of START with some other values."""
     names = {"jaw": JAW, "left": LEFT, "right": RIGHT, "brow": BROW}
     return pytest.approx({**START, **{names[k]: v for k, v in changed.items()}}, abs=1e-6)
 
@@ -75,13 +75,13 @@ def apply(name, **how):
 
 
 def refused(call, **given):
-    """The sentence of a refusing operator."""
+    """The error text of an operator that must refuse."""
     with pytest.raises(RuntimeError) as error:
         call(**given)
     return str(error.value)
 
 
-# a way of mixing -> the sliders after it, worked out by hand from START and OWN
+# options of blending -> sliders afterwards, calculated by hand from START and OWN
 MIXED = [
     ({"only": True}, {"jaw": 0.8, "left": 0.6, "right": 0, "brow": 0}),
     ({"only": False}, {"jaw": 0.8, "left": 0.6}),
@@ -134,7 +134,7 @@ def test_one_click_saves_what_is_not_at_rest(rig, folder):
     assert action.asset_data is not None
     assert {t.name for t in action.asset_data.tags} == {"mood", "mouth", "jaw"}
     bpy.ops.risorius.reset()
-    scene.face(rig)[BROW] = 0.7  # which it does not hold
+    scene.face(rig)[BROW] = 0.7  # a slider that the expression does not contain
     apply("mein_gruß")
     assert values(rig) == other(brow=0.7)
 
@@ -205,7 +205,7 @@ def test_a_library_that_is_missing_newer_or_of_another_rig_is_one_sentence(rig, 
     assert len(said) == 2
     assert said[0].startswith("bad.toml: a TOML file was expected")
     assert said[1].startswith("new.toml: it was written by a newer Risorius: format 1 at most")
-    apply("wide", only=False)  # those that can be read are there
+    apply("wide", only=False)  # the readable expressions are available
     start(rig)
     text = f'[expressions.alien]\nlabel = "Alien"\n[expressions.alien.weights]\n"{JAW}" = 0.9\n'
     text += "antenna = 1.0\n"
@@ -241,30 +241,30 @@ def test_export_and_import_take_all_or_none(rig, folder, tmp_path):
 
 
 def posed(face, *selected):
-    """Pose mode with some bones selected."""
+    """Enter pose mode with these bones selected."""
     controls = scene.controls(face)
     bpy.context.view_layer.objects.active = controls
     bpy.ops.object.mode_set(mode="POSE")
     for bone in controls.pose.bones:
-        owner = bone if hasattr(bone, "select") else bone.bone  # since 5.0 it is the pose bone's
+        owner = bone if hasattr(bone, "select") else bone.bone  # since 5.0 on pose bones
         owner.select = bone.name in selected
     return controls
 
 
 def test_blenders_own_operators_apply_the_assets(rig):
     stamp = scene.submodule("scene.animation.actions").stamp
-    stamp(bpy.data.actions.new("Face Smile, closed"))  # as an older version named it
+    stamp(bpy.data.actions.new("Face Smile, closed"))  # the name in an older version
     bpy.ops.risorius.make_pose_assets()
     assert [a.name for a in bpy.data.actions if "smile, c" in a.name.lower()] == [
         "Face Smile, closed"
     ]
     joy = risorius.expressions.load()["joy"].weights
     action = bpy.data.actions["Face Joy"]
-    assert "Face PP" in bpy.data.actions  # a sound is called M B P in panels alone
+    assert "Face PP" in bpy.data.actions  # a viseme is called M B P only in panels
     controls = posed(rig)
     controls.pose.apply_pose_from_action(action)
     goal = {JAW: joy[JAW], LEFT: joy[LEFT], RIGHT: joy[RIGHT]}
-    # It has no brow of this face: that region is not in the asset.
+    # The expression moves no brow of this face, so the asset does not contain the region.
     assert values(rig) == pytest.approx({**START, **goal}, abs=1e-6)
     start(rig)
     controls.pose.blend_pose_from_action(action, blend_factor=0.5)
@@ -294,14 +294,14 @@ def test_ours_apply_them_whatever_is_selected(rig):
     assert "Walk is no expression of a face." in said
 
 
-JOY = {LEFT: 1.0, RIGHT: 0.94, JAW: 0.24}  # of what this face has
+JOY = {LEFT: 1.0, RIGHT: 0.94, JAW: 0.24}  # the weights of joy for controls of this face
 
 # --- pictures --------------------------------------------------------------------------------
 
 
 @pytest.fixture
 def lower_jaw(tmp_path, folder):
-    """A face of which the lower half is the jaw's, and the upper half the head's."""
+    """A face whose lower half the jaw moves, and whose upper half the head moves."""
     dna = faces.small_face(head_grid=(14, 21))
     dna.meshes = [dna.meshes[0]]
     dna.mesh_names, dna.lod_count = ["head_lod0_mesh"], 1
@@ -340,14 +340,14 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     after = oracle.vertices(dna, 0, risorius.Rig(dna).evaluate(moved))
     still = np.linalg.norm(after - before, axis=1) < 1e-6
     assert 0.3 < still.mean() < 0.7
-    # The face fills the picture from the front: its largest side is 1 / 1.05 of it.
+    # The face fills the picture from the front: the picture is 1.05 times its largest side.
     low, high = before.min(axis=0), before.max(axis=0)
     half = 1.05 * (high - low)[[0, 2]].max() / 2
-    edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # of what stands still, from -1
+    edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # -1 to 1
     row = round((edge + 1) / 2 * 160)
     apart = np.abs(opened - rest).max(axis=2)
     assert 40 < row < 110
-    assert apart[row + 12 :].max() < 0.02  # a hollow's shade reaches a little further
+    assert apart[row + 12 :].max() < 0.02  # the shading of a hollow reaches slightly further
     assert (apart[: row - 12] > 0.05).mean() > 0.2
     # The visible area ends at the oracle's vertices.
     shown = (np.abs(rest - np.linspace(rest[0, 0], rest[-1, 0], 160)[:, None]) > 0.05).any(axis=2)
@@ -358,7 +358,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
 
 @pytest.fixture
 def kept(rig):
-    """The folder of pictures, empty before and after."""
+    """The folder of pictures, emptied before and after the test."""
     folder = scene.submodule("scene.expressions.library").own_folder("thumbnails")
     for path in folder.iterdir():
         path.unlink()
@@ -373,7 +373,7 @@ def test_pictures_are_made_once_and_anew_when_asked(rig, kept, monkeypatch):
     folder = kept
     assert list(folder.iterdir()) == []
     drawn, draw = [], portrait.draw
-    monkeypatch.setattr(thumbnails, "_MOST_FACES", 20)  # the coarse level
+    monkeypatch.setattr(thumbnails, "_MOST_FACES", 20)  # use the coarse level of detail
     monkeypatch.setattr(
         portrait, "draw", lambda *given: drawn.append(given) or draw(*given, size=24)
     )
@@ -381,7 +381,7 @@ def test_pictures_are_made_once_and_anew_when_asked(rig, kept, monkeypatch):
     items, _ = scene.submodule("scene.expressions.library").all_items(folder)
     first = len(drawn)
     assert len({tuple(sorted(d[1].items())) for d in drawn}) == len(list(folder.iterdir())) > 5
-    assert first == len(items) + 2  # those of the library
+    assert first == len(items) + 2  # plus the expressions of the library
     assert bpy.ops.risorius.render_thumbnails() == {"FINISHED"}
     assert len(drawn) == first
     assert bpy.ops.risorius.render_thumbnails(again=True) == {"FINISHED"}

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The life of the extension's zip: validated, installed, used, disabled, removed.
 
-Each step is a Blender process of its own with one user folder of its own. Programs are asked by
-their own `--command extension`; the bpy module has none, so there it is the operators that the
-preferences call, and the command line that Blender brings along for validation. The tests build
-on each other, in this order.
+Each step is a separate Blender process, and all steps use one user folder. Blender programs are
+called with their own `--command extension`; the bpy module lacks it, so there the operators of the
+preferences are called, and Blender's bundled command line validates. The tests depend on each
+other, in this order.
 """
 
 import json
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(not PACKAGE, reason="needs --extension ZIP")
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    """The user folder for all steps, and a face beside it."""
+    """The user folder for all steps, with a face beside it."""
     folder = tmp_path_factory.mktemp("user")
     small_face().save(str(folder.parent / "small.dna"))
     return folder
@@ -35,7 +35,7 @@ def home(tmp_path_factory):
 
 def _run(home, *command):
     settings = os.environ | {"BLENDER_USER_RESOURCES": str(home)}
-    # Blender's own module may be found by it (Windows, in wine); our package may not.
+    # PYTHONPATH may lead to Blender's own module (Windows, in Wine), but not to our package.
     paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     kept = (path for path in paths if path and not (Path(path) / "risorius").is_dir())
     settings["PYTHONPATH"] = os.pathsep.join(kept)
@@ -122,7 +122,8 @@ def test_a_sample_face_is_there_without_a_network(home):
     assert found["moved"] > 1000
     assert found["licence"] == "CC0-1.0"
     sizes = {name: width * height for name, (width, height) in found["textures"].items()}
-    # 22 wrinkle masks of 512 texels, three in the colours of a tile: made on import, in no file.
+    # 22 wrinkle masks of 512 texels, three in the channels of a tile; made on import, without
+    # files.
     assert [sizes.pop(name) for name in list(sizes) if name.endswith("_masks")] == [(3 * 512) ** 2]
     assert max(sizes.values()) == 1024 * 1024
 
@@ -144,6 +145,6 @@ def test_removed_nothing_of_it_is_left(home):
     assert found == NOTHING
     left = _files_of_ours(home)
     if bpy.app.version == (4, 2, 0) and not PROGRAM:
-        # The first 4.2 as a module forgets the wheel that it unpacked, whatever the extension.
+        # The bpy module of 4.2.0 leaves an unpacked wheel behind, for any extension.
         left = [name for name in left if ".local" not in name]
     assert left == []

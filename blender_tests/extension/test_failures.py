@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad files get one sentence and leave nothing behind; a missing wheel gets a sentence."""
+"""Bad files give one sentence and leave no data behind; a missing wheel gives a sentence."""
 
 import builtins
 import io
@@ -120,7 +120,7 @@ def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
 
 @pytest.fixture
 def work(dna_file, monkeypatch):
-    """How often the bytes of the file are read, hashed, unpacked, parsed and compiled."""
+    """Counts how often the bytes of the file are read, hashed, unpacked, parsed and compiled."""
     whole, counts = dna_file.read_bytes(), Counter()
     storage = scene.submodule("scene.base.storage")
 
@@ -149,7 +149,7 @@ def test_an_import_reads_the_file_once_and_compiles_it_once(dna_file, mode, work
     once = {"read": 1, "hash": 1, "load": 1, "Rig": 1}
     assert +work == once
     work.clear()
-    again = scene.load(dna_file, mode)  # what the .blend holds is unpacked: its hash may lie
+    again = scene.load(dna_file, mode)  # the .blend's hash may be wrong
     scene.set_controls(again, jawOpen=0.5)
     assert +work == {**once, "hash": 2, "unpack": 1}
 
@@ -238,7 +238,7 @@ def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
 
 
 def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
-    """A user folder of the extension, and a builder of samples that copies a small face."""
+    """Set up a user folder of the extension, and a builder of samples that copies a small face."""
     import shutil
 
     import risorius_people as sample
@@ -267,7 +267,7 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
 
 
 def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
-    """The status bar and Esc: the task of the operator, without a window."""
+    """Tests the status bar and Esc with the operator's task, without a window."""
     import risorius_people as sample
 
     operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character

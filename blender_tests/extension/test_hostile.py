@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hostile files through the front door: a sentence, and the scene and the memory as before."""
+"""Hostile files give one sentence; the scene and the memory are as before."""
 
 import gc
 import hashlib
@@ -29,15 +29,17 @@ def _one_sentence(text, path):
 
 
 def _take_out():
-    """Remove the imported data."""
+    """Remove the imported faces."""
     build, parts = scene.submodule("scene.character.build"), scene.submodule("scene.base.parts")
     for rig in parts.rigs():
         build.remove(rig)
 
 
 def _offer(path, **options):
-    """Import a file that may be refused, and check that nothing is left. Returns: whether it was
-    accepted."""
+    """Import a file that may be refused, and check that nothing is left.
+
+    Returns whether it was accepted.
+    """
     before = scene.counts()
     try:
         bpy.ops.risorius.import_dna(filepath=str(path), **(options or QUICK))
@@ -132,7 +134,7 @@ def test_a_face_that_left_is_not_kept(tmp_path):
 
 
 def _draw_panels():
-    """Draw every panel of the sidebar; returns the words that were shown."""
+    """Draw every panel of the sidebar. Returns the shown texts."""
     said = []
     face = "ui.face"
     for panel in (
@@ -207,7 +209,7 @@ def test_export_of_a_face_whose_dna_was_tampered_with_since(how, dna_file, tmp_p
     rig = scene.load(dna_file)
     target = tmp_path / "kept.dna"
     target.write_bytes(b"what was there")
-    _tamper(rig["risorius_dna"], how)  # what was compiled of it is still there
+    _tamper(rig["risorius_dna"], how)  # its compiled rig still exists
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.risorius.export_dna(filepath=str(target))
     text = str(caught.value).removeprefix("Error: ").strip()
@@ -246,7 +248,7 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
     blend = str(tmp_path / "tampered.blend")
     bpy.ops.wm.save_as_mainfile(filepath=blend)
     scene.submodule("scene.character.runtime").forget_unused(())
-    capsys.readouterr()  # a save that takes a face out of Direct mode may have told it, too
+    capsys.readouterr()  # a save that ends Direct mode may also have printed
     bpy.ops.wm.open_mainfile(filepath=blend)
     rig = bpy.data.objects["Small_rig"]
     bpy.context.view_layer.objects.active = rig
@@ -258,7 +260,7 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
     said = capsys.readouterr()
     assert "Traceback" not in said.err + said.out
     if how == "another file with its hash":
-        return  # a face of its own, only not this one
+        return  # another face, which is accepted
     assert "has lost its data" in shown
     if how.startswith(("no text", "words for the text", "a number for the hash")):
         return
@@ -268,7 +270,7 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
     assert lines[0].endswith(".")
 
 
-# Whoever writes a .blend writes the length and the hash too: neither may be believed.
+# The author of a .blend also writes length and hash, so neither can be trusted.
 @pytest.mark.parametrize("said", ["nothing", "the truth", "too little", "no number"])
 @pytest.mark.parametrize("begins", ["as a DNA file", "as nothing known"])
 def test_a_small_stream_that_unfolds_to_a_thousand_times_its_size(said, begins, dna_file, capsys):

@@ -19,7 +19,7 @@ def rig(dna_file):
 def test_without_a_face_the_panel_offers_one():
     layout = drawn(bpy.types.RISORIUS_PT_character)
     assert layout.operators == [
-        *("risorius.add_character", "risorius.import_dna"),
+        *("risorius.add_character", "risorius.import_dna", "risorius.make_rig_from_head"),
         "risorius.key",
         *("risorius.import_animation", "risorius.speak"),
     ]
@@ -40,11 +40,11 @@ def test_a_face_has_a_hint_until_it_is_dismissed(rig):
         return "pulls at the skin" in drawn(bpy.types.RISORIUS_PT_character).text()
 
     addons = bpy.context.preferences.addons
-    entry = addons.new()  # tests enable the add-on without one
+    entry = addons.new()  # tests enable the add-on without an entry
     entry.module = scene.MODULE
     assert says()
     scene.set_controls(rig, jawOpen=0.3)
-    assert says()  # a hand on a slider must not find another one under it
+    assert says()  # the hints stay, so that sliders do not move under the mouse
     assert bpy.ops.risorius.hide_hints() == {"FINISHED"}
     assert not says()
     addons[scene.MODULE].preferences.hints = True

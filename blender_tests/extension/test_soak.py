@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A short soak, and proof that it notices wrong faces, tracebacks and crashes."""
+"""A short soak test, and checks that it notices wrong faces, tracebacks and crashes."""
 
 import os
 import sys
@@ -15,12 +15,12 @@ ACTIONS = 300
 
 
 def _soak(log, *given, **environment):
-    """Exit code and log of a run in a process of its own."""
+    """Run the soak test in a separate process. Returns its exit code and log."""
     program = [sys.executable, str(SOAK), "--log", str(log), *given]
     if bpy.app.binary_path:
         program += ["--blender", bpy.app.binary_path]
     kept = {k: v for k, v in os.environ.items() if k != "RISORIUS_TEST_USER"}
-    # The child has a user folder of its own: it finds the module where this process found it.
+    # The child has its own user folder, and finds the package where this process found it.
     kept["RISORIUS_TEST_PATH"] = str(Path(risorius.__file__).parent.parent)
     done = limits.run(program, 400, env={**kept, **environment})
     text = log.read_text(encoding="utf-8") if log.is_file() else done.stderr

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties of a .blend with arbitrary values: no traceback, and the face keeps working."""
+"""Custom properties with arbitrary values cause no traceback, and the face keeps working."""
 
 import bpy
 import pytest
@@ -20,7 +20,7 @@ VALUES = {
     "an object": "OBJECT",
     "a text": "TEXT",
 }
-# Owner -> names of its properties.
+# Owner -> names of its custom properties.
 PROPERTIES = {
     "rig": """risorius_rig risorius_controls risorius_dna risorius_lod risorius_lod_render
         risorius_lod_by_distance risorius_lod_distances risorius_follow risorius_unit
@@ -45,7 +45,7 @@ PROPERTIES = {
     "risorius_landmark_found",
     "landmark": "risorius_landmark risorius_landmark_found",
 }
-# Values that would hide all others get a session of their own.
+# Values that hide the effect of others are tested in their own session.
 ALONE = (
     ("rig", "risorius_controls", "numbers"),
     ("rig", "risorius_controls", "an object"),
@@ -68,7 +68,7 @@ TOGETHER = [
 
 @pytest.fixture
 def rig(tmp_path):
-    """A small face with levels and an action, beside an object and a text."""
+    """A small face with LODs and an action, with another object and a text in the file."""
     path = tmp_path / "small.dna"
     small_face(head_grid=(5, 6)).save(str(path))
     found = scene.load(path, "LIVE", lods=(True,) * 8)
@@ -110,7 +110,7 @@ def _value(what):
 
 
 def _panels():
-    """Every panel of the tab that asks to be drawn."""
+    """Draw all panels of the tab whose poll succeeds."""
     for panel in bpy.types.Panel.__subclasses__():
         ours = getattr(panel, "bl_category", "") == "Risorius" and panel.is_registered
         if ours and getattr(panel, "poll", lambda _context: True)(bpy.context):
@@ -118,7 +118,7 @@ def _panels():
 
 
 def _use(tmp_path, number):
-    """A short session: sliders, frames, panels, operators, a file saved and loaded."""
+    """A short session: sliders, frames, panels, operators, saving and loading."""
     context = bpy.context
     controls = bpy.data.objects.get("Small_controls")
     context.view_layer.objects.active = controls
@@ -164,14 +164,14 @@ STEPS = [
 
 
 def _plant(rig, who, name, what):
-    """Give a property a wrong value, where Blender takes it."""
+    """Set a property to a wrong value, if Blender accepts the value."""
     owner = _owner(rig, who)
     if name in owner:
         del owner[name]
     try:
         owner[name] = _value(VALUES[what])
     except (TypeError, ValueError):
-        return  # a mesh's property takes no object
+        return  # a property of a mesh accepts no object
 
 
 @pytest.mark.parametrize("turn", range(len(VALUES)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One line at the top of the tab names the active mode, and the panels below stay in place."""
+"""A line at the top of the tab names the active mode, and the panels below stay in place."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from support.heights import lines_of
 from support.layout import Recorder, drawn
 
 JAW = "CTRL_expressions.jawOpen"
-# Mode -> call that turns it on, text of the banner, and whether an own operator ends it.
+# Name of a mode -> call that starts it, and text of the banner.
 MODES = {
     "tweak": (lambda: bpy.ops.risorius.tweak(first=1, last=20), "Tweak 1-20"),
     "tweak elsewhere": (
@@ -42,7 +42,7 @@ def _banner(rig):
 
 
 def _done(mode):
-    """The effect of a click on Done."""
+    """Click on Done."""
     return getattr(bpy.ops.risorius, mode.operator.partition(".")[2])(**mode.settings)
 
 
@@ -67,7 +67,7 @@ def test_each_mode_is_named_ends_with_done_and_moves_nothing(rig):
         found = _banner(rig)
         assert [mode.text for mode in found] == [text]
         assert drawn(top).labels[:2] == [text, "Done"]
-        baked = name == "baked"  # See Why says then that no controls are shown
+        baked = name == "baked"  # then See Why shows no controls
         assert _heights()[: 2 if baked else 4] == before[: 2 if baked else 4], name
         assert _done(found[0]) == {"FINISHED"}, name
         assert _banner(rig) == [], name

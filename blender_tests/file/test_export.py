@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An imported file is exported byte for byte; edits are exported as shown in the scene."""
+"""An unedited face is exported byte for byte; edits are exported as the scene shows them."""
 
 import os
 from pathlib import Path
@@ -35,7 +35,7 @@ def _report(name="Small"):
 
 
 def _move(rig, mesh, vertex, by):
-    """Move a neutral vertex as edit mode does: every key moves along."""
+    """Move a neutral vertex like edit mode: every shape key moves too."""
     for block in scene.meshes(rig)[mesh].data.shape_keys.key_blocks:
         co = np.array(block.points[vertex].co) + by
         block.points[vertex].co = co
@@ -54,7 +54,7 @@ def test_untouched_files_of_every_version(mode, tmp_path):
 
 
 def test_untouched_golden_files(tmp_path):
-    """Files of another writer; files without a face are refused at the import."""
+    """Files of another program; files without a face are refused on import."""
     seen = 0
     for source in sorted(GOLDEN.glob("*.dna")):
         try:
@@ -86,7 +86,7 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
     shown = scene.snapshot(rig)
     out = _export(tmp_path)
     again = scene.load(out, "KEYS")
-    scene.controls(again).location.x = 0.0  # it was put beside the other
+    scene.controls(again).location.x = 0.0  # it was placed beside the other face
     scene.set_controls(again, jawOpen=0.7, mouthCornerPullL=0.4)
     np.testing.assert_allclose(scene.snapshot(again), shown, atol=size * 1e-6)
     raw = scene.raw_of(again, out)
@@ -95,7 +95,7 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
 
 
 def _only_these_changed(source, out, step):
-    """In the file three values differ by the right distances, and all others by no bit."""
+    """Check that three values differ by given distances, and all others not in a bit."""
     old, new = risorius.load(str(source)), risorius.load(str(out))
     one, two = old.meshes[0], new.meshes[0]
     moved = oracle.to_blender(new, (two.positions.astype(float) - one.positions))
@@ -113,7 +113,7 @@ def _only_these_changed(source, out, step):
         assert list(changed) == [vertex]
         by_now = oracle.to_blender(new, delta[1] - delta[0])[vertex]
         np.testing.assert_allclose(by_now, by, atol=step * 1e-3)
-    # With these restored the file equals the imported one.
+    # With these values restored, the file equals the imported one.
     two.positions = one.positions
     two.blend_shape_targets = one.blend_shape_targets
     assert new.to_bytes(version=f"2.{old.version}") == old.to_bytes(version=f"2.{old.version}")
@@ -173,7 +173,7 @@ def test_what_is_not_asked_for_is_not_written(dna_file, tmp_path):
 
 
 def test_a_basis_edit_by_edit_mode_is_no_edit_of_keys(dna_file, tmp_path):
-    """Blender moves the keys along and rounds: only the neutral may change."""
+    """Blender moves the keys and rounds; only the neutral positions may change."""
     import bmesh
 
     rig = scene.load(dna_file, "KEYS")
@@ -221,7 +221,7 @@ def test_edited_joints(tmp_path):
         again = scene.load(out)
         for name, matrix in wanted.items():
             got = np.array(again.data.bones[name].matrix_local)
-            # Blender keeps a bone's direction as two float32 ends, here 4 cm at a height of 1.7 m.
+            # Blender stores a bone as two float32 ends, here 4 cm apart at a height of 1.7 m.
             np.testing.assert_allclose(got[:3, :3], matrix[:3, :3], atol=3e-5)
             np.testing.assert_allclose(got[:3, 3], matrix[:3, 3], atol=1e-6 * size)
         said = next(x for x in _report().splitlines() if x.startswith("Joint FACIAL_L_Eye: "))
@@ -247,7 +247,7 @@ def test_painted_weights(dna_file, tmp_path):
     np.testing.assert_array_equal(two.skin_weights[:begin], one.skin_weights[:begin])
     np.testing.assert_array_equal(two.skin_weights[end:], one.skin_weights[one.skin_offsets[7] :])
     again = scene.load(out)
-    scene.controls(again).location.x = 0.0  # it was put beside the other
+    scene.controls(again).location.x = 0.0  # it was placed beside the other face
     for of in (rig, again):
         scene.set_controls(of, jawOpen=1.0)
     np.testing.assert_allclose(scene.snapshot(again), scene.snapshot(rig), atol=1e-6)
@@ -315,8 +315,8 @@ def test_an_export_follows_links_keeps_rights_and_is_whole_or_not_there(dna_file
     path.chmod(0o640)
     link.symlink_to("out.dna")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Blender 4.3 does not
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # as on a full disk
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Blender 4.3 does not ignore it
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # simulates a full disk
     try:
         with pytest.raises(RuntimeError, match=r"^Error: link.dna: File too large\.$"):
             bpy.ops.risorius.export_dna(filepath=str(link))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of a .blend or a library are no paths, and files of the user stay."""
+"""Names in a .blend or a library never become paths, and files of the user stay."""
 
 import os
 from pathlib import Path
@@ -40,7 +40,7 @@ def text_of(name, weight=0.5):
 
 
 def library(folder, *names):
-    """A folder as one gets it from somebody, with an expression of each name."""
+    """A library folder from another person, with one expression for each name."""
     folder.mkdir(parents=True)
     for number, name in enumerate(names):
         (folder / f"{number:02}.toml").write_text(text_of(name), encoding="utf-8")
@@ -108,7 +108,7 @@ def test_pose_assets_of_hostile_names_are_exported_into_the_folder(rig, tmp_path
 def test_files_of_the_users_are_replaced_only_where_that_is_said(rig, tmp_path):
     own, other = tmp_path / "library", library(tmp_path / "other", "grin", "growl")
     (own / "my grin.toml").write_text(text_of("grin", 0.9), encoding="utf-8")
-    (own / "grin.toml").write_text("[expressions", encoding="utf-8")  # no library's, but the user's
+    (own / "grin.toml").write_text("[expressions", encoding="utf-8")  # the user's own
     before = everything(own)
     said = refused(bpy.ops.risorius.import_expressions, directory=str(other))
     assert "There is an expression grin already: choose Replace" in said
@@ -209,7 +209,7 @@ def test_an_image_without_a_path_is_written_beside_the_usd(rig, tmp_path):
 
 
 def _painted(name, folder):
-    """A material that shows an image unchanged."""
+    """A material that shows an image, without shading."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

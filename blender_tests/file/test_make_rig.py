@@ -16,7 +16,7 @@ _SUPPORT = Path(__file__).parents[2] / "tests" / "python" / "support"
 
 
 def _supporting(name):
-    """A module of the package's tests, which imports others by these names."""
+    """Load a module of the package's tests under the name by which others import it."""
     spec = importlib.util.spec_from_file_location(name, _SUPPORT / f"{name}.py")
     sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sys.modules[name])
@@ -30,7 +30,7 @@ METRES = 0.01
 
 
 def to_blender(points):
-    """Centimetres with y up as metres with z up."""
+    """Convert centimetres with y up to metres with z up."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * METRES
 
 
@@ -69,7 +69,7 @@ def made_face():
 
 
 def shape(item, name):
-    """Vertices moved by one key alone, without the object's transform."""
+    """Vertices with a single key active, without the object's location."""
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)
@@ -114,12 +114,12 @@ def test_what_blender_saves_is_the_same_head(saved, scale, head, tmp_path):
     positions, faces = face_shapes.head()
     assert len(mesh.positions) == len(positions)
     corners = [len(face) for face in mesh.faces]
-    assert sum(corners) - 2 * len(corners) == 2 * len(faces)  # as many triangles
+    assert sum(corners) - 2 * len(corners) == 2 * len(faces)  # the same number of triangles
     assert [len(face) for face in mesh.uv_faces] == corners
     assert np.ptp(mesh.uvs, axis=0).min() > 0.9
     wanted = face_shapes.expressions(positions)
     assert list(moved) == list(wanted)
-    # Blender may put vertices into another order: each is looked for by its place.
+    # Blender may reorder vertices, so each is found by its place.
     unit = METRES * scale
     place = np.array([2.0, 3.0, -1.0]) / 1.5
     apart = np.linalg.norm(mesh.positions[:, None] / unit - positions[None] - place, axis=2)
@@ -152,7 +152,7 @@ def test_the_face_does_what_the_keys_did(head, tmp_path):
         scene.set_controls(rig, **{f"CTRL_expressions.{control}": 0.0})
     assert [m.name for m in mesh.data.materials] == ["Skin", "Lips"]
     assert mesh.data.polygons[3].material_index == 1
-    assert len(head.data.shape_keys.key_blocks) == 8  # it stays as it was
+    assert len(head.data.shape_keys.key_blocks) == 8  # the head is unchanged
 
 
 def test_joints_alone_and_as_many_levels_as_asked_for(head, tmp_path):
@@ -215,7 +215,7 @@ def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
 
 
 def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
-    """A mesh of centimetres with y up, as an object somewhere."""
+    """Add a mesh, given in centimetres with y up, as an object."""
     points, faces = geometry
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(to_blender(points).tolist(), [], np.asarray(faces).tolist())
@@ -234,7 +234,7 @@ def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
 
 @pytest.fixture
 def whole_head():
-    """A head that looks along +Y, with teeth of the same keys, eyes, hair, and a far-off cube."""
+    """A head that looks along +Y: teeth with the same keys, eyes, hair, and a distant cube."""
     armature = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     bpy.context.scene.collection.objects.link(armature)
     armature.rotation_euler = (0.0, 0.0, np.pi)

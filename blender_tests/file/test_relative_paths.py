@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths that begin with two slashes, as Blender writes them, in each operator that takes a file."""
+"""Paths that begin with `//`, for each operator that opens or writes a file."""
 
 import bpy
 import numpy as np
@@ -18,7 +18,7 @@ MARKS = """{"format": "risorius landmarks", "version": 1,
 
 
 def _library(folder, name):
-    """A folder with one expression."""
+    """A folder with one expression file."""
     folder.mkdir()
     expression = risorius.expressions.Expression(name, name, "own", "", {JAW: 0.5}, ())
     text = risorius.expressions.text_of(expression)
@@ -32,7 +32,7 @@ OF_HEADS = (
 
 
 def _calls(folder):
-    """Operator -> calls with `//`, each with the file in the folder that it must have made."""
+    """Operator -> calls with `//` paths, each with the file that it must write in the folder."""
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
     opened = 0.8 * (np.arange(240) % 60 < 20)
     risorius.Clip([JAW], [opened], 60.0).save(folder / "opens.rzc")
@@ -73,7 +73,7 @@ def _calls(folder):
 
 
 def _head():
-    """An active mesh with a shape key that a rig can be made of."""
+    """Add an active mesh with a shape key from which a rig can be made."""
     mesh = bpy.data.meshes.new("Head")
     places = [(x, y, z) for x in (-0.1, 0.1) for y in (0, 0.1) for z in (0, 0.1, 0.2)]
     mesh.from_pydata(places, [], [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)])
@@ -86,7 +86,7 @@ def _head():
 
 
 def _deaf(monkeypatch):
-    """The paths given to a fake recogniser."""
+    """Replace the recogniser; returns a list that receives the paths given to it."""
     heard = []
 
     class Task:

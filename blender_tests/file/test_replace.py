@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replacing the file of a face: the user's additions stay, removed parts are listed."""
+"""Replacing the DNA file of a face: the user's additions stay, removed parts are listed."""
 
 import bpy
 import numpy as np
@@ -30,7 +30,7 @@ def _report(name="Small"):
 
 
 def _right(rig, path, seed=5):
-    """Random controls give the pose of the new file, and no driver is broken."""
+    """Check that random controls give the pose of the new file, and that no driver is broken."""
     bone = scene.face(rig)
     random = np.random.default_rng(seed)
     labels = [k for k in bone.keys() if k.startswith(PREFIX)]  # noqa: SIM118
@@ -76,7 +76,7 @@ def test_a_file_with_other_numbers_everywhere(mode, dna_file, other_file):
 
 
 def _clear_action(controls):
-    """Controls that are keyed cannot be set by hand: `_right` sets them."""
+    """Remove the action, because keyed controls could not be set by `_right`."""
     assert controls.animation_data.action is not None
     controls.animation_data.action = None
 
@@ -130,12 +130,12 @@ def test_actions_nla_and_drivers_move_the_new_face(mode, dna_file, other_file):
     bpy.context.scene.frame_set(2)
     bpy.context.view_layer.update()
     raw = scene.raw_of(rig, other_file)
-    raw[3], raw[1] = 0.25, 0.75  # jawOpen and mouthCornerPullL of the new file
+    raw[3], raw[1] = 0.25, 0.75  # jawOpen and mouthCornerPullL in the new file
     assert scene.error_against_oracle(rig, other_file, raw) < scene.TOLERANCE
 
 
 def _decorate(rig):
-    """Everything that a user may put onto a character."""
+    """Add everything that a user may add to a character. Returns the head."""
     head = scene.meshes(rig)[0]
     head.modifiers.new("Subdivision", "SUBSURF").levels = 0
     head.modifiers.new("First", "SMOOTH").factor = 0.0
@@ -209,7 +209,7 @@ def test_what_users_add_stays(mode, dna_file, other_file):
 
 
 def test_a_face_with_other_topology(mode, dna_file, tmp_path):
-    """A finer mesh on the same sphere: all data arrive near their old places."""
+    """The new mesh is finer on the same sphere; all data move to near their old places."""
     path = _save(small_face(head_grid=(19, 21)), tmp_path)
     rig = scene.load(dna_file, mode)
     head = _decorate(rig)
@@ -258,7 +258,7 @@ def test_an_untouched_mesh_leaves_no_copy(mode, dna_file, tmp_path):
 
 
 def test_edits_lie_on_top_of_the_new_file(dna_file, tmp_path):
-    """An edited key and an edited neutral: the difference to the old file is added to the new."""
+    """Differences of an edited key and an edited neutral are added to the new file's."""
     dna = other_face()
     dna.meshes[0].positions = dna.meshes[0].positions * np.float32(1.02)
     for target in dna.meshes[0].blend_shape_targets:
@@ -354,7 +354,7 @@ def test_a_bone_that_the_user_connected_stays_where_it_was_put(dna_file, other_f
     rig = scene.load(dna_file)
     armatures = scene.submodule("scene.character.armatures")
     with armatures.edit_armature(bpy.context, rig.data) as bones:
-        bones["FACIAL_L_Eye"].use_connect = True  # it jumps to the tail of the head
+        bones["FACIAL_L_Eye"].use_connect = True  # its head jumps to the parent's tail
 
     def local():
         bones = rig.data.bones
@@ -403,7 +403,7 @@ def test_a_mesh_without_faces_lends_nothing_and_breaks_nothing():
 @pytest.mark.parametrize("skinning", ["AUTO", "LIVE"])
 def test_joints_that_the_new_file_does_not_move_go_back_to_rest(skinning, dna_file, tmp_path):
     dna = small_face()
-    dna.joint_groups = dna.joint_groups[:1]  # the eye's group is gone
+    dna.joint_groups = dna.joint_groups[:1]  # without the eye's group
     path = _save(dna, tmp_path)
     rig = scene.load(dna_file, skinning)
     scene.set_controls(rig, eyeLookUpL=1.0, jawOpen=0.5)
@@ -441,7 +441,7 @@ def test_an_edited_joint_stays_edited(dna_file, other_file):
 
     moved = local(rig)
     _replace(other_file)
-    np.testing.assert_allclose(local(rig), moved, atol=1e-5)  # a roll angle in float32
+    np.testing.assert_allclose(local(rig), moved, atol=1e-5)  # tolerance of a roll angle in float32
     assert np.abs(local(rig) - local(clean)).max() > 0.004
     head = np.array(rig.data.bones["head"].matrix_local)
     np.testing.assert_allclose(head, np.array(clean.data.bones["head"].matrix_local), atol=1e-6)
@@ -457,7 +457,7 @@ def test_control_bones_go_with_the_new_face_unless_the_user_moved_them(dna_file,
         bones["neck"].head.x += 0.01
         bones["neck"].tail.x += 0.01
     moved, before = data.bones["neck"].head_local.copy(), data.bones["head"].head_local.copy()
-    other = bpy.data.objects.new("other", data)  # that shares the bones
+    other = bpy.data.objects.new("other", data)  # another object that shares the bones
     _replace(other_file)
     assert (other.data.bones["head"].head_local - before).length == 0
     data = scene.controls(rig).data

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of Shape Keys: assignments of the keys of a head by the user, before a rig is made."""
+"""Names of Shape Keys: the user assigns the keys of a head before a rig is made."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ PREFIX = "CTRL_expressions."
 
 @pytest.fixture
 def head():
-    """The egg with two unknown keys."""
+    """The egg with two keys of unknown names."""
     item = egg.egg()
     keys = item.data.shape_keys.key_blocks
     keys["jawOpen"].name, keys["mouthSmileLeft"].name = "Key 7", "Key 8"
@@ -35,7 +35,7 @@ def test_the_list_tells_what_names_become(head):
     assert (found["Key 7"].kind, found["Key 7"].is_known) == ("OWN", False)
     assert (found["eyeBlinkLeft"].controls, found["eyeBlinkLeft"].by) == (("eyeBlinkL",), "ARKit")
     _SAY(key="Key 8", becomes="eyeBlinkL")
-    assert rows(head)["eyeBlinkLeft"].holder == "Key 8"  # what is said comes first
+    assert rows(head)["eyeBlinkLeft"].holder == "Key 8"  # the user's assignments have precedence
     _SAY(key="Key 8", way="NAME")
     head.data.shape_keys.key_blocks["eyeBlinkLeft"].mute = True
     assert rows(head)["eyeBlinkLeft"].kind == "MUTED"
@@ -45,7 +45,7 @@ def test_the_list_tells_what_names_become(head):
 
 
 def test_what_is_said_is_what_the_rig_has(head, tmp_path):
-    assert _SAY(becomes="jawOpen") == {"FINISHED"}  # of the active key
+    assert _SAY(becomes="jawOpen") == {"FINISHED"}  # the active key
     assert _SAY(key="Key 8", becomes="@joy") == {"FINISHED"}
     assert _SAY(key="browOuterUpLeft", way="NOTHING") == {"FINISHED"}
     assert _SAY(key="eyeBlinkLeft", way="OWN") == {"FINISHED"}
@@ -100,7 +100,7 @@ def test_what_cannot_be_said_is_one_sentence(head, tmp_path):
     with pytest.raises(RuntimeError, match="has no shape key hat"):
         _SAY(key="hat", becomes="jawOpen")
     assert not kinds(head)
-    head.data["risorius_names"] = "[controls"  # of somebody else
+    head.data["risorius_names"] = "[controls"  # written by another program
     assert rows(head)["Key 7"].kind == "OWN"
 
 
@@ -115,7 +115,7 @@ def test_what_is_said_is_undone(head):
 
 
 def test_a_picture_shows_where_a_key_moves_the_head(head):
-    """For every orientation of the head; a picture of the sample man shows the assignment."""
+    """A picture shows the motion for any orientation; the sample man shows the assignment."""
     _SAY(becomes="jawOpen")
     shown = scene.submodule("scene.shape_keys.pictures")
     head.rotation_euler.z = np.pi / 2
@@ -127,7 +127,7 @@ def test_a_picture_shows_where_a_key_moves_the_head(head):
         pictures.pixels(paths[name]).reshape(160, 160, 4) for name in ("Key 7", "browOuterUpLeft")
     )
     orange = [np.argwhere(p[..., 0] - p[..., 2] > 0.25).mean(axis=0) for p in (jaw, brow)]
-    assert orange[0][0] < orange[1][0] - 20  # rows go up: the jaw is below the brows
+    assert orange[0][0] < orange[1][0] - 20  # rows go upwards: the jaw is below the brows
     assert abs(orange[0][1] - jaw.shape[1] / 2) < 8  # and in the middle
     assert shown.sample_path("jawOpen").is_file()
 

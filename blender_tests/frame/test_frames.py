@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every frame is a function of its controls: playback, scrubbing, rendering, NLA, drivers."""
+"""Each frame depends only on its controls: playback, scrubbing, rendering, NLA, drivers."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ FRAMES = (1, 4, 7, 10)
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """Direct mode, a live key and real keys, both on posed bones."""
+    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
     return request.param
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One turned head with neck poses by every way out of Blender, against an evaluator in NumPy."""
+"""A rotated head with neck poses in all outputs of Blender, compared with a NumPy evaluator."""
 
 import base64
 import gzip
@@ -25,26 +25,28 @@ behavior, pose_oracle = (importlib.import_module(n) for n in ("oracle_behavior",
 
 NECK, HEAD = (0, 1), 2
 JAW = "CTRL_expressions.jawOpen"
-# Frame -> jaw, turns of neck and head as angles of their control bones.
+# Frame -> jaw, and rotations of neck and head as Euler angles of their control bones, in radians.
 KEYS = {
     1: (0.0, (0.1, 0.0, -0.05), (-0.2, 0.1, 0.1)),
     2: (0.6, (-0.25, 0.2, 0.1), (0.35, -0.2, 0.15)),
     3: (0.3, (0.3, -0.1, 0.0), (-0.1, 0.4, -0.3)),
 }
-SAME = 1e-5  # of channels, which go up to 1
-NEAR = 2e-5  # of vertices, of the head's size: float32 bones
+SAME = 1e-5  # tolerance of channels, which go up to 1
+NEAR = 2e-5  # tolerance of vertices, as a share of the head's size: bones are float32
 
 
 def two_necks():
-    """The face with neck poses and a neck of two joints; the solver reads the lower one."""
+    """The face with neck poses and a neck of two joints; the solver reads the lower joint."""
     dna = neck_face()
     dna.joint_names = ["neck_01", "neck_02", *dna.joint_names[2:]]
     return dna
 
 
 class _Reference:
-    """The face at the keys by the format's description: channels, and vertices in the face's own
-    space."""
+    """The expected face at the keys, from the description of the format.
+
+    It has channels, and vertices in the face's own space.
+    """
 
     def __init__(self, dna, rig):
         self.dna = dna
@@ -59,7 +61,7 @@ class _Reference:
         return {f: rest @ q @ rest.inverted() for f, q in own.items()}
 
     def matrices(self, frame):
-        """Joint -> the matrix of its turn about its own axes."""
+        """Joint -> the matrix of its rotation about its own axes."""
         half = Quaternion().slerp(self.turns["neck"][frame], 0.5)
         basis = oracle.to_blender(self.dna, np.eye(3)) * 100.0
         rest = oracle._world(self.dna, np.zeros((len(self.dna.joint_names), 9)))
@@ -94,7 +96,7 @@ class _Reference:
 
 @pytest.fixture
 def face(tmp_path):
-    """An animated face with a mirrored parent: its rig, its file, its _Reference."""
+    """An animated face with a mirrored parent: (rig, file, _Reference)."""
     path, dna = tmp_path / "neck.dna", two_necks()
     dna.save(str(path))
     rig = scene.load(path)
@@ -115,7 +117,7 @@ def face(tmp_path):
 
 
 def _check(shown, reference, frame, place):
-    """Vertices by mesh against the reference at a place of the face."""
+    """Check vertices by mesh against the reference, with the face's world matrix `place`."""
     for mesh, points in shown.items():
         wanted = reference.vertices(frame, mesh) @ place[:3, :3].T + place[:3, 3]
         assert np.abs(points - wanted).max() < NEAR * np.ptp(wanted, axis=0).max(), (frame, mesh)
@@ -170,7 +172,7 @@ def _clips(rig, path, reference, wanted, folder):
     with np.load(out) as found:
         for frame in KEYS:
             np.testing.assert_allclose(found["blend_shapes"][frame - 1], wanted[frame], atol=SAME)
-    # The angles alone give the same result.
+    # The angles of neck and head without the raw controls give the same result.
     loaded = risorius.Clip.load(clip)
     angles = [f"{bone}.{way}" for bone in ("neck", "head") for way in ("yaw", "pitch", "roll")]
     loaded.selected([JAW, *angles]).save(clip)
@@ -214,7 +216,7 @@ def _pages(reference, wanted, folder, monkeypatch):
 
 
 def _exports(reference, place, folder):
-    """Alembic has the vertices themselves."""
+    """Check that an Alembic file contains the expected vertices."""
     if not bpy.app.build_options.alembic:
         return
     path = folder / "face.abc"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A frame has the same pixels however it was reached: alone, backwards, after any other."""
+"""A frame has the same pixels in any order of frames: alone, backwards, after any other."""
 
 import os
 
@@ -17,12 +17,12 @@ NOISELESS = 1.01 / 255
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """Direct mode, and real shape keys under posed bones."""
+    """The mode of the face: Direct mode, or real shape keys on posed bones."""
     return request.param
 
 
 def _set_up(motion_blur, persistent):
-    """A scene that renders the face in a few samples, always the same ones."""
+    """Set up a scene that renders the face with a few samples, which are always the same."""
     setup = bpy.context.scene
     setup.render.engine = "CYCLES"
     setup.cycles.samples, setup.cycles.device, setup.cycles.seed = 4, "CPU", 3
@@ -58,7 +58,7 @@ def _render_animation(setup, folder):
 
 
 def _render_frame(setup, folder, frame, before=None):
-    """One frame, after another one was shown."""
+    """Render a frame, after another frame was shown."""
     if before is not None:
         setup.frame_set(before)
     setup.frame_set(frame)
@@ -68,7 +68,7 @@ def _render_frame(setup, folder, frame, before=None):
 
 
 def _look_the_same(setup, folder, orders=ORDERS):
-    """Assert that the frames look the same in every order; returns them."""
+    """Check that the frames look the same in every order. Returns their pixels."""
     animated = _render_animation(setup, folder)
     for frame, before in orders:
         alone = _render_frame(setup, folder, frame, before)
@@ -116,7 +116,7 @@ def test_direct_and_live_render_the_same_pixels(motion_blur, dna_file, tmp_path)
     bpy.ops.risorius.set_shape_mode(mode="LIVE")
     live = _render_animation(setup, tmp_path)
     assert not any("risorius_finished" in item for item in scene.meshes(rig).values())
-    # Positions differ in the last bits, so that a ray may pass an edge on the other side.
+    # Positions differ in the last bits, so a ray may hit the other side of an edge.
     for frame in FRAMES:
         apart = np.abs(direct[frame] - live[frame]).max(axis=2)
         assert (apart > NOISELESS).mean() < 0.002, frame
@@ -140,7 +140,7 @@ def test_two_processes_render_the_same_pixels(mode, dna_file, tmp_path):
 )
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "blurred"])
 def test_a_frame_has_the_same_pixels_in_eevee(motion_blur, dna_file, tmp_path):
-    # Plain grey: in software a material takes its time to be compiled.
+    # Plain grey, because compiling materials takes long in software rendering.
     animate(scene.load(dna_file, "LIVE", use_materials=False))
     setup = _set_up(motion_blur, False)
     setup.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair: their material, and strands that take their place in renders."""
+"""Hair cards: their material, and strands that replace them in renders."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ ROWS, CARDS = 3, 5
 
 
 def cards(joint):
-    """A Mesh of cards side by side on a joint, each with ROWS rows of two vertices."""
+    """A Mesh of hair cards in a row on a joint, each with ROWS rows of two vertices."""
     points, faces = [], []
     for card in range(CARDS):
         for row in range(ROWS):
@@ -33,11 +33,11 @@ def cards(joint):
 
 @pytest.fixture
 def haired(tmp_path):
-    """A face with cards on the joint that its jaw control turns, and a picture with opacity."""
+    """A face with cards on the joint that its jaw control rotates, and a texture with opacity."""
     dna = small_face()
     moving = int(dna.joint_groups[0].output_indices[0]) // 9
     meshes = {"head_lod0_mesh": dna.meshes[0], "hair_lod0_mesh": cards(moving)}
-    meshes["beard_lod0_mesh"] = cards(moving)  # without rows in the metadata: no strands
+    meshes["beard_lod0_mesh"] = cards(moving)  # metadata without rows: no strands
     looks.set_meshes(dna, meshes)
     dna.metadata = {
         "texture:hair_lod0_mesh:color": "hair.png",
@@ -50,8 +50,10 @@ def haired(tmp_path):
 
 
 def points_of(thing):
-    """float64[n, 3] points of the rendered curves in world space, and the first point of each
-    curve."""
+    """Points of the rendered curves in world space, float64[n, 3].
+
+    Also the index of each curve's first point.
+    """
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
     seen = thing.evaluated_get(graph)
@@ -76,7 +78,8 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
 
 
 # How far a strand strays: in cards' widths, in rows of two centimetres; metres, by which tips part
-# on each axis.
+# How far a strand may leave its card: in widths of a card, in rows of 2 cm, and the distance in
+# metres by which tips separate along each axis.
 ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
 
 
@@ -85,7 +88,7 @@ def test_strands_go_wherever_their_cards_go(haired):
     before = set(bpy.data.objects), len(bpy.data.node_groups), len(bpy.data.materials)
     assert bpy.ops.risorius.set_strands() == {"FINISHED"}
     (thing,) = set(bpy.data.objects) - before[0]
-    assert bpy.ops.risorius.set_strands() == {"FINISHED"}  # it has them: nothing to do
+    assert bpy.ops.risorius.set_strands() == {"FINISHED"}  # the strands exist already
     assert len(set(bpy.data.objects) - before[0]) == 1
     assert (item.hide_render, thing.hide_render, thing.hide_viewport) == (True, False, True)
     for jaw in (0.0, 1.0):
@@ -98,7 +101,7 @@ def test_strands_go_wherever_their_cards_go(haired):
         local = points - corners[0, 0, 0]
         side, up, off = np.linalg.solve(np.column_stack([across, along, out]), local.T)
         tips = APART / np.linalg.norm(across), APART / np.linalg.norm(along)
-        pitch = 1 / 0.8  # of the cards, in widths
+        pitch = 1 / 0.8  # distance of the cards, in widths
         assert side.min() >= -ASIDE - tips[0]
         assert side.max() <= (CARDS - 1) * pitch + 1 + ASIDE + tips[0]
         assert up.min() >= -ALONG - tips[1]
@@ -120,19 +123,19 @@ def test_roots_stand_between_the_cards_too(haired):
     roots = points[first] - corners[0, 0, 0]
     across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
     side = np.sort(roots @ across / (across @ across))
-    # Strands also have the colour of the picture's transparent places between hairs.
+    # Strands use the texture's colour at transparent places between hairs, too.
     pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
     assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
-    # In tufts, each as wide as its card, there are gaps of a quarter between them.
+    # If each strand were in a tuft as wide as its card, there would be gaps of a quarter.
     assert np.diff(side).max() < 0.2
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
-_DARK = 0.1  # as stored: of a picture of brows
+_DARK = 0.1  # a stored value, as in textures of brows
 
 
 def test_strands_of_brows_are_no_black_wires(tmp_path):
-    """They are about as light as the cards that they replace, and have thin roots."""
+    """Strands are about as light as the cards that they replace, and their roots are thin."""
     dna = small_face()
     looks.set_meshes(dna, {"head_lod0_mesh": dna.meshes[0], "brows_lod0_mesh": cards(0)})
     dna.metadata = {
@@ -159,12 +162,12 @@ def test_strands_of_brows_are_no_black_wires(tmp_path):
     assert (radii[first] < 0.6 * np.maximum.reduceat(radii, first)).all()
 
 
-RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm; strands of a lock, locks of a card
+RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks per card
 
 
 @pytest.fixture
 def curly(tmp_path):
-    """A factory like `haired` with winding hair, from metadata."""
+    """Returns a function that makes a face like `haired` with coiled hair, from metadata."""
 
     def made(words):
         dna = small_face()
@@ -180,7 +183,7 @@ def curly(tmp_path):
 
 
 def strands_of(face):
-    """(points, numbers of the first of each strand, metres of a width and of a row) of a face."""
+    """Points of a face's strands, indices of first points, and corners of the cards."""
     corners = scene.evaluated(scene.meshes(face)[1]).reshape(CARDS, ROWS, 2, 3).astype(float)
     before = set(bpy.data.objects)
     bpy.ops.risorius.set_strands()
@@ -202,7 +205,8 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis is straight, as the card is; its own lean and parting are smaller than the coil.
+        # The axis is straight, like the card; its inclination and parting are smaller than the
+        # coil.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000
         assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS
@@ -210,7 +214,7 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         pitch = np.ptp(up[wound]) * 1000 / (np.ptp(turned) / (2 * np.pi))
         assert abs(pitch - PITCH) < 0.2 * PITCH
         locks.setdefault(number // LOCK, []).append(place[0])
-    # A lock's strands begin together.
+    # All strands of a lock have their roots at one place.
     for roots in locks.values():
         assert np.ptp(np.array(roots), axis=0).max() < 0.0005
 

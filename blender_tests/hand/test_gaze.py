@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that look at a target, meet on it, with lids; blinks; the turns of a body."""
+"""Eyes that look at a target, with lids; blinks; rotations of a body."""
 
 import math
 
@@ -14,11 +14,11 @@ EYES = ("L", "R")
 
 
 def two_eyed(path, shift=0.0):
-    """The small face with a right eye too.
+    """Save the small face with a second eye.
 
     Args:
-        path: of the saved file.
-        shift: file units by which looking left or right moves an eye's centre aside.
+        path: path of the saved file.
+        shift: file units by which looking left or right moves the centre of an eye.
     """
     dna = small_face()
     names = list(dna.raw_control_names)
@@ -36,7 +36,7 @@ def two_eyed(path, shift=0.0):
     groups = dna.joint_groups
     eye = groups[1]
     rows = np.zeros((6, 8), np.float32)
-    # columns: left eye left, right, up, down; right eye likewise
+    # columns: left eye looks left, right, up, down; then the right eye
     rows[0] = [
         30,
         -28,
@@ -46,7 +46,7 @@ def two_eyed(path, shift=0.0):
         0,
         0,
         0,
-    ]  # about the upright axis, with an odd turn when it looks up
+    ]  # about the upright axis, with a wrong part when it looks up
     rows[1] = [0, 0, -20, 22, 0, 0, 0, 0]
     rows[2] = [0, 0, 0, 0, 28, -30, 0, 0]
     rows[3] = [0, 0, 0, 0, 0, 0, -20, 22]
@@ -68,10 +68,10 @@ def rig(tmp_path):
 
 
 def eye(rig, side):
-    """Centre and direction of an eye in world space, from the bone that the skin hangs on."""
+    """Centre and direction of an eye in world space, from the bone that deforms the skin."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # The direction that was -y at rest.
+    # The direction that is -y at rest.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (
@@ -85,7 +85,7 @@ def yaw(rig, side):
 
 
 def misses(rig, point):
-    """Degrees by which each eye looks past a point of the world."""
+    """Angle in degrees between each eye's direction and a point in world space."""
     found = []
     for side in EYES:
         centre, ahead = eye(rig, side)
@@ -103,7 +103,7 @@ def target_point(rig):
 
 
 def move_target(rig, x, y, z):
-    """Move the target by shares of its distance, along the axes of the world."""
+    """Move the target along the world's axes by shares of its distance from the eyes."""
     bone = target(rig)
     rest = bone.bone.matrix_local.to_3x3()
     far = abs(bone.bone.head_local.y - scene.controls(rig).data.bones["eye_L"].head_local.y)
@@ -213,7 +213,7 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A turned body with base, neck and head where the face has them."""
+    """A rotated body with base, neck and head bones at the places of the face's."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)
@@ -289,7 +289,7 @@ def test_a_render_and_a_bake_have_the_gaze_of_the_view(rig):
 
 @pytest.fixture
 def blinking(tmp_path):
-    """A face whose second and third controls close its eyes."""
+    """A face with the controls eyeBlinkL and eyeBlinkR."""
     dna = small_face()
     names = list(dna.raw_control_names)
     names[1], names[2] = "CTRL_expressions.eyeBlinkL", "CTRL_expressions.eyeBlinkR"
@@ -301,7 +301,7 @@ def blinking(tmp_path):
 
 
 def lid_keys(rig, side):
-    """Frame -> value of the keys that close an eye."""
+    """Frame -> value of the keys of an eye's blink control."""
     path = f'pose.bones["face"]["CTRL_expressions.eyeBlink{side}"]'
     found = [c for c in scene.curves(scene.controls(rig)) if c.data_path == path]
     return {round(k.co.x, 3): round(k.co.y, 4) for c in found for k in c.keyframe_points}
@@ -316,7 +316,7 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
 
 
 def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
-    """The active object, or a selected one (an Empty first), or the camera."""
+    """The active object, or a selected one (an empty first), or the camera."""
     operators = scene.submodule("ui.hand.gaze")
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     empty = bpy.data.objects.new("empty", None)
@@ -327,7 +327,7 @@ def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
     assert operators.proposed(bpy.context) == "camera"
     for item in (thing, empty):
         item.select_set(True)
-        assert operators.proposed(bpy.context) == item.name  # beside the face, which is active
+        assert operators.proposed(bpy.context) == item.name  # the face stays active
     empty.select_set(False)
     bpy.context.view_layer.objects.active = empty
     assert operators.proposed(bpy.context) == "empty"
@@ -388,7 +388,7 @@ def test_a_face_without_lids_says_so(rig):
 
 
 def lidded(path):
-    """The two-eyed face with controls that close and widen an eye, which the gaze leaves alone."""
+    """The two-eyed face with controls that close and widen an eye, which do not follow the gaze."""
     two_eyed(path)
     import risorius
 
@@ -404,7 +404,7 @@ def lidded(path):
 def test_lids_follow_the_gaze_as_far_as_is_asked(tmp_path, amount):
     path = lidded(tmp_path / "lids.dna")
     rig = scene.load(path)
-    assert scene.controls(rig).risorius_lids == 0.5  # nothing but the eyes follows by itself
+    assert scene.controls(rig).risorius_lids == 0.5  # the lids do not follow the gaze by themselves
     scene.controls(rig).risorius_lids = amount
     scene.set_controls(rig, eyeLookDownL=0.8, eyeBlinkL=0.2)
     raw = scene.raw_of(rig, path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that move controls key as Blender's own edits do; poses between poses; tweaks."""
+"""Operators that move controls insert keys like Blender's own edits; breakdowns; tweaks."""
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def auto():
-    """Auto-key is on at frame 10, with factory preferences."""
+    """Switch auto-key on at frame 10, with factory preferences."""
     tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
     names = ("use_auto_keyframe_insert_needed", "use_keyframe_insert_needed")
     names += ("use_keyframe_insert_available", "keyframe_new_interpolation_type")
@@ -59,7 +59,7 @@ def curve(rig, name):
 
 
 def key(rig, name, **values):
-    """Keys on a slider: f5=0.3."""
+    """Insert keys on a slider; f5=0.3 is value 0.3 at frame 5."""
     for frame, number in values.items():
         scene.face(rig)[PREFIX + name] = number
         scene.controls(rig).keyframe_insert(path_of(name), frame=int(frame[1:]))
@@ -72,7 +72,7 @@ def select_keys(rig, *frames):
 
 
 def _start(rig):
-    """A lopsided face, of which a copy is in Blender's clipboard and in ours."""
+    """Pose the face asymmetrically and copy the pose to Blender's clipboard and to ours."""
     scene.set_controls(rig, mouthCornerPullL=0.8, mouthCornerPullR=0.1, jawOpen=0.5)
 
 
@@ -91,13 +91,13 @@ def _paste_blenders(rig):
 
 
 def _asset(rig, operator):
-    """As Blender's shelf calls it."""
+    """Call an operator like Blender's asset shelf."""
     bpy.ops.risorius.make_pose_assets()
     place = {"asset_library_type": "LOCAL", "relative_asset_identifier": "Action/Face Joy"}
     return operator("EXEC_DEFAULT", **place)
 
 
-# Operator that moves controls -> call, and resulting slider values.
+# Operator that moves controls -> (call, resulting slider values).
 HANDS = {
     "risorius.reset": (lambda rig: bpy.ops.risorius.reset(), {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0}),
     "risorius.mirror": (lambda rig: bpy.ops.risorius.mirror(), {LEFT: 0.1, RIGHT: 0.8}),
@@ -130,7 +130,7 @@ HANDS = {
     ),
 }
 
-# Operators that set the rest of the face to rest.
+# Operators that move the rest of the face to rest.
 WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 
 # Reason -> operators that move no slider and no control bone, or handle keys themselves.
@@ -174,7 +174,7 @@ OTHERS = {
     "live_record live_finish live_discard live_neutral live_subject",
 }
 
-ON_BOARD = {"risorius.reset_board"}  # where the face board leads; see test_board.py
+ON_BOARD = {"risorius.reset_board"}  # operators for a leading face board; see test_board.py
 
 
 def _all_operators():
@@ -258,11 +258,11 @@ def test_only_insert_needed_and_only_available(rig, auto):
     edit.use_auto_keyframe_insert_needed = edit.use_keyframe_insert_available = True
     bpy.ops.risorius.mirror()
     assert list(keys(rig, LEFT)) == [1.0, 10.0, 20.0]
-    assert list(keys(rig, JAW)) == [1.0, 20.0]  # in hand, and already there
-    assert keys(rig, RIGHT) == {}  # has no curve
+    assert list(keys(rig, JAW)) == [1.0, 20.0]  # handled, and already at this value
+    assert keys(rig, RIGHT) == {}  # without a curve
     edit.use_auto_keyframe_insert_needed = edit.use_keyframe_insert_available = False
     bpy.ops.risorius.mirror()
-    assert list(keys(rig, JAW)) == [1.0, 10.0, 20.0]  # what is in hand is held
+    assert list(keys(rig, JAW)) == [1.0, 10.0, 20.0]  # values that are handled are keyed
     assert list(keys(rig, RIGHT)) == [10.0]
 
 
@@ -296,14 +296,14 @@ def test_bones_are_keyed_where_they_were_turned(rig, auto):
 def test_an_operator_works_at_the_frames_of_selected_keys(rig):
     key(rig, LEFT, f1=0.8, f5=0.6, f9=0.4)
     key(rig, JAW, f1=0.2)
-    scene.set_controls(rig, mouthCornerPullR=0.3)  # without a curve: it stands
+    scene.set_controls(rig, mouthCornerPullR=0.3)  # a slider without a curve
     select_keys(rig, 1.0, 9.0)
     bpy.context.scene.frame_set(5)
     assert bpy.ops.risorius.mirror(at="SELECTED") == {"FINISHED"}
     assert keys(rig, LEFT) == {1.0: 0.3, 5.0: 0.6, 9.0: 0.3}
     assert keys(rig, RIGHT) == {1.0: 0.8, 9.0: 0.4}
     assert keys(rig, JAW) == {1.0: 0.2}
-    assert value(rig, LEFT) == pytest.approx(0.6)  # frame 5 is shown as before
+    assert value(rig, LEFT) == pytest.approx(0.6)  # frame 5 is unchanged
     assert value(rig, RIGHT) == pytest.approx(curve(rig, RIGHT).evaluate(5.0))
 
 
@@ -326,7 +326,7 @@ def test_new_curves_have_the_colour_of_their_region(rig, auto):
     assert left.group.color_set == "CUSTOM"
     assert tuple(left.group.colors.normal) != tuple(brow.group.colors.normal)
     assert left.color_mode == "CUSTOM"
-    assert tuple(left.color) != tuple(right.color)  # told apart within the region
+    assert tuple(left.color) != tuple(right.color)  # different colours within the region
 
 
 def test_to_the_next_key_of_a_control_and_of_all(rig):
@@ -351,7 +351,7 @@ def test_to_the_next_key_of_a_control_and_of_all(rig):
 
 
 def _two_poses(rig):
-    """Poses at 10 and 20, of a mouth that opens while the head turns; shown is frame 14."""
+    """Poses at frames 10 and 20 of an opening mouth and a rotating head; frame 14 is shown."""
     key(rig, JAW, f10=0.2, f20=0.8)
     key(rig, LEFT, f10=0.6, f20=0.0)
     head = scene.controls(rig).pose.bones["head"]
@@ -424,7 +424,7 @@ def test_a_breakdown_without_keys_says_so(rig):
 
 
 def shown(rig, frame, index=0):
-    """A raw control as the face takes it, with layers."""
+    """The value of a raw control as the evaluator receives it, with layers."""
     bpy.context.scene.frame_set(frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = scene.controls(rig).evaluated_get(depsgraph)
@@ -449,7 +449,7 @@ def test_a_tweak_shows_what_was_asked_and_touches_no_key(rig):
     assert bpy.ops.risorius.tweak(enable=False) == {"FINISHED"}
     bpy.context.scene.frame_set(20)
     bpy.ops.risorius.key()
-    assert 20.0 in keys(rig, JAW)  # keys are keys again
+    assert 20.0 in keys(rig, JAW)  # keys go to the action again
     assert shown(rig, 18) == pytest.approx(0.7, abs=1e-4)
 
 
@@ -502,7 +502,7 @@ def test_curves_of_before_get_groups_and_colours(rig):
 
 @pytest.fixture
 def preferences():
-    """The add-on's, which a user has."""
+    """The add-on's preferences, as in an installation."""
     addons = bpy.context.preferences.addons
     entry = addons.new()
     entry.module = scene.MODULE
@@ -515,11 +515,11 @@ def test_favourites_are_kept_in_the_file_and_by_the_user(rig, dna_file, preferen
     assert bpy.ops.risorius.favourite(controls=names) == {"FINISHED"}
     of = scene.submodule("ui.hand.favourites").favourites_of
     assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]
-    other = scene.load(dna_file)  # a face that has none of its own takes the user's
+    other = scene.load(dna_file)  # a face without favourites uses the user's
     bpy.context.view_layer.objects.active = scene.controls(other)
     assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]
     bpy.ops.risorius.favourite(controls=PREFIX + JAW)
-    bpy.ops.risorius.favourite(controls=PREFIX + LEFT)  # again: it goes
+    bpy.ops.risorius.favourite(controls=PREFIX + LEFT)  # the second call removes it
     assert of(bpy.context) == [PREFIX + RIGHT, PREFIX + JAW]
     bpy.context.view_layer.objects.active = scene.controls(rig)
     assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]

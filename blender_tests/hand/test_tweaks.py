@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""While a tweak is on, whatever moves or keys the face goes into it; the keys below stay."""
+"""While a tweak is active, all moves and keys of the face go into it; the keys below stay."""
 
 import bpy
 import pytest
@@ -18,7 +18,7 @@ def path_of(name):
 
 @pytest.fixture
 def rig(dna_file):
-    """Keys of the jaw at 1, 15 and 40, of all kinds, and a tweak from 10 to 30."""
+    """A face with keys of the jaw at 1, 15 and 40 of all kinds, and a tweak from 10 to 30."""
     rig = scene.load(dna_file)
     for frame, value in ((1, 0.2), (15, 0.3), (40, 0.6)):
         scene.face(rig)[PREFIX + JAW] = value
@@ -43,7 +43,7 @@ def action_of(rig):
 
 
 def below(rig):
-    """The content of the face's action."""
+    """All properties of the keys in the face's action."""
     if action_of(rig) is None:
         return []
     return [
@@ -54,7 +54,7 @@ def below(rig):
 
 
 def shown(rig, frame=None, name=JAW):
-    """A raw control as the face takes it, with layers."""
+    """The value of a raw control as the evaluator receives it, with layers."""
     if frame is not None:
         go(rig, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -65,19 +65,19 @@ def shown(rig, frame=None, name=JAW):
 
 
 def press_i(rig, name=JAW, frame=20):
-    """Press I over a slider; auto-key does the same after a move."""
+    """Insert a key like I over a slider; auto-key does the same after a move."""
     scene.controls(rig).keyframe_insert(path_of(name), frame=frame)
     bpy.context.view_layer.update()
 
 
 def ask(rig, wanted, name=JAW):
-    """Move a slider until the face shows the wanted pose."""
+    """Move a slider until the face shows the wanted value."""
     offset = shown(rig, name=name) - scene.face(rig)[PREFIX + name]
     scene.set_controls(rig, **{name: wanted - offset})
 
 
 def test_a_key_over_a_slider_goes_into_the_tweak(rig):
-    """Between keys, on a key, again at the same frame, of a slider without keys."""
+    """Tested between keys, on a key, twice at a frame, and on a slider without keys."""
     before, base = below(rig), {f: shown(rig, f) for f in (1, 9, 31, 40)}
     for frame, wanted in ((20, 0.8), (15, 0.5), (20, 0.7)):
         go(rig, frame)
@@ -93,9 +93,9 @@ def test_a_key_over_a_slider_goes_into_the_tweak(rig):
     assert [shown(rig, f) for f in (15, 20)] == pytest.approx([0.5, 0.7], abs=1e-4)
     assert bpy.ops.risorius.tweak(enable=False) == {"FINISHED"}
     assert shown(rig, 20) == pytest.approx(0.7, abs=1e-4)
-    assert len(bpy.data.actions) == 2  # what was kept has gone
+    assert len(bpy.data.actions) == 2  # the tweak's action is removed
     press_i(rig)
-    assert len(below(rig)) == len(before) + 1  # keys are keys again
+    assert len(below(rig)) == len(before) + 1  # keys go to the action again
 
 
 def test_sliders_that_move_go_into_it_when_the_frame_changes_and_when_it_ends(rig):
@@ -105,7 +105,7 @@ def test_sliders_that_move_go_into_it_when_the_frame_changes_and_when_it_ends(ri
     go(rig, 25)
     ask(rig, 0.1)
     scene.set_controls(rig, mouthCornerPullR=0.3)
-    press_i(rig, RIGHT, 25)  # what has no key goes with it
+    press_i(rig, RIGHT, 25)  # a control without keys is tweaked too
     assert shown(rig) == pytest.approx(0.1, abs=1e-4)
     assert shown(rig, 20) == pytest.approx(0.8, abs=1e-4)
     assert shown(rig, name=LEFT) == pytest.approx(0.4, abs=1e-4)
@@ -115,7 +115,7 @@ def test_sliders_that_move_go_into_it_when_the_frame_changes_and_when_it_ends(ri
     assert shown(rig, 25, RIGHT) == pytest.approx(0.3, abs=1e-4)
     assert below(rig) == before
     for frame in range(1, 41):
-        go(rig, frame)  # playing takes nothing
+        go(rig, frame)  # playing keeps the tweak
     assert shown(rig, 20) == pytest.approx(0.75, abs=1e-4)
 
 
@@ -221,7 +221,7 @@ def pose_bone(rig, name):
 
 
 def seen(rig, frame):
-    """All that the face takes: raw controls and turns of head and neck."""
+    """Everything that the evaluator receives: raw controls, and rotations of head and neck."""
     go(rig, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     controls = scene.controls(rig).evaluated_get(depsgraph)
@@ -231,7 +231,7 @@ def seen(rig, frame):
 
 
 def turn(rig, name):
-    """Move a control bone without a key; returns the property and its new value."""
+    """Move a control bone without a key. Returns the name of the property."""
     bone, (channel, value) = pose_bone(rig, name), BONES[name]
     if channel == "rotation_euler":
         bone.rotation_mode = "XYZ"
@@ -242,7 +242,7 @@ def turn(rig, name):
 
 @pytest.fixture
 def turning(dna_file):
-    """Keys of the head at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
+    """Head keys at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
     rig = scene.load(dna_file)
     pose_bone(rig, "neck").rotation_mode = "XYZ"
     for frame, angle in ((1, 0.1), (40, 0.3)):
@@ -255,7 +255,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """By I and auto-key at the frame, without a key when it changes; the bake has them too."""
+    """Keyed by I or auto-key, or unkeyed when the frame changes; the bake has them too."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)
@@ -328,12 +328,12 @@ def test_key_all_and_whole_character_and_keys_in_channels_go_into_the_tweak(turn
 
 
 def test_pasted_keys_go_into_the_tweak_and_moved_ones_stay(rig):
-    """Where keys are pasted at several frames, each is a tweak of its frame."""
+    """Each pasted key becomes a tweak at its frame."""
     before = below(rig)
     curve = scene.curves(scene.controls(rig))[0]
     for point in curve.keyframe_points:
         point.select_control_point = point.co.x < 20
-    go(rig, 14)  # the key at 1 comes to 14, the one at 15 to 28
+    go(rig, 14)  # the key at 1 is pasted at 14, the key at 15 at 28
     with editor("GRAPH_EDITOR"):
         assert bpy.ops.graph.copy() == {"FINISHED"}
         assert bpy.ops.graph.paste(offset="START") == {"FINISHED"}
@@ -350,7 +350,7 @@ def test_pasted_keys_go_into_the_tweak_and_moved_ones_stay(rig):
 
 
 def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
-    """The strip alone, and an action that is added above it."""
+    """Tested with a strip alone, and with an action above it."""
     controls = scene.controls(rig)
     scene.submodule("scene.animation.tweaks").end(controls)
     data = controls.animation_data
@@ -385,7 +385,7 @@ def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):
-    """All keys of a take are selected after an import, so this selection does not count."""
+    """After an import all keys of a take are selected, so such a selection is ignored."""
     proposed = scene.submodule("ui.hand.operators").proposed_range
     points = scene.curves(scene.controls(rig))[0].keyframe_points
     for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):

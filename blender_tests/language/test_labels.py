@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No text of a panel or dialog is cut off at Blender's own widths; automatic values are named."""
+"""No text of a panel or dialog is cut off at default widths; special values have names."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ STANDARD = Path(__file__).resolve().parents[2] / "tests" / "data" / "controls" /
 
 
 def texts(part):
-    """Every word that was drawn."""
+    """All texts that were drawn."""
     found = []
     for child in part.children:
         found += texts(child) if isinstance(child, Part) else [child[0]]
@@ -34,7 +34,7 @@ def rig(dna_file):
 
 @pytest.fixture(params=["", *LANGUAGES], ids=lambda language: language or "en")
 def language(request, monkeypatch):
-    """Words in English, then in each language that there is a table for."""
+    """English texts, then each language with a translation table."""
     tables, words = scene.submodule("language.tables"), ui("words")
     there = tables.translation(request.param) if request.param else {}
     for (context, english), shown in there.items():
@@ -60,7 +60,7 @@ def test_the_ruler_finds_words_that_are_cut():
     line.label(text="")
     assert layout.cut(1000) == []
     cut = [text for text, _needed, _room in layout.cut(SIDEBAR)]
-    assert {"LOD, Viewport", "Lower Lip Depress"} <= set(cut)  # as was seen in a window
+    assert {"LOD, Viewport", "Lower Lip Depress"} <= set(cut)  # they are cut off in a real window
 
 
 def test_every_panel_can_be_read(rig, language):
@@ -77,7 +77,7 @@ def test_every_panel_can_be_read(rig, language):
         layout = drawn(getattr(ui(name), kind), bpy.context)
         assert texts(layout)
         cut = [text for text, _needed, _room in layout.cut(SIDEBAR) if not text.startswith("Xxx")]
-        assert cut == [], kind  # beside a name of 90 letters
+        assert cut == [], kind  # next to a name of 90 letters
 
 
 def test_what_a_head_lacks_can_be_read(monkeypatch, language):
@@ -109,7 +109,7 @@ def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkey
 
 
 def test_the_names_of_all_sliders_can_be_read(rig):
-    """Of the standard face: 260 sliders, in one column."""
+    """Tests the 260 sliders of the standard face in one column."""
     face = {name: 0.0 for name in STANDARD.read_text().split()}
     layout, names = Part(), list(face)
     words = scene.submodule("logic.character.slider_words")
@@ -123,7 +123,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 
 
 def test_all_sections_are_seen_at_once_on_a_laptop(rig, monkeypatch):
-    """1366 x 768: in Blender's first window the tab has 688 - 84 pixels in the 3D view."""
+    """1366 x 768: in a new window the tab has 688 - 84 pixels of the 3D view."""
     face, panel = scene.face(rig), ui("face.controls_panel")
     labels = [*STANDARD.read_text().split(), "spine_04.qx"]
     for name in labels:
@@ -172,7 +172,7 @@ def test_layers_and_reactions_can_be_read(rig, language):
             None, None, layout, None, item, 0, None, ""
         )
         assert measured.local(reaction.label) in texts(layout)
-        assert layout.cut(SIDEBAR - 36) == []  # beside the button, within the list's frame
+        assert layout.cut(SIDEBAR - 36) == []  # next to the button, inside the list's frame
 
 
 @pytest.mark.parametrize("choices", [{}, {"mapping": "FILE", "use_neutral": True}])
@@ -232,7 +232,7 @@ def test_words_are_measured_for_the_width_that_the_sidebar_has():
 
 
 def test_words_are_measured_once(rig, monkeypatch):
-    """260 sliders are drawn with each redraw of the sidebar."""
+    """260 sliders are drawn with each redraw of the sidebar, so widths must be cached."""
     words, asked = ui("words"), []
     real = words.blf.dimensions
     fake = SimpleNamespace(size=words.blf.size, dimensions=lambda *a: asked.append(a) or real(*a))

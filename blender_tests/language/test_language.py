@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In German: our words by Blender's own look-up, names of things untouched."""
+"""In German, Blender finds our translations; names of objects stay untranslated."""
 
 import bpy
 import pytest
@@ -28,7 +28,7 @@ def german():
 def test_our_words_have_a_context_of_their_own(german):
     look_up = bpy.app.translations.pgettext_iface
     assert look_up("Face", "Risorius") == "Gesicht"
-    assert look_up("Face") != "Gesicht"  # a mesh has some
+    assert look_up("Face") != "Gesicht"  # Blender's translation is for a face of a mesh
     panel = bpy.types.RISORIUS_PT_character
     assert look_up(panel.bl_label, panel.bl_translation_context) == "Gesicht"
     operator = bpy.ops.risorius.mirror.get_rna_type()
@@ -41,7 +41,7 @@ def test_our_words_have_a_context_of_their_own(german):
 
 
 def test_properties_that_blenders_types_get_have_the_context_too():
-    """Like properties of our classes, so that Blender finds their translations."""
+    """Properties of Blender's own types need the context too, so that texts are found."""
     ours = [
         prop
         for kind in (bpy.types.Object, bpy.types.WindowManager, bpy.types.Scene)

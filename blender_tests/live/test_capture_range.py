@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture range of a face: learned, edited, stored with it, and applied to captures."""
+"""The capture range of a face: learned, edited, saved in the file, and applied to captures."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ RATE = 30
 
 
 def bump(count, at, height):
-    """Up and down again over 30 frames, with a top of a few frames."""
+    """A movement up and down over 30 frames, with a flat top of a few frames."""
     distance = np.clip(np.abs(np.arange(count) - at) - 2.0, 0.0, 15.0)
     return height * (0.5 + 0.5 * np.cos(np.pi * distance / 15.0))
 
@@ -30,8 +30,10 @@ def table(path, **curves):
 
 @pytest.fixture(scope="module")
 def rom(tmp_path_factory):
-    """A range of motion: jaw to 0.8, smiles to 0.7 with 0.05 at rest, and a brow that hardly
-    moves."""
+    """A take with all extremes.
+
+    The jaw reaches 0.8, the smiles 0.7 with 0.05 at rest, and a brow hardly moves.
+    """
     smile = 0.05 + bump(150, 110, 0.65)
     return table(
         tmp_path_factory.mktemp("rom") / "rom.csv",
@@ -52,7 +54,7 @@ def rows(rig):
 
 
 def imported(rig, path, **options):
-    """The highest keys of jaw and smile after an import, and the report's text."""
+    """Import a file. Returns the highest keys of jaw and smile, and the text of the report."""
     assert bpy.ops.risorius.import_animation(filepath=str(path), **options) == {"FINISHED"}
     action = scene.controls(rig).animation_data.action
     tops = {}
@@ -93,7 +95,7 @@ def test_the_range_of_a_take_alone_leaves_the_face_as_it_is(rig, tmp_path):
     jaw = sum(bump(400, at, 0.75) for at in (60, 160, 260, 340))
     smile = bump(400, 200, 0.7)
     take = table(tmp_path / "take.csv", JawOpen=jaw, MouthSmileLeft=smile, MouthSmileRight=smile)
-    # The jaw stops at one height again and again; one smile tells no extreme.
+    # The jaw stops repeatedly at the same height; a single smile shows no extreme.
     assert imported(rig, take, capture_range="TAKE")[:2] == pytest.approx((1.0, 0.7))
     assert rows(rig) == {}
     short = table(tmp_path / "short.csv", JawOpen=[0.0, 1.0])
@@ -120,7 +122,7 @@ def test_it_is_saved_with_the_face_and_as_a_file(rig, rom, tmp_path):
     kind, row = bpy.types.RISORIUS_UL_ranges, rows(rig)[JAW]
     kind.draw_item(None, bpy.context, line, None, row, 0, None, "")
     assert (line.labels, line.properties) == (["jawOpen"], ["used", "neutral", "extreme"])
-    rows(rig)[JAW].neutral = 0.75  # the extreme stays above it
+    rows(rig)[JAW].neutral = 0.75  # the extreme stays above the neutral
     assert rows(rig)[JAW].extreme == pytest.approx(0.85)
     path = tmp_path / "ada.range.toml"
     assert bpy.ops.risorius.save_range(filepath=str(path)) == {"FINISHED"}
@@ -150,7 +152,7 @@ def test_live_capture_follows_the_range_and_teaches_it(rig, rom):
     tick_until(rig, 1)
     assert scene.face(rig)[JAW] == 1.0
     rows(rig)[JAW].used = False
-    tick_until(rig, 1)  # no new face is needed to see it
+    tick_until(rig, 1)  # the change is visible without a new face
     assert scene.face(rig)[JAW] == pytest.approx(0.8)
     rows(rig)[JAW].used = True
     bpy.ops.risorius.live_record()
@@ -162,7 +164,7 @@ def test_live_capture_follows_the_range_and_teaches_it(rig, rom):
     assert jaw.keyframe_points[1].co[1] == 1.0
     with pytest.raises(RuntimeError, match="a take of at least 2 s was expected"):
         bpy.ops.risorius.learn_range_live()
-    # The received values, without the earlier range.
+    # The stored values are as received, without the earlier range.
     session, frame = session_of(rig), session_of(rig).recent[-1]
     session.recent.clear()
     for n, height in enumerate(bump(150, 60, 0.65)):

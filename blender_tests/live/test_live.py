@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live capture: a program sends faces over this machine's network, the viewport follows."""
+"""Live capture: a program sends faces through this machine's network, and the viewport follows."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from support.faces import CONTROLS, HEAD
 
 SENDER = Path(__file__).resolve().parents[2] / "tests" / "python" / "support" / "face_sender.py"
 PHONE = "6F0F5B52-8E3C-4E7B-9D42-0123456789AB"
-JAW, SMILE_LEFT, BROW_LEFT, YAW = 17, 23, 41, 52  # places in a packet of Live Link Face
+JAW, SMILE_LEFT, BROW_LEFT, YAW = 17, 23, 41, 52  # indices in a packet of Live Link Face
 JAW_OPEN = "CTRL_expressions.jawOpen"
 
 
@@ -56,7 +56,7 @@ def packet(frame, subject="iPhone", rate=60, **places):
 
 
 def send(port, *steps):
-    """Run the sender to its end."""
+    """Run the sender program with these steps and wait for its end."""
     lines = "".join(json.dumps(step) + "\n" for step in steps)
     command = [sys.executable, str(SENDER), str(port)]
     limits.run(command, 60, input=lines).check_returncode()
@@ -96,7 +96,7 @@ def test_the_viewport_follows(mode, dna_file, port):
     tick_until(rig, 2)
     wanted = raw(jawOpen=0.6, mouthCornerPullL=0.4)
     assert scene.error_against_oracle(rig, dna_file, wanted) < scene.TOLERANCE
-    assert np.abs(scene.snapshot(rig) - still).max() > 0.01  # and that is not nothing
+    assert np.abs(scene.snapshot(rig) - still).max() > 0.01  # the pose differs from rest
     assert scene.controls(rig).animation_data is None
     assert bpy.ops.risorius.live_stop() == {"FINISHED"}
     bpy.context.view_layer.update()
@@ -109,7 +109,7 @@ def test_only_new_faces_are_written(dna_file, port):
     bpy.ops.risorius.live_start()
     send(port, packet(1, _17=0.5))
     tick_until(rig, 1)
-    scene.face(rig)[JAW_OPEN] = 0.75  # by hand, while the phone is silent
+    scene.face(rig)[JAW_OPEN] = 0.75  # set by the user, while the phone sends nothing
     module = scene.submodule("scene.live.capture")
     assert module._tick() == module.INTERVAL
     assert scene.face(rig)[JAW_OPEN] == 0.75
@@ -122,7 +122,7 @@ def test_the_head_turns(dna_file, port):
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = (0.1, 0.2, 0.3)
     bpy.ops.risorius.live_start()
-    send(port, packet(1, _52=-0.4, _53=-0.3))  # to the own left and up, in the app's signs
+    send(port, packet(1, _52=-0.4, _53=-0.3))  # to the face's left and up, with the app's signs
     tick_until(rig, 1)
     head = next(b for b in rig.pose.bones if b.bone["dna_joint"] == HEAD)
     turn = head.matrix.to_3x3() @ head.bone.matrix_local.to_3x3().inverted()
@@ -134,7 +134,7 @@ def test_the_head_turns(dna_file, port):
     bpy.context.window_manager.risorius_live.head_gain = 0.0
     send(port, packet(2, _52=0.8))
     tick_until(rig, 2)
-    assert tuple(bone.rotation_euler) == turned  # left alone from then on
+    assert tuple(bone.rotation_euler) == turned  # after that it is not changed
     bpy.ops.risorius.live_stop()
     assert tuple(bone.rotation_euler) == pytest.approx((0.1, 0.2, 0.3))
 
@@ -179,7 +179,7 @@ def test_a_recording_is_an_action(dna_file, port):
     scene.set_controls(rig, jawOpen=0.9)
     bpy.ops.risorius.live_start()
     assert bpy.ops.risorius.live_record() == {"FINISHED"}
-    numbers = [0, 1, 2, 3, 9, 10]  # the phone was silent for a while
+    numbers = [0, 1, 2, 3, 9, 10]  # the phone sends nothing for a while
     faces = [packet(600 + n, _17=n / 16.0, _41=0.5, _52=-0.02 * n) for n in numbers]
     send(port, *faces)
     tick_until(rig, len(numbers))
@@ -194,7 +194,7 @@ def test_a_recording_is_an_action(dna_file, port):
     keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
     assert np.allclose(keys[:, 0], [11 + n / 60 * 24 for n in numbers], atol=1e-4)
     assert np.allclose(keys[:, 1], [n / 16.0 for n in numbers], atol=1e-7)
-    # Blender plays it: at whole frames, on the straight line between the faces.
+    # Blender plays it: whole frames are on the straight line between the received faces.
     for frame in (11, 13, 15):
         bpy.context.scene.frame_set(frame)
         at = np.interp((frame - 11) / 24 * 60, numbers, np.array(numbers) / 16.0)
@@ -280,7 +280,7 @@ def test_vmc_and_neutral_now(dna_file, port):
 
 
 def listens(port):
-    """Whether somebody has the port."""
+    """Whether the port is in use."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("127.0.0.1", port))
@@ -297,7 +297,7 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     name = scene.controls(rig).name
     for item in scene.submodule("scene.base.parts").members_of(rig):
         bpy.data.objects.remove(item)
-    scene.controls(scene.load(dna_file)).name = name  # another face of the same name
+    scene.controls(scene.load(dna_file)).name = name  # another face with the same name
     assert module._tick() is None
     assert not listens(port)
     assert "went away" in module.last_error()
@@ -311,13 +311,13 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     assert listens(port)
     send(port, packet(2, _17=0.625))
     tick_until(rig, 2)
-    assert scene.face(rig)[JAW_OPEN] == 0.625  # saving does not end it
+    assert scene.face(rig)[JAW_OPEN] == 0.625  # saving does not end the capture
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert not listens(port)
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
-    assert scene.face(rig)[JAW_OPEN] == 0.0  # what was saved is the face without the capture
+    assert scene.face(rig)[JAW_OPEN] == 0.0  # the file contains the face without the capture
 
-    choose(port)  # choices are the window's, and that came with the file
+    choose(port)  # settings belong to the window, which the file replaces
     bpy.ops.risorius.live_start()
     assert listens(port)
     module.unregister()
@@ -331,7 +331,7 @@ def sliders(rig):
 
 
 def begin_recording(rig, *steps):
-    """A capture that records what the steps send."""
+    """Start a capture and a recording, and send the steps."""
     assert bpy.ops.risorius.live_start() == {"FINISHED"}
     assert bpy.ops.risorius.live_record() == {"FINISHED"}
     send(bpy.context.window_manager.risorius_live.port, *steps)
@@ -339,14 +339,14 @@ def begin_recording(rig, *steps):
 
 
 def jaw_keys(rig):
-    """The keys of the jaw, float64[keys, 2], and their action."""
+    """The keys of the jaw, float64[keys, 2]."""
     path = f'pose.bones["face"]["{JAW_OPEN}"]'
     curve = next(c for c in scene.curves(scene.controls(rig)) if c.data_path == path)
     return np.array([tuple(k.co) for k in curve.keyframe_points])
 
 
 def only_recording(faces):
-    """The single waiting recording, with a number of faces."""
+    """The only waiting recording, which must have this number of faces."""
     (recording,) = scene.submodule("scene.live.recordings").waiting()
     assert len(recording.take) == faces
     return recording
@@ -395,7 +395,7 @@ def test_a_recording_that_cannot_be_finished_waits(dna_file, port):
     assert sliders(rig) == before
     data.use_tweak_mode = False
     only_recording(2)
-    bpy.context.scene.frame_set(9)  # it lies where it was recorded all the same
+    bpy.context.scene.frame_set(9)  # the recording keeps its own frames
     assert bpy.ops.risorius.live_finish() == {"FINISHED"}
     assert np.allclose(jaw_keys(rig), [(5.0, 0.5), (5.0 + 3 / 60 * 24, 0.75)], atol=1e-4)
 
@@ -459,7 +459,7 @@ def test_undo_does_not_end_it(dna_file, port):
 
 
 def drawn():
-    """The words of the panel as it is now."""
+    """The texts of the panel in its current state."""
     return layout.drawn(scene.submodule("ui.live.panel").RISORIUS_PT_live).text(" | ")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials: nothing is flat, maps reach colour and relief, textures are found, seams close."""
+"""Materials: varied colours, maps for colour and relief, found textures, no seams."""
 
 from types import SimpleNamespace
 
@@ -18,14 +18,14 @@ def _save(tmp_path, dna, name="face"):
 
 
 def _materials(rig):
-    """Mesh base -> material."""
+    """Base name of a mesh -> its material."""
     prefix = rig.name.removesuffix("_rig") + "_"
     found = [m.data.materials[0] for m in scene.meshes(rig).values()]
     return {m.name.removeprefix(prefix): m for m in found}
 
 
 def _shown(material):
-    """The socket of a surface's colour, or of a film's roughness."""
+    """The input socket for the colour of a surface, or for the roughness of a film."""
     shader = looks.principled(material)
     if shader is not None:
         return shader.inputs["Base Color"]
@@ -34,7 +34,7 @@ def _shown(material):
 
 
 def _emit_only(material, socket=None):
-    """Show the plain value of that socket, or of another input, as light."""
+    """Make the material emit the value of its colour socket, or of another socket, as light."""
     tree = material.node_tree
     source = (socket or _shown(material)).links[0].from_socket
     output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
@@ -87,8 +87,10 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
 
 
 def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
-    """Height of the weave as light: visible from 30 cm, even from 3 m, where a thread is below a
-    pixel."""
+    """The height of the weave is rendered as light.
+
+    It is visible from 30 cm, and even from 3 m, where a thread is smaller than a pixel.
+    """
     face = small_face()
     skin = face.meshes[0]
     shirt = looks.copy_mesh(skin)
@@ -117,9 +119,9 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
     for factor in (1.0, 3.0):
         bpy.context.scene.unit_settings.scale_length = 1.0 / factor
         shader = looks.principled(_materials(scene.load(_save(tmp_path, small_face())))["head"])
-        # Led by the distance from an open border.
+        # The weight depends on the distance from an open border.
         assert shader.inputs["Subsurface Weight"].is_linked
-        # How far in the palest skin; less where its colour is dark.
+        # The distance in the palest skin; it is smaller if the colour is dark.
         far = shader.inputs["Subsurface Scale"].links[0].from_node
         scales.append(far.inputs[1].default_value)
     assert scales[1] == pytest.approx(3 * scales[0], rel=1e-4)
@@ -131,7 +133,7 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
 
 
 def _mapped(label, metadata=None):
-    """A face whose second map has this name; browDownL alone moves it, by half, and no bone."""
+    """A face whose second map has this name; only browDownL moves it, by half, and no bone."""
     center = np.array([0.0, 158.0, 2.0])
     head = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
     face = looks.set_meshes(small_face(), {"head_lod0_mesh": head})
@@ -141,12 +143,12 @@ def _mapped(label, metadata=None):
 
 
 def _before_and_after(rig, tmp_path):
-    """Pictures without and with the map, their places, and how much each pixel changed."""
+    """Render without and with the map. Returns pictures, places of pixels, and their change."""
     head = scene.meshes(rig)[0]
     for index, item in scene.meshes(rig).items():
         item.hide_render = index != 0
     shader = looks.principled(head.data.materials[0])
-    weight = shader.inputs["Subsurface Weight"]  # light would spread past the mask
+    weight = shader.inputs["Subsurface Weight"]  # scattered light would leave the mask
     for link in list(weight.links):
         head.data.materials[0].node_tree.links.remove(link)
     weight.default_value = 0.0
@@ -171,7 +173,7 @@ def test_a_map_without_textures_shows_in_its_area_only(tmp_path, label, side):
     points = np.array([v.co for v in scene.meshes(rig)[0].data.vertices])
     unit = 0.36 * np.ptp(points[:, 0])
     top = points[:, 2].max() - 1.75 * unit
-    # The brow's ellipse of the face's own measures, and a side of the middle line.
+    # The brow's ellipse in units of the face, on one side of the middle line.
     away = np.hypot(x / 0.26, (z - top - 0.36 * unit) / 0.32) / unit
     inside = solid & (away < 0.8) & (side * x > 0.05 * unit)
     outside = solid & ((away > 1.5) | (side * x < -0.2 * unit))
@@ -189,18 +191,19 @@ def test_a_mask_of_the_metadata_limits_its_map(tmp_path):
     rig = scene.load(path)
     changed, (x, _), solid = _before_and_after(rig, tmp_path)
     width = np.ptp(x[solid])
-    # u grows with x here; the file's +x is the face's own left and Blender's +x.
+    # u grows with x here; the file's +x is the face's left and Blender's +x.
     assert changed[solid & (x < -0.15 * width)].mean() > 6 / 255
     assert changed[solid & (x > 0.15 * width)].max() <= 2 / 255
 
 
-# A wrinkle map as whole normals or colours, and as differences about 0.5: left half, right half.
+# A wrinkle map with complete normals or colours, and with differences around 0.5: left half, right
+# half.
 WHOLE = ((0.85, 0.5, 0.85), (0.85, 0.5, 0.85))
 OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 
 
 def _write_maps(folder, wrinkle, mask_left):
-    """Base and wrinkle maps by MetaHuman's names, and a packed mask whose red is one half."""
+    """Write base and wrinkle maps with MetaHuman's names, and a mask with half of red set."""
     folder.mkdir()
     looks.write_image(folder / "head_color_map.png", np.full((16, 16, 3), 0.6, np.float32))
     looks.write_image(folder / "head_normal_map.png", looks.halves([0.5, 0.5, 1], [0.5, 0.5, 1]))
@@ -229,7 +232,7 @@ def test_wrinkle_textures_show_where_their_mask_is(tmp_path, target, wrinkle):
 
 @pytest.mark.parametrize("target", ["normal", "color"])
 def test_differences_of_nothing_change_nothing(tmp_path, target):
-    """Newer exports store differences around 0.5, so grey is no target colour."""
+    """Newer exports store differences around 0.5, so grey must not become the target colour."""
     letter = "w" if target == "normal" else "c"
     path = _save(tmp_path, _mapped(f"head_{letter}m1_{target}.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
@@ -254,7 +257,7 @@ def test_only_maps_that_show_get_a_driver(tmp_path):
     }
     assert drivers.pop("head") == 2
     body = drivers.pop("body")
-    assert body <= 1  # what has no area shows everywhere
+    assert body <= 1  # a map without an area shows everywhere
     assert not any(drivers.values())
     bad, seen = scene.invalid_drivers()
     assert not bad
@@ -271,11 +274,11 @@ def test_simple_materials_have_no_drivers_and_no_subsurface(kinds_file):
             assert not shader.inputs["Normal"].is_linked
 
 
-# --- what one looks through ------------------------------------------------------------------
+# --- transparent parts of the eye ------------------------------------------------------------
 
 
 def _eye_under_a_film(film="eyeshell"):
-    """An eye with a film in front of it, like eyeshell and cornea."""
+    """An eye with a film in front, such as eyeshell or cornea."""
     face = small_face()
     patch = face.meshes[1]
     meshes = {
@@ -368,7 +371,7 @@ def test_eevee_shows_maps_and_the_iris(tmp_path):
     assert "compil" not in said.lower() or "error" not in said.lower(), said
 
 
-# --- textures and their spaces ---------------------------------------------------------------
+# --- textures and their colour spaces --------------------------------------------------------
 
 
 def test_a_chosen_folder_is_looked_into_first_and_the_finds_are_said(tmp_path):
@@ -487,7 +490,7 @@ for image in bpy.data.images:
 
 @pytest.mark.parametrize("data", ["Utility - Raw", "ACES - Linear"])
 def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
-    """An ACES-like configuration: neither `sRGB` nor `Non-Color`, once without a data role."""
+    """A configuration like ACES has neither `sRGB` nor `Non-Color`, and once no data role."""
     path = _save(tmp_path, _mapped("head_wm1_normal.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
     config = tmp_path / "config.ocio"
@@ -498,13 +501,13 @@ def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
     spaces = {w[1]: (w[2], " ".join(w[3:])) for w in map(str.split, said.splitlines())
               if w[:1] == ["SPACE"]}  # fmt: skip
     for name in ("head_normal_map.png", "head_wm1_normal_map.png"):
-        # Blender sets `is_data` by the role alone, so without a role the name decides.
+        # Blender sets `is_data` by the role only, so without a role only the name is tested.
         assert spaces[name] == (str(data == "Utility - Raw"), "Utility - Raw"), said
     assert spaces["head_color_map.png"] == ("False", "Utility - sRGB - Texture"), said
 
 
 class _Spaces:
-    """The settings of an image in a colour configuration with unknown names."""
+    """Settings of an image in a colour configuration with unknown names."""
 
     bl_rna = SimpleNamespace(
         properties={"name": SimpleNamespace(enum_items=[SimpleNamespace(identifier="Vectors")])}
@@ -525,18 +528,18 @@ def test_where_no_name_is_known_the_configuration_itself_says_what_numbers_are(d
     assert settings.is_data is data
 
 
-# --- the seam --------------------------------------------------------------------------------
+# --- the seam between head and body ----------------------------------------------------------
 
 
 def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
-    """A sphere cut in two: without the file's normals each half would shade to its own rim."""
+    """A sphere cut in two; without the file's normals each half is shaded to its own rim."""
     face = small_face()
     center = np.array([0.0, 158.0, 2.0])
     whole = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
     faces = whole.face_layouts.reshape(-1, 4)
     level = whole.positions[faces, 1].mean(axis=1)
     upper = level >= np.median(level)
-    # The neck's weights run smoothly from one joint to the next, as at a real seam.
+    # The weights change smoothly from one joint to the next, as at a real neck.
     height = whole.positions[:, 1]
     share = (height - height.min()) / np.ptp(height)
     parts = {}
@@ -560,7 +563,8 @@ def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
             scene.update(scene.controls(rig))
             ours, theirs = (_corner_normals(m) for _, m in sorted(scene.meshes(rig).items()))
             gap = max(np.abs(ours[v] - theirs[v]).max() for v in seam)
-            # Posed, Blender bends custom normals by each half's own shape: nearly equal.
+            # In a pose Blender rotates custom normals by each half's own shape, so they are nearly
+            # equal.
             assert (gap < (0.03 if turn else 2e-3)) == normals, (turn, gap)
 
 
@@ -576,8 +580,10 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """Drivers from scene/upkeep/duplicates.py for the maps of a duplicate: sums without Python
-    expressions."""
+    """Drivers for the maps of a duplicate are sums without Python expressions.
+
+    scene/upkeep/duplicates.py makes them.
+    """
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))
     assert len(drivers) == 2

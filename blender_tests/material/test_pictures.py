@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures beside a file: their unpacked size is bounded by their file size and checked before."""
+"""Textures: their unpacked size is limited by their file size and checked before loading."""
 
 import random
 import struct
@@ -51,7 +51,7 @@ def test_damaged_heads_have_a_size_or_none(file_format, tmp_path):
 
 
 def _bomb(width, height, rows=40):
-    """A PNG whose header states a size."""
+    """A PNG whose header states a size that its data do not have."""
 
     def chunk(kind, content):
         crc = zlib.crc32(kind + content)
@@ -91,7 +91,7 @@ def test_a_small_file_of_a_huge_picture_is_a_sentence(tmp_path):
 
 
 def _most_memory():
-    """Bytes of address space that this process ever had."""
+    """The largest address space that this process has used, in bytes."""
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     return int(next(line for line in lines if line.startswith("VmPeak")).split()[1]) * 1024
 
@@ -128,7 +128,7 @@ def test_many_pictures_have_a_bound_together(tmp_path, monkeypatch):
 
 
 def test_a_large_flat_picture_is_taken(tmp_path):
-    """8192 pixels a side, as masks have, pack to a thousandth."""
+    """Masks with 8192 pixels per side may be compressed to a thousandth."""
     textures = scene.submodule("scene.material.image_loading")
     path = tmp_path / "flat.png"
     path.write_bytes(_bomb(8192, 8192))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solid view, in which people animate: gaze and lids are seen, no mask blackens the head."""
+"""The solid view, used for animation: gaze and lids are visible, no mask blackens the head."""
 
 import bpy
 import numpy as np
@@ -8,13 +8,15 @@ from support import child, looks, scene
 from support.faces import _mesh as fine_mesh
 from support.faces import small_face
 
-SKIN = (0.8, 0.5, 0.2)  # of the colour texture, as it is stored
-HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and how much of their cards is hair
+SKIN = (0.8, 0.5, 0.2)  # stored value of the colour texture
+HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and the share of their cards that hair covers
 
 
 def _face(tmp_path, color=True):
-    """A head with a mask and perhaps a colour, a fine eye, lashes before it, a film before all;
-    brows of thin grey hair before the eye."""
+    """A face for the solid view: a head with a mask and perhaps a colour texture, and a fine eye.
+
+    Lashes, a film and brows of thin grey hair are in front of the eye.
+    """
     face = small_face()
     random = np.random.default_rng(5)
     place = np.array([3.0, 160.0, 12.0])
@@ -61,7 +63,7 @@ def test_the_iris_has_a_slot_of_the_same_surface(tmp_path):
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.ptp(points[:, 2]) / 2
     away = np.hypot(*(middles - middle)[:, [0, 2]].T) / radius
-    # The same edge as the shader's limbus, within half a polygon.
+    # The same edge as in the shader, within half a polygon.
     assert (slots[away < 0.43] == 1).all()
     assert (slots[away > 0.51] == 0).all()
     assert max(iris.diffuse_color[:3]) < 0.1
@@ -157,5 +159,5 @@ def test_solid_view_shows_the_gaze_and_no_black_head(tmp_path):
     np.testing.assert_allclose(shots["plain"][0], shots["skin"][0], atol=0.03)  # not the mask
     assert shots["skin"][0].min() > 0.3
     lashes, white = shots["lashes"][1].mean(), shots["eye"][1].mean()
-    assert 0.5 * white < lashes < 0.95 * white  # what is behind them is seen
-    assert 0.8 * white < shots["brows"][1].mean() < 0.98 * white  # no black speck
+    assert 0.5 * white < lashes < 0.95 * white  # the eye behind them is visible
+    assert 0.8 * white < shots["brows"][1].mean() < 0.98 * white  # no black spot

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The menu Face of the header: Blender's search finds its entries only."""
+"""The menu Face in the header, through which Blender's search finds the operators."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ import pytest
 from support import scene
 from support.layout import Recorder
 
-# Of a thing that only its panel, list or handle can name, or a step of something that is open.
+# Operators that need an item of a panel, list or handle, or belong to an open dialog.
 ELSEWHERE = {
     *("apply_pose_asset", "blend_pose_asset", "blend_expression", "delete_expression"),
     *("rename_expression", "star_expression", "update_expression", "render_thumbnails"),
@@ -33,7 +33,7 @@ ELSEWHERE = {
 
 
 class Menus(Recorder):
-    """Follows menus into menus, as Blender's search does."""
+    """Follows submenus like Blender's search."""
 
     def __init__(self, top=None):
         super().__init__(top)
@@ -60,7 +60,7 @@ class Menus(Recorder):
 
 
 def found():
-    """The entries of the header: paths as shown by the search, and names of operators."""
+    """The entries of the menu: their paths as the search shows them, and names of operators."""
     layout = Menus()
     draw = scene.submodule("ui.menu.face_menu").draw_header
     assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()
@@ -69,7 +69,7 @@ def found():
 
 
 def is_in_header():
-    """Whether the header shows the menu now."""
+    """Whether the header shows the menu."""
     return bool(found()[0])
 
 
@@ -91,10 +91,10 @@ def test_search_finds_the_face_by_the_words_of_animators(rig):
     ours = {name for name in dir(bpy.ops.risorius) if not name.startswith("_")}
     assert ours - operators - ELSEWHERE == set()
     assert ELSEWHERE - ours == set()
-    for name in operators & ours:  # or the search would leave them out
+    for name in operators & ours:  # the search leaves internal operators out
         assert "INTERNAL" not in getattr(bpy.ops.risorius, name).bl_options, name
     keymap = bpy.context.window_manager.keyconfigs.user.keymaps.new("3D View")
-    for name in operators & ours:  # a shortcut can be given, and shows what it is of
+    for name in operators & ours:  # a shortcut can be assigned, and shows the operator's name
         item = keymap.keymap_items.new(f"risorius.{name}", "F", "PRESS", ctrl=True, alt=True)
         assert item.name == getattr(bpy.ops.risorius, name).get_rna_type().name, name
         keymap.keymap_items.remove(item)
@@ -111,7 +111,7 @@ def test_the_menu_stands_in_object_and_pose_mode_and_without_a_face(dna_file):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.objects.active = scene.meshes(rig)[0]
     bpy.ops.object.mode_set(mode="EDIT")
-    assert not is_in_header()  # Blender's own menu Face stands there
+    assert not is_in_header()  # Blender's own menu Face is shown
     bpy.ops.object.mode_set(mode="OBJECT")
 
 

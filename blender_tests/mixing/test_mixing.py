@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mix Faces: the preview follows the sliders, and the face that is written moves."""
+"""Mix Faces: the preview follows the sliders, and the written face moves."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ MEDIUM = Path(__file__).parents[2] / "tests" / "data" / "golden" / "medium.dna"
 
 
 def to_blender(points):
-    """Centimetres with y up as metres with z up."""
+    """Convert centimetres with y up to metres with z up."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * 0.01
 
 
 @pytest.fixture
 def files(tmp_path):
-    """A face, and the same one wider and with a longer nose."""
+    """A folder with the files of a face and of a wider copy with a longer nose."""
     dna = risorius.load(MEDIUM)
     dna.save(tmp_path / "one.dna")
     meshes = []
@@ -62,7 +62,7 @@ def points(item):
 
 
 def seen(item):
-    """float32[V, 3]: the vertices as the depsgraph has them."""
+    """The evaluated vertices of an object, float32[V, 3]."""
     shown = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     out = np.empty(3 * len(shown.data.vertices), np.float32)
     shown.data.vertices.foreach_get("co", out)
@@ -70,7 +70,7 @@ def seen(item):
 
 
 def finest(path):
-    """float64[V, 3] of the meshes of LOD 0 in Blender's space."""
+    """The vertices of the meshes of LOD 0 in Blender's space, float64[V, 3]."""
     dna = risorius.load(path)
     rows = [np.asarray(dna.meshes[int(m)].positions) for m in dna.lod_mesh_mapping[0]]
     return to_blender(np.concatenate(rows))
@@ -160,7 +160,7 @@ def test_a_file_that_is_gone_is_said_where_it_is_needed(files):
     bpy.ops.risorius.mix_preview()
     (files / "wide.dna").unlink()
     parents()[0].share = 0.7
-    assert preview() is not None  # it was read
+    assert preview() is not None  # the file was read
     with pytest.raises(RuntimeError, match=r"wide\.dna: No such file"):
         bpy.ops.risorius.mix_write(filepath=str(files / "child.dna"))
     bpy.ops.risorius.mix_preview()

@@ -13,7 +13,7 @@ JAW, PULL, BROW = (
     "CTRL_expressions.mouthCornerPullL",
     "CTRL_expressions.browDownL",
 )
-CORRECTIVE = 11  # the one after the eleven controls: jaw times pull
+CORRECTIVE = 11  # the control after the eleven raw ones: jaw times pull
 HEAT = "risorius_heat"
 
 
@@ -27,7 +27,7 @@ def why(name):
 
 
 def raw_with(rig, path, **values):
-    """float32[R] of the sliders with some values replaced, by the ends of their names."""
+    """Raw controls of the sliders, float32[R], with some values replaced by name endings."""
     raw = scene.raw_of(rig, path)
     names = risorius.load(str(path)).raw_control_names
     for end, value in values.items():
@@ -36,7 +36,7 @@ def raw_with(rig, path, **values):
 
 
 def wanted(path, mesh, raw, without_corrective=False):
-    """float64[V, 3] millimetres by the oracle; a corrective is taken out of the pose by hand."""
+    """Vertices by the oracle in mm, float64[V, 3], with or without the corrective."""
     dna = risorius.load(str(path))
     pose = risorius.Rig(dna).evaluate(np.asarray(raw, np.float32))
     if without_corrective:
@@ -56,7 +56,7 @@ def apart(one, other):
 
 
 def heat_of(rig):
-    """Mesh -> float32[V, 4] of its heat map."""
+    """Mesh -> colours of its heat map, float32[V, 4]."""
     found = {}
     for index, item in scene.meshes(rig).items():
         layer = item.data.color_attributes.get(HEAT)
@@ -74,7 +74,7 @@ def test_solo_shows_one_control_and_leaves_the_values(rig, dna_file, mode):
     alone = raw_with(rig, dna_file, mouthCornerPullL=0.0)
     assert scene.error_against_oracle(rig, dna_file, alone) < scene.TOLERANCE
     assert scene.face(rig)[PULL] == pytest.approx(0.6)
-    scene.set_controls(rig, jawOpen=0.4)  # it follows
+    scene.set_controls(rig, jawOpen=0.4)  # solo control: the face follows it
     alone = raw_with(rig, dna_file, mouthCornerPullL=0.0)
     assert scene.error_against_oracle(rig, dna_file, alone) < scene.TOLERANCE
     text = drawn(bpy.types.RISORIUS_PT_character).text()
@@ -135,7 +135,7 @@ def test_a_rendered_frame_is_whole_and_the_view_is_solo_again(rig, dna_file, tmp
     scene.set_controls(rig, jawOpen=0.7, mouthCornerPullL=0.6)
     bpy.ops.risorius.solo(control=JAW)
     graph = bpy.context.evaluated_depsgraph_get()
-    evaluate.evaluate(rig, graph, evaluate.Moment.RENDER)  # what a frame of a render does
+    evaluate.evaluate(rig, graph, evaluate.Moment.RENDER)  # the evaluation of a rendered frame
     bpy.context.view_layer.update()
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
@@ -197,7 +197,7 @@ def test_a_heat_map_has_the_distances_of_the_oracle(rig, dna_file, kind):
     most = max(float(f.max()) for f in far.values())
     assert why("heat").of(rig).most == pytest.approx(most, rel=1e-3)
     shown = heat_of(rig)
-    assert sorted(shown) == [0, 1]  # the meshes of the level that is shown
+    assert sorted(shown) == [0, 1]  # the meshes of the visible level
     ramp = scene.submodule("logic.base.heat_ramp")
     for mesh, colours in shown.items():
         expected = ramp.linear(ramp.colours(far[mesh] / most))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrong weights, bones and values give the same result in Direct mode and in Live mode."""
+"""Wrong weights, bones and values give the same result in Direct mode as in Live mode."""
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ def _pair(dna, tmp_path):
 
 
 def test_weights_that_do_not_sum_to_one(tmp_path):
-    """From the file, and as the user paints them: Blender divides by their sum."""
+    """Weights from the file or painted by the user; Blender divides them by their sum."""
     dna = small_face()
     mesh = dna.meshes[0]
     weights = np.array(mesh.skin_weights)
@@ -65,7 +65,7 @@ def test_groups_of_no_bone_and_of_a_bone_that_does_not_deform(tmp_path):
 
 @pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1e-9, 1e-9, 1e-9)])
 def test_a_bone_of_no_size(tmp_path, scale):
-    """A script scales an unmoved joint to 0, so that its matrix has no inverse."""
+    """A script scales an unmoved joint to 0, so its matrix has no inverse."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.pose.bones["user_joint"].scale = scale
@@ -76,7 +76,7 @@ def test_a_bone_of_no_size(tmp_path, scale):
 
 
 def test_a_joint_that_the_file_gives_no_size(tmp_path):
-    """The jaw's scale comes to 0 with the open mouth."""
+    """With an open mouth, the file scales the jaw to 0."""
     dna = small_face()
     group = dna.joint_groups[0]
     values = np.array(group.values)
@@ -102,7 +102,7 @@ def test_a_slider_that_is_no_number(tmp_path):
 
 
 def test_an_added_and_a_renamed_bone(tmp_path):
-    """Weights are read for the current bones."""
+    """Weights belong to the current names of bones."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.hide_viewport = False

@@ -14,9 +14,9 @@ ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "data" / "golden"
 STAND_IN = "RISORIUS_TEST_STAND_IN"  # a file of tests/fullscale/generate.py
 MAN = ROOT / "build" / "sample" / "man.dna"
-NORMALS_NEAR = 2e-3  # of unit length: both are made of the positions, which are floats
+NORMALS_NEAR = 2e-3  # tolerance of unit normals, which are computed from float positions
 
-# name -> (DNA or file, levels of detail, poses, scale of the object).
+# name -> (DNA or file, LODs, number of poses, scale of the object).
 _CONVENTIONS = {
     "small": {},
     "z up": {"axes": ("right", "front", "up")},
@@ -55,7 +55,7 @@ def _path(source, folder):
 
 
 def _pose(pair, random, turned):
-    """Sliders, and where wanted the bones of neck, head and eyes, at random."""
+    """Set random sliders, and if `turned` random rotations of neck, head and eyes."""
     sliders = None
     for rig in pair.each():
         face, bones = scene.face(rig), scene.controls(rig).pose.bones

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files have the form of Live mode; undo, copies and files of Blender's own come back right."""
+"""Saved files have the form of Live mode; undo, copies and Blender's own files are restored."""
 
 import addon_utils
 import bpy
@@ -17,7 +17,7 @@ def pair(dna_file):
 
 
 def _opened():
-    """The pair that is in the file now."""
+    """The pair of faces in the current file."""
     pair = object.__new__(both_ways.Pair)
     pair.direct, pair.live = bpy.data.objects["Small_rig"], bpy.data.objects["Small.001_rig"]
     return pair
@@ -114,7 +114,7 @@ def test_a_save_between_undo_and_the_next_update(pair, tmp_path):
 
 
 def test_a_file_that_blender_writes_by_itself(pair, tmp_path):
-    """It has finished positions and disabled modifiers; the add-on brings it back."""
+    """Such a file has finished positions and disabled modifiers; the add-on restores it."""
     shown = scene.snapshot(pair.direct)
     blend = tmp_path / "copied.blend"
     bpy.data.libraries.write(str(blend), {bpy.context.scene})
@@ -243,7 +243,7 @@ def test_a_duplicated_character(pair, linked):
 
 @pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D"])
 def test_a_duplicated_mesh(pair, linked):
-    """A copy of one mesh is posed by the rig, as in Live mode: the bones are posed for it."""
+    """The rig deforms a copied mesh as in Live mode; for it the bones are posed."""
     made = [_duplicate([scene.meshes(rig)[0].name], linked)[0] for rig in pair.each()]
     pair.check()
     copies = [scene.evaluated(item) for item in made]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh that cannot be in Direct mode looks as in Live mode, is named with the reason, and returns
-to Direct mode."""
+"""A mesh that cannot be in Direct mode looks as in Live mode, and the reason is named.
+
+Afterwards it returns to Direct mode.
+"""
 
 from contextlib import contextmanager
 
@@ -35,7 +37,7 @@ def _smooth(head, place):
 
 
 def before(_rig, head):
-    """An enabled modifier before ours."""
+    """Enable a modifier before ours."""
     return _smooth(head, 0)
 
 
@@ -46,7 +48,7 @@ def before_in_renders(_rig, head):
 
 
 def moved_down(_rig, head):
-    """Our modifier is moved below another."""
+    """Move our modifier below another one."""
     modifier = head.modifiers.new("Mirror", "MIRROR")
     head.modifiers.move(0, 1)
 
@@ -83,7 +85,7 @@ def removed(rig, head):
 
 
 def of_another(rig, head):
-    """Our modifier is given another armature."""
+    """Assign another armature to our modifier."""
     modifier = _armature(head)
     modifier.object = rig["risorius_controls"]
 
@@ -114,7 +116,7 @@ def masked(_rig, head):
 
 def _own_key(head):
     block = head.shape_key_add(name="mine", from_mix=False)
-    block.value = 0.0  # Blender 5 gives a new key the value 1
+    block.value = 0.0  # Blender 5 sets new keys to 1
     for point in block.points[:30]:
         point.co.x += 0.02
     return block
@@ -183,7 +185,7 @@ def live_relative(_rig, head):
 
 
 def key_edited_on_live(_rig, head):
-    """A key of the user's own that is relative to the live key."""
+    """Add a key of the user that is relative to the live key."""
     block = _own_key(head)
     block.relative_key = _live_key(head)
     block.value = 0.5
@@ -191,7 +193,7 @@ def key_edited_on_live(_rig, head):
 
 
 def basis_edited(_rig, head):
-    """The rest form itself is edited."""
+    """Edit the rest form itself."""
     points = head.data.shape_keys.reference_key.points
     for point in points[:20]:
         point.co.y -= 0.03
@@ -199,7 +201,7 @@ def basis_edited(_rig, head):
 
 
 def moved(_rig, head):
-    """Taken back: the parts of a face must fit."""
+    """Move the head; the add-on moves it back, because parts of a face must fit."""
     return _set(head, "location", (0.1, 0.0, 0.2))
 
 
@@ -268,7 +270,7 @@ WHOLE_FACE = [rest_position, other_inheritance, bone_constraint]
 
 @contextmanager
 def _row(change):
-    """A failure names its row. One scene serves all rows, because each change is undone."""
+    """Add the row's name to a failure. All rows use one scene, because each change is undone."""
     try:
         yield
     except AssertionError as error:
@@ -342,7 +344,7 @@ def live_renamed(_rig, head):
 
 
 def live_moved(_rig, head):
-    """The live key gets another place in the list."""
+    """Move the live key to another place in the list."""
     _own_key(head)
     bpy.context.view_layer.objects.active = head
     head.active_shape_key_index = len(head.data.shape_keys.key_blocks) - 1
@@ -354,7 +356,7 @@ def live_deleted(_rig, head):
 
 
 def enabled(_rig, head):
-    """Our modifier, which Direct mode disables, is enabled by hand."""
+    """Enable our modifier, which Direct mode has disabled."""
     _armature(head).show_viewport = True
 
 
@@ -393,14 +395,14 @@ def test_a_mesh_stays_direct_through_an_edit(pair):
 
 
 def test_an_edited_rest_form(pair):
-    """A script's edit of the rest form is seen at the next step in Live mode."""
+    """A script's edit of the rest form becomes visible with the next update, in Live mode."""
     pair.edit(basis_edited)
     pair.check()
     assert both_ways.is_direct(pair.direct)
 
 
 def test_sliders_and_frames_look_at_nothing_again(pair, monkeypatch):
-    """Plans and weights are read after edits alone: they take longer than a frame."""
+    """Plans and weights are read only after edits, because reading takes longer than a frame."""
     conditions, skins = (scene.submodule(f"scene.skinning.{n}") for n in ("conditions", "skins"))
     animation.animate(pair.direct)
     bpy.context.scene.frame_set(2)
@@ -425,13 +427,13 @@ def _noted(function, read):
 
 
 def test_a_deleted_live_key(pair):
-    """Live has no channels on the mesh then, and the joints still move it."""
+    """Without its live key, a Live face has no channels on the mesh, but joints still move it."""
     pair.edit(live_deleted)
     pair.check()
 
 
 def test_another_object_with_the_same_data_keeps_the_rest_form(pair):
-    """The mesh of the face gets data of its own, as in Live mode."""
+    """The face's mesh gets its own data, as in Live mode."""
     others = []
 
     def share(_rig, head):
@@ -536,13 +538,13 @@ def test_another_number_of_vertices(pair):
     plan = both_ways.plan(pair.direct)
     assert head.session_uid not in plan.direct
     assert any(head.name in str(why) for why in plan.why)
-    pair.set(jawOpen=0.1)  # the live key of either stays as it was cut
+    pair.set(jawOpen=0.1)  # the live keys stay as they were cut
     assert np.isfinite(scene.evaluated(head)).all()
     assert pair.apart() < both_ways.NEAR
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """Automatic does not enable what the user disabled in Live mode, nor does a save."""
+    """Neither Automatic nor a save enables a modifier that the user disabled in Live mode."""
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones are posed while something needs them, and rest again afterwards; meshes stay Direct."""
+"""Bones are posed while something needs them, and rest afterwards; meshes stay in Direct mode."""
 
 import bpy
 import pytest
 from support import both_ways, scene
 
-BONES_NEAR = 1e-5  # of the elements of posed matrices, in metres and ratios
+BONES_NEAR = 1e-5  # tolerance of elements of posed matrices, in metres and ratios
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def constraint(rig):
 
 
 def bone_constraint_elsewhere(rig):
-    """A bone of another armature follows the jaw."""
+    """Make a bone of another armature follow the jaw."""
     armature = bpy.data.objects.new("Other", bpy.data.armatures.new("Other"))
     bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -79,7 +79,7 @@ def driver(rig):
 
 
 def driver_of_a_material(rig):
-    """A node of a material of the face reads the jaw."""
+    """Make a node of the face's material read the jaw."""
     material = scene.meshes(rig)[0].material_slots[0].material
     node = material.node_tree.nodes.new("ShaderNodeValue")
     curve = node.outputs[0].driver_add("default_value")
@@ -95,7 +95,7 @@ def driver_of_a_material(rig):
 
 
 def clothes(rig):
-    """Another object is deformed by the rig."""
+    """Let the rig deform another object."""
     shirt = bpy.data.objects.new("Shirt", bpy.data.meshes.new("Shirt"))
     bpy.context.scene.collection.objects.link(shirt)
     shirt.data.from_pydata([(0, 0, 1.5), (0.1, 0, 1.5), (0, 0.1, 1.4)], [], [(0, 1, 2)])
@@ -105,7 +105,7 @@ def clothes(rig):
 
 
 def nodes_with_the_rig(rig):
-    """Geometry nodes have the rig as an input."""
+    """Pass the rig to geometry nodes as an input."""
     tree = bpy.data.node_groups.new("Reads", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -123,7 +123,7 @@ def nodes_with_the_rig(rig):
 
 
 def node_of_the_rig(rig):
-    """A node inside of a tree names the rig."""
+    """Use the rig in a node of geometry nodes."""
     tree = bpy.data.node_groups.new("Names", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     tree.nodes.new("NodeGroupOutput")
@@ -140,7 +140,7 @@ def node_of_the_rig(rig):
 
 
 def hook(rig):
-    """A modifier of a mesh of the face follows a bone."""
+    """Add a modifier to a mesh of the face that follows a bone."""
     head = scene.meshes(rig)[0]
     modifier = head.modifiers.new("Hook", "HOOK")
     modifier.object, modifier.subtarget = rig, "FACIAL_C_Jaw"
@@ -175,7 +175,7 @@ def test_bones_are_posed_while_they_are_needed(pair):
 
 
 def test_pose_mode(pair):
-    """Bones that somebody poses are Blender's: the face is Live as long as the mode lasts."""
+    """In pose mode the face is Live, because the user poses the bones."""
     for rig in pair.each():
         rig.hide_viewport = False
         rig.hide_set(False)
@@ -195,7 +195,7 @@ def test_pose_mode(pair):
     bpy.ops.object.select_all(action="DESELECT")
     both_ways.settle()
     assert both_ways.is_direct(pair.direct)
-    pair.check()  # the joint that the user posed has what it was given
+    pair.check()  # the joint that the user posed keeps its pose
 
 
 def test_shown_joints(pair):
@@ -216,7 +216,7 @@ SCRIPTED = [child_of_a_bone, constraint, driver, clothes]
 
 
 def test_a_script_that_steps_to_the_next_frame_without_an_update(pair):
-    """Without an interface Blender reports an edit only with the next frame."""
+    """Without an interface, Blender reports an edit only with the next frame."""
     for rig in pair.each():
         bone = scene.face(rig)
         name = next(k for k in bone.keys() if k.endswith("jawOpen"))  # noqa: SIM118

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Camera, three lights and a backdrop around a face, scaled and placed by its head."""
+"""The studio: camera, three lights and a backdrop, scaled and placed by the head."""
 
 import bpy
 import numpy as np
@@ -30,7 +30,7 @@ def _camera(collection):
 
 
 def _seen(rig, camera):
-    """The face's corners in the picture, (0, 0) to (1, 1)."""
+    """The corners of the face's bounding boxes in the picture, (0, 0) to (1, 1)."""
     corners = [m.matrix_world @ Vector(c) for m in scene.meshes(rig).values() for c in m.bound_box]
     return np.array([world_to_camera_view(bpy.context.scene, camera, c) for c in corners])
 
@@ -153,7 +153,7 @@ def _corners(item):
 
 
 def test_no_shirt_ends_in_the_picture(rig):
-    """Of a hem that is higher in the middle than at the sides, as a child's."""
+    """Tested with a hem that is higher in the middle than at the sides, like a child's."""
     bpy.ops.risorius.add_character()
     man = next(
         o for o in bpy.data.objects if o.name.startswith("Sample") and o.name.endswith("_rig")

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face that moves: keys on a few controls and on the head."""
+"""Animates a face with keys on some controls and on the head."""
 
 from . import scene
 
 
 def animate(rig, with_head=True):
-    """Keys on three controls and the head bone from frame 1 to 10; returns the controls."""
+    """Insert keys on three controls and the head bone from frame 1 to 10. Returns the controls."""
     controls, bone = scene.controls(rig), scene.face(rig)
     for frame, jaw, pull, turn in ((1, 0.0, 1.0, 0.0), (5, 1.0, 0.2, 0.4), (10, 0.3, 0.6, -0.3)):
         for end, value in (("jawOpen", jaw), ("mouthCornerPullL", pull), ("eyeLookUpL", jaw)):

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One face in Direct mode compared with the same face in Live mode, which Blender deforms."""
+"""Compares a face in Direct mode with the same face in Live mode, which Blender deforms."""
 
 import bpy
 import numpy as np
 
 from . import scene
 
-NEAR = 1e-5  # of the face's size
+NEAR = 1e-5  # tolerance as a share of the face's size
 
 
 def plan(rig):
-    """How a face was last shown: conditions.Plan."""
+    """The conditions.Plan with which a face was last shown."""
     return scene.submodule("scene.skinning.conditions").known(rig)
 
 
 def is_direct(rig, *numbers):
-    """Whether meshes of a face, or all, have finished positions and disabled modifiers."""
+    """Whether these meshes of a face (or all) are in Direct mode, with disabled modifiers."""
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
     off = all(not m.modifiers[0].show_viewport for m in wanted)
@@ -23,7 +23,7 @@ def is_direct(rig, *numbers):
 
 
 def normals(item):
-    """float64[C, 3] normals of the corners of the shown mesh; bool[C] corners to compare.
+    """Normals of the corners of the evaluated mesh, float64[C, 3], and which to compare, bool[C].
 
     A corner between polygons with opposite normals, as in teeth of coarse levels, has no normal.
     """
@@ -45,7 +45,7 @@ def normals(item):
 
 
 def bones(rig):
-    """float64[B, 4, 4], the posed matrices that Blender has of the deforming armature."""
+    """The posed matrices of the deforming armature's bones, float64[B, 4, 4]."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     flat = np.empty(len(seen) * 16, np.float32)
     seen.foreach_get("matrix", flat)
@@ -53,16 +53,16 @@ def bones(rig):
 
 
 def settle():
-    """Let Blender evaluate edits and the add-on's writes after them."""
+    """Update twice, so that Blender also evaluates the add-on's writes after an edit."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
 
 
 class Pair:
-    """The face of a file twice.
+    """The same face twice, in Direct mode and in Live mode.
 
     Attributes:
-        direct, live: deforming armatures of the face in Direct mode, and of the one in Live mode.
+        direct, live: deforming armature of the face in Direct mode and in Live mode.
     """
 
     def __init__(self, path, **options):
@@ -82,13 +82,13 @@ class Pair:
         settle()
 
     def edit(self, change):
-        """Make one edit of both faces. Args: change  function of a rig and its head mesh."""
+        """Make one edit on both faces. Args: change  function of a rig and its head mesh."""
         done = [change(rig, scene.meshes(rig)[0]) for rig in self.each()]
         settle()
         return done
 
     def apart(self, lod=0):
-        """The largest distance between meshes as seen from their rigs, over the face's size."""
+        """The largest distance between the meshes, relative to their rigs, as a share of size."""
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))
@@ -100,11 +100,11 @@ class Pair:
         return max(float(np.abs(a - b).max()) for a, b in pairs) / size
 
     def bones_apart(self):
-        """The largest difference of elements of posed bone matrices."""
+        """The largest difference between elements of posed bone matrices."""
         return float(np.abs(bones(self.direct) - bones(self.live)).max())
 
     def check(self, near=NEAR):
-        """Both show the same, and do so when they move."""
+        """Check that both faces show the same for two poses."""
         for values in ((0.9, 0.2), (0.3, 0.8)):
             self.set(jawOpen=values[0], mouthCornerPullL=values[1])
             assert self.apart() < near

@@ -37,16 +37,16 @@ os._exit(code)
 
 
 def run(tmp_path, body, cpu=300, **environment):
-    """Run lines of Python with `bpy` and `scene` at hand.
+    """Run lines of Python with the names `bpy` and `scene` in a separate Blender.
 
     Args:
         tmp_path: folder for the script.
-        body: the lines.
-        cpu: seconds of CPU.
-        environment: variables to set.
+        body: lines of Python.
+        cpu: limit in seconds of CPU.
+        environment: environment variables to set.
 
     Returns:
-        Exit code and all that was printed.
+        Exit code, and the printed output.
     """
     script = tmp_path / "child.py"
     indented = "\n".join(f"    {line}" for line in body.splitlines())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and editing in Blender's own animation editors."""
+"""Reads and edits keys through Blender's own animation editors."""
 
 from contextlib import contextmanager
 
@@ -8,7 +8,7 @@ import bpy
 
 @contextmanager
 def editor(kind):
-    """In this block operators run in an editor. Args: kind  as Area.type."""
+    """Let operators run in an editor during this context. Args: kind  its Area.type."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     before, area.type = area.type, kind
@@ -22,6 +22,6 @@ def editor(kind):
 
 
 def seen_paths():
-    """Data paths of the F-curves that a graph editor with its own settings shows now."""
+    """Data paths of the F-curves that a graph editor with default settings shows."""
     with editor("GRAPH_EDITOR"):
         return {c.data_path for c in bpy.context.visible_fcurves or ()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head in the form of an egg with shape keys, that no rig was made of yet."""
+"""A head in the form of an egg with shape keys, from which a rig can be made."""
 
 import importlib.util
 from pathlib import Path
@@ -16,7 +16,7 @@ _METRES = 0.01
 
 
 def egg():
-    """The active object, looking along -y, with the keys of face_shapes.expressions."""
+    """Add the egg as the active object, looking along -y, with the expressions' shape keys."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new("Egg")
     mesh.from_pydata(_to_blender(positions).tolist(), [], faces.tolist())
@@ -33,5 +33,5 @@ def egg():
 
 
 def _to_blender(points):
-    """Centimetres with y up as metres with z up."""
+    """Convert centimetres with y up to metres with z up."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * _METRES

@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """Everything of the add-on that this process can see."""
+    """All parts of the add-on that are registered in this process."""
     handlers = [
         name
         for name in dir(bpy.app.handlers)
@@ -47,7 +47,7 @@ def _list(value):
 
 
 def _manager():
-    """The part of Blender that installs extensions; as a module it starts without."""
+    """Enable the part of Blender that installs extensions, which the bpy module lacks at start."""
     import addon_utils
 
     if "bl_pkg" not in bpy.context.preferences.addons:
@@ -67,7 +67,7 @@ def _read_preferences(step):
 
 
 def install(package):
-    """As a user does it: Preferences, Install from Disk."""
+    """Install like a user: Preferences, Install from Disk."""
     _manager()
     bpy.ops.extensions.package_install_files(
         filepath=package, repo="user_default", enable_on_install=True
@@ -77,13 +77,13 @@ def install(package):
 
 
 def _vertices(item):
-    """The shown vertices of a mesh."""
+    """The evaluated vertices of a mesh."""
     graph = bpy.context.evaluated_depsgraph_get()
     return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
 
 
 def use(path):
-    """Import a face, move it, save the scene beside the file."""
+    """Import a face, move it, and save the scene in the same folder."""
     assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     bone = rig["risorius_controls"].pose.bones["face"]
@@ -124,7 +124,7 @@ def add(_nothing=""):
 
 
 def disable(_nothing=""):
-    """As a user does it: the check box in the preferences."""
+    """Disable like a user, with the check box in the preferences."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     bpy.ops.wm.save_userpref()
     return of_ours()
@@ -139,7 +139,7 @@ def look(blend):
 
 
 def remove(_nothing=""):
-    """As a user does it: Uninstall."""
+    """Uninstall like a user."""
     _manager()
     names = [r.module for r in bpy.context.preferences.extensions.repos]
     bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small face-like DNA of our own: two meshes, LODs, joints, channels, maps, odd names."""
+"""A small DNA like a face: two meshes, LODs, joints, channels, maps, odd names."""
 
 import numpy as np
 import risorius
@@ -25,7 +25,7 @@ UNOWNED = 5
 
 
 def _grid(columns, rows, radius, center):
-    """A patch of a sphere that looks to the file's front (+z): positions and quads."""
+    """A patch of a sphere that faces the file's front (+z): positions, normals, UVs and quads."""
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
@@ -77,7 +77,7 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A DNA with every kind of thing that the add-on builds; the same at every call."""
+    """A DNA with all elements that the add-on builds; equal at every call."""
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0
@@ -123,7 +123,7 @@ def small_face(
 
 
 def _behave(dna, random, angle):
-    """Jaw with all nine attributes, an eye that looks, one corrective, channels and maps."""
+    """Add behavior: a jaw with nine attributes, an eye that looks, a corrective, channels, maps."""
     count = len(CONTROLS)
     jaw = random.uniform(-1, 1, (9, 3)).astype(np.float32)
     jaw[3:6] *= 25 * angle
@@ -167,7 +167,7 @@ def _behave(dna, random, angle):
 
 
 def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
-    """The same face with other index spaces, in place.
+    """Change the index spaces of a face in place.
 
     Args:
         dna: a small_face.
@@ -193,7 +193,7 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
 
 def _order(names, order):
-    """New names, and the new number of each old one (-1: gone)."""
+    """The new names, and the new index of each old name (-1: removed)."""
     where = np.full(len(names), -1)
     for new, old in enumerate(order):
         if not isinstance(old, str):
@@ -234,7 +234,7 @@ def _renumber_channels(dna, order):
 
 
 def _renumber_controls(dna, order):
-    """Controls that something listens to may move but must not go, browDownL and later may."""
+    """Controls that others read may move but must not be removed: browDownL and later may."""
     count = len(dna.raw_control_names)
     dna.raw_control_names, where = _order(dna.raw_control_names, order)
     where = np.append(where, len(order))  # the one corrective comes after the controls
@@ -274,7 +274,7 @@ def _renumber_joints(dna, order):
 
 
 def other_face(**options):
-    """A newer file of the small face: everything has another number, some is gone, some new."""
+    """A newer file of the small face: other indices everywhere, some elements removed, some new."""
     dna = renumbered(
         small_face(**options),
         joints=[0, "new_joint", 1, 2, 5, 4, 3],
@@ -299,7 +299,7 @@ NECK_POSES = (
 
 
 def neck_face(**options):
-    """The small face, whose solver repairs the neck when neck and head turn.
+    """The small face with a solver that repairs the neck when neck and head rotate.
 
     The raw controls of TURNING store rotations of joints. The solver poses NECK_POSES drive
     channels 4 and 5. The pose UP together with the open jaw fires a corrective, which drives

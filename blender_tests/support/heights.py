@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The height of a panel in lines: a click must not move the lines below the pointer."""
+"""The height of a panel in lines, because a click must not move the lines below the pointer."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ class Lines:
         object.__setattr__(self, "_parts", [])
 
     def __setattr__(self, _name, _value):
-        """Options of a layout or of an operator button."""
+        """Ignore options of a layout or of an operator button."""
 
     @property
     def count(self):
@@ -29,7 +29,7 @@ class Lines:
         return part
 
     def panel(self, *_arguments, **_options):
-        """Header and body of an open section."""
+        """Header and body of an open subpanel."""
         return self._part(Lines(beside=True)), self._part(Lines())
 
     def __getattr__(self, name):
@@ -40,7 +40,7 @@ class Lines:
 
 
 def lines_of(panel):
-    """How many lines a panel takes now, with all its sections open."""
+    """The number of lines of a panel with all its subpanels open."""
     layout = Lines()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout.count

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are broken, and files that are well formed but odd.
+"""Damaged DNA files, and valid files with unusual content.
 
-Indices that lead out of their lists, joints in a circle and huge counts are among the broken ones:
-the writer of the library refuses to make them, so they come as edited bytes.
+Damaged files with indices out of range, joints in a circle or huge counts are made by editing
+bytes, because the library refuses to write them.
 """
 
 from pathlib import Path
@@ -15,14 +15,14 @@ DATA = Path(__file__).resolve().parents[2] / "tests" / "data"
 
 
 def found_by_fuzzing():
-    """Paths of all files that the project's fuzzers found and that are kept."""
+    """Paths of the files that the project's fuzzers found."""
     return [p for p in sorted((DATA / "fuzz").iterdir()) if p.suffix in {".dna", ".json"}]
 
 
 def broken_on_purpose():
-    """(name, bytes, whether it must be refused) of the files of tests/data/malformed.
+    """The files of tests/data/malformed: (name, bytes, whether it must be refused).
 
-    A line of edits.txt: name, base, outcome, and edits `offset:bytes that go:bytes that come`.
+    A line of edits.txt: name, base, outcome, and edits `offset:removed bytes:inserted bytes`.
     """
     bases = {}
     for line in (DATA / "malformed" / "edits.txt").read_text(encoding="utf-8").splitlines():
@@ -70,7 +70,7 @@ def _set(face, mesh=None, **values):
 
 
 def _numbers(face, value):
-    """One kind of number for everything that is a number of the geometry."""
+    """Set some numbers of all geometry arrays to a value."""
     meshes = list(face.meshes)
     for mesh in meshes:
         mesh.positions = _with(mesh.positions, value, np.s_[::5])
@@ -85,7 +85,7 @@ def _numbers(face, value):
 
 
 def _surface(face, value):
-    """Numbers that only the look depends on."""
+    """Set some normals and UV coordinates, on which only the look depends, to a value."""
     for mesh in range(len(face.meshes)):
         normals, uvs = face.meshes[mesh].normals, face.meshes[mesh].texture_coordinates
         _set(
@@ -105,7 +105,7 @@ def _neutral(face, value):
 
 
 def _named(face, text):
-    """The same text for everything that has a name."""
+    """Use one text as the name of every element."""
     face.name = text
     face.joint_names = [text] * len(JOINTS)
     face.raw_control_names = [text] * len(CONTROLS)
@@ -116,7 +116,7 @@ def _named(face, text):
 
 
 def _flat_faces(face):
-    """Faces with one corner, two corners, and the same vertex at all corners."""
+    """Faces with one corner, with two corners, and with one vertex at all corners."""
     layouts = np.array([0, 1, 2, 5, 5, 5, 5, 6, 7, 6], np.uint32)
     for mesh in range(len(face.meshes)):
         _set(face, mesh, face_layouts=layouts, face_offsets=np.array([0, 1, 3, 7, 10], np.uint32))
@@ -218,7 +218,7 @@ ODD = {
 
 
 def odd_face(name):
-    """The bytes of a small face with one odd thing."""
+    """The bytes of a small face with one unusual property."""
     face = small_face()
     ODD[name](face)
     return face.to_bytes()

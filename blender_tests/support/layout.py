@@ -24,7 +24,7 @@ class Recorder:
         object.__setattr__(self, "_top", top)
 
     def __setattr__(self, _name, _value):
-        """Options of a layout or of an operator button."""
+        """Ignore options of a layout or of an operator button."""
 
     def label(self, text="", icon="NONE", **_options):
         assert icon in ICONS, icon
@@ -57,12 +57,12 @@ class Recorder:
         return lambda *_a, **_o: Recorder(self._top)
 
     def text(self, between=" "):
-        """All words, as one line."""
+        """All drawn texts as one line."""
         return between.join(self.labels)
 
 
 def drawn(panel):
-    """Draw a panel into a Recorder."""
+    """Draw a panel into a Recorder, which is returned."""
     layout = Recorder()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout

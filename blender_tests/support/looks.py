@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces with every kind of mesh, small pictures, and textures to put on them."""
+"""Faces with every kind of mesh, small pictures, and textures for them."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ KINDS = {
 
 
 def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
-    """The same mesh elsewhere, without shapes; the offset in the file's axes and units."""
+    """A moved and scaled copy of a mesh, without shapes; offset in the file's axes and units."""
     middle = mesh.positions.mean(axis=0)
     moved = (mesh.positions - middle) * scale + middle + np.array(offset, np.float32)
     names = ("normals", "texture_coordinates", "layout_positions", "layout_normals")
@@ -34,7 +34,7 @@ def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
 
 
 def set_meshes(dna, meshes):
-    """Give a face other meshes: name -> Mesh."""
+    """Replace the meshes of a face. Args: meshes  name -> Mesh."""
     dna.mesh_names, dna.meshes = list(meshes), list(meshes.values())
     dna.lod_count = 1
     dna.lod_mesh_mapping = [list(range(len(meshes)))]
@@ -65,7 +65,7 @@ def every_kind():
 
 
 def write_image(path, pixels):
-    """A PNG of float[H, W, 3 or 4], its numbers stored as they are."""
+    """Write float[H, W, 3 or 4] as a PNG, with unchanged values."""
     height, width, channels = pixels.shape
     image = bpy.data.images.new(path.stem, width, height, alpha=channels == 4)
     image.colorspace_settings.is_data = True
@@ -79,7 +79,7 @@ def write_image(path, pixels):
 
 
 def halves(left, right, size=16):
-    """float32[size, size, n]: one colour for u below a half, another above."""
+    """A picture float32[size, size, n]: one colour for u below 0.5, another above."""
     pixels = np.empty((size, size, len(left)), np.float32)
     pixels[:, : size // 2], pixels[:, size // 2 :] = left, right
     return pixels
@@ -126,7 +126,7 @@ def stage(items, size=32, engine="CYCLES", samples=4):
 
 
 def render(setup, path):
-    """float32[size, size, 4] of a still, row 0 at the bottom."""
+    """Render a still. Returns its pixels, float32[size, size, 4], with row 0 at the bottom."""
     setup.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path), check_existing=False)
@@ -138,7 +138,7 @@ def render(setup, path):
 
 
 def upstream(socket):
-    """All nodes that feed an input."""
+    """All nodes on which an input depends."""
     seen, todo = set(), [link.from_node for link in socket.links]
     while todo:
         node = todo.pop()

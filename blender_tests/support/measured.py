@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fake layout that finds text which Blender would cut off.
+"""A simulated layout that finds texts which Blender would cut off.
 
 It repeats the widths of Blender's layouts at an interface scale of 1 with Blender's font: a column
 gives each part its width, a row divides it by the needs of its parts, a split by its factor, and
@@ -17,25 +17,25 @@ DIALOG = 300 - 24
 _MARGIN = 10  # around the text of a label; a button has more
 _BUTTON = 14
 _ICON = 20
-_ASKED = 30  # beside its text a button asks a row for as much, a label for next to nothing
-_NUMBER = 60  # a number for more
+_ASKED = 30  # pixels that a button adds to its text's width in a row; a label adds almost none
+_NUMBER = 60  # the same for a number
 _NAMES = 0.4
 _VALUE = "0.000"
 # Heights measured in a window of Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
-# English -> another language, as Blender would look it up: its own build as a module cannot.
+# English -> text in the tested language, because the bpy module cannot translate.
 LOCAL = {}
 
 
 def width_of(text):
-    """Pixels of a text in Blender's interface font."""
+    """The width of a text in Blender's interface font, in pixels."""
     points = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, points)
     return blf.dimensions(0, text)[0]
 
 
 def local(text):
-    """A label in the language that is tried."""
+    """A label in the tested language."""
     return LOCAL.get(text, text)
 
 
@@ -45,7 +45,7 @@ class Part:
     Its children are Parts and (text, pixels to be read, pixels that it asks a row for).
     """
 
-    everything_open = True  # else panels within panels are as a new file has them
+    everything_open = True  # False: subpanels are open as in a new file
 
     def __init__(self, kind="column", factor=0.0, split=False):
         self.is_header = False
@@ -98,7 +98,7 @@ class Part:
         self.children.append((text, pixels, asked))
 
     def _named(self, text):
-        """A name in the left part of a line that is split into name and value."""
+        """Add a name in the left part of a line that is split into name and value."""
         part = self._inner("split", _NAMES)
         part._leaf(text, width_of(text) + _MARGIN)
         part._leaf("", 0)
@@ -174,12 +174,12 @@ class Part:
             part._leaf(text, pixels)
 
     def asks(self):
-        """Pixels that it asks a row for."""
+        """The width in pixels that the part requests from a row."""
         asked = [c.asks() if isinstance(c, Part) else c[2] for c in self.children]
         return sum(asked) if self.kind == "row" else max(asked, default=0)
 
     def height(self):
-        """Pixels from top to bottom."""
+        """The height in pixels."""
         if self.is_header:
             return SUB_HEADER
         tall = [c.height() if isinstance(c, Part) else _LINE for c in self.children]
@@ -215,7 +215,7 @@ def _property(data, name):
 
 
 class Operator:
-    """An operator for its draw(): its properties with given or default values."""
+    """An operator whose draw() is tested, with given or default properties."""
 
     def __init__(self, kind, **given):
         self._kind = kind
@@ -240,7 +240,7 @@ class Operator:
 
 
 def drawn(kind, context, **given):
-    """The drawing of a panel or of a list's line."""
+    """Draw a panel or a line of a list into a Part."""
     layout = Part()
     kind.draw(SimpleNamespace(layout=layout, **given), context)
     return layout

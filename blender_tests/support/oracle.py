@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skinning and morphing in float64, written from the format's description alone.
+"""Skinning and morphing in float64, written only from the description of the format.
 
 It uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and metres.
 """
@@ -13,7 +13,7 @@ _AXES = {
 
 
 def _rotation(dna, angles):
-    """One joint's matrix for column vectors: the first of the sequence acts first."""
+    """The matrix of a joint's angles for column vectors; the sequence's first rotation is first."""
     if dna.rotation_unit == "degrees":
         angles = np.radians(angles)
     matrix = np.eye(3)
@@ -31,7 +31,7 @@ def _rotation(dna, angles):
 
 
 def _world(dna, deltas, turns=None):
-    """Joint matrices in the file's space. Args: turns  of `vertices`."""
+    """Joint matrices in the file's space. Args: turns  see `vertices`."""
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -48,7 +48,7 @@ def _world(dna, deltas, turns=None):
 
 
 def to_blender(dna, points, unit_scale=1.0):
-    """File points to Blender units."""
+    """Convert points of the file to Blender units."""
     axes = np.array([_AXES[w] for w in dna.coordinate_system], np.float64).T
     metres = 0.01 if dna.translation_unit == "cm" else 1.0
     return points @ axes.T * metres / unit_scale
@@ -59,10 +59,10 @@ def vertices(dna, mesh_index, pose, unit_scale=1.0, turns=None):
 
     Args:
         dna: the Dna.
-        mesh_index: which mesh.
+        mesh_index: index of the mesh.
         pose: risorius.Pose.
         unit_scale: metres per Blender unit.
-        turns: joint -> float64[3, 3], how a host turns it against rest, about its own axes.
+        turns: joint -> rotation float64[3, 3] that Blender adds to its rest, about its own axes.
     """
     mesh = dna.meshes[mesh_index]
     points = mesh.positions.astype(np.float64)

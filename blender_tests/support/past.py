@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of the past: opening them in several ways, and recording their animation."""
+"""Files of older versions: opens them in several ways and records their animation."""
 
 import json
 import os
@@ -31,7 +31,7 @@ PLAYS = {
 
 @contextmanager
 def scalar():
-    """While this lasts faces are compiled for the kernels that are the same on every processor."""
+    """During this context faces are compiled for the scalar code, equal on every processor."""
     before = os.environ.get("RISORIUS_SIMD")
     os.environ["RISORIUS_SIMD"] = "scalar"
     try:
@@ -55,7 +55,7 @@ def controls():
 
 
 def open_it(path, _folder):
-    """As one opens it. Blender 5.2 mends the root of overrides of 4.2, and calls that an error."""
+    """Open a file. Blender 5.2 reports the repair of 4.2's override roots as an error."""
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path))
     except RuntimeError as error:
@@ -64,13 +64,13 @@ def open_it(path, _folder):
 
 
 def _open_if_needed(path, folder):
-    """Open it, unless it is open and has only been played: most of the time goes into opening."""
+    """Open a file unless it is open and unchanged, because opening takes most of the time."""
     if bpy.data.filepath != str(path) or "touched" in bpy.context.scene:
         open_it(path, folder)
 
 
 def save_and_open(path, folder):
-    """Opened, saved under another name and opened again."""
+    """Open a file, save it under another name, and open that."""
     _open_if_needed(path, folder)
     again = folder / f"again_{path.name}"
     bpy.ops.wm.save_as_mainfile(filepath=str(again))
@@ -78,7 +78,7 @@ def save_and_open(path, folder):
 
 
 def append(path, _folder):
-    """Its characters and actions appended to an empty file."""
+    """Append the file's characters and actions to an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path)) as (there, _here):
         collections, actions = list(there.collections), list(there.actions)
@@ -91,7 +91,7 @@ def append(path, _folder):
 
 
 def link(path, _folder):
-    """Its characters and actions linked into an empty file."""
+    """Link the file's characters and actions into an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path), link=True) as (there, here):
         collections = list(there.collections)
@@ -102,7 +102,7 @@ def link(path, _folder):
 
 
 def override(path, folder):
-    """Its characters linked and made ready to animate."""
+    """Link the file's characters and make them ready to animate."""
     link(path, folder)
     for rig in rigs():
         bpy.context.view_layer.objects.active = rig["risorius_controls"]
@@ -111,7 +111,7 @@ def override(path, folder):
 
 
 def undo(path, folder):
-    """Opened, changed, and the change undone."""
+    """Open a file, change it, and undo the change."""
     bpy.context.preferences.edit.use_global_undo = True
     _open_if_needed(path, folder)
     bpy.ops.ed.undo_push(message="as it was")
@@ -134,18 +134,18 @@ ROUTES = {
     "link": link,
     "override": override,
 }
-# Overrides of a library are not appended or linked once more.
+# Files with library overrides are not appended or linked again.
 NOT_OVERRIDDEN = ("append", "link", "override")
 
 
 def routes_of(name):
-    """The ways in which a file is brought into Blender."""
+    """The routes by which a file is brought into Blender."""
     skipped = NOT_OVERRIDDEN if name.startswith("overridden") else ()
     return [route for route in ROUTES if route not in skipped]
 
 
 def show(mode):
-    """Show all faces that are no overrides in Direct mode ("AUTO"), or with bones ("LIVE")."""
+    """Show all faces without overrides in Direct mode ("AUTO") or with posed bones ("LIVE")."""
     for rig in rigs():
         if rig.library is None and rig.override_library is None:
             rig["risorius_skinning"] = mode
@@ -160,7 +160,7 @@ def prepare(play):
         bpy.context.scene["touched"] = True
     for rig, item in [(r, r["risorius_controls"]) for r in rigs()]:
         if item.library is not None:
-            continue  # it stands as it was saved
+            continue  # stays as it was saved
         _choose_slot(item)
         if play == LIVE_AGAIN:
             bpy.context.view_layer.objects.active = item
@@ -228,7 +228,7 @@ def _read(rig, depsgraph):
 
 
 def vertices(rig, depsgraph):
-    """A reader for `film`: the vertices of each mesh in world space."""
+    """The vertices of each mesh in world space, as a reader for `film`."""
     found = {}
     for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
         seen = rig[key].evaluated_get(depsgraph)
@@ -240,7 +240,7 @@ def vertices(rig, depsgraph):
 
 
 def direct_rigs():
-    """The faces that are in Direct mode now: one of their meshes at least has final positions."""
+    """The faces in Direct mode: at least one of their meshes has final positions."""
     return [
         rig
         for rig in rigs()
@@ -256,12 +256,12 @@ def _numbers(bone):
 
 
 def films(folder, name, work, routes=None):
-    """Play a file in every way.
+    """Play a file by each route.
 
     Args:
-        folder: where the files are.
-        name: of one of PLAYS.
-        work: a folder to write to.
+        folder: folder of the files.
+        name: name of a file in PLAYS.
+        work: folder for temporary files.
         routes: some of ROUTES; None: all routes of the file.
 
     Yields:

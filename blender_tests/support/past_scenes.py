@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scenes that are saved as files of the past: every way in which a face is animated."""
+"""Makes the scenes that are stored as files of older versions, with all kinds of animation."""
 
 import bpy
 
@@ -51,7 +51,7 @@ def save(path):
 
 
 def _empty_action(item, name):
-    """A new action that the control armature plays from now on."""
+    """Assign a new action to the control armature."""
     data = item.animation_data_create()
     data.action = bpy.data.actions.new(name)
     data.action.use_fake_user = True
@@ -59,7 +59,7 @@ def _empty_action(item, name):
 
 
 def _key_sliders(item, **curves):
-    """Keys on sliders of the action that is played: control -> {frame: value}."""
+    """Insert keys on sliders in the assigned action: control -> {frame: value}."""
     bone = item.pose.bones["face"]
     for short, keys in curves.items():
         for frame, value in keys.items():
@@ -69,7 +69,7 @@ def _key_sliders(item, **curves):
 
 
 def _key_weight(item, place, keys):
-    """Keys on the weight of a layer, by its place, as 38364e4 and before it wrote them."""
+    """Key the weight of a layer by its index, as versions up to 38364e4 did."""
     for frame, value in keys.items():
         item.risorius_layers[place].weight = value
         item.keyframe_insert(f"risorius_layers[{place}].weight", frame=frame)
@@ -115,7 +115,7 @@ def meta(dna, _folder):
 
 
 def _strip(item, action, name="", **settings):
-    """A strip of a new NLA track, where the action's keys are."""
+    """Add a strip with the action on a new NLA track, at the frames of its keys."""
     data = item.animation_data
     slot = getattr(data, "action_slot", None)
     data.action = None
@@ -134,7 +134,7 @@ def _strip(item, action, name="", **settings):
 
 
 def make_meta(item, strip):
-    """Put a strip into a meta strip, in an NLA editor as Blender demands."""
+    """Put a strip into a meta strip, which needs an NLA editor."""
     bpy.context.view_layer.objects.active = item
     item.select_set(True)
     for track in item.animation_data.nla_tracks:
@@ -221,7 +221,7 @@ def baked_result(dna, _folder):
 
 
 def _own_joint(rig):
-    """Tracks on the deforming armature itself: one muted, one that plays."""
+    """Two tracks on the deforming armature: a muted one and one that plays."""
     bone = rig.pose.bones["user_joint"]
     bone.rotation_mode = "XYZ"
     for name, angle in (("Turn", 0.7), ("Back", -0.4)):
@@ -285,12 +285,12 @@ def bones(dna, _folder):
 
 
 def overridden_live(dna, folder):
-    """An override of a linked face, its live meshes copied; with a layer and keys of its own."""
+    """An override of a linked face with copied live meshes, a layer and keys."""
     _overridden(dna, folder, "LIVE")
 
 
 def overridden_keys(dna, folder):
-    """The same of a face with real keys, which stay linked."""
+    """An override of a linked face with real keys, which stay linked."""
     _overridden(dna, folder, "KEYS")
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small renders and their pixels."""
+"""Makes small renders and reads their pixels."""
 
 import bpy
 import numpy as np
 
 
 def small_render(camera, size=32):
-    """Cycles, one sample, no denoising; a sun. Returns the scene."""
+    """Set up Cycles with one sample and a sun. Returns the scene."""
     setup = bpy.context.scene
     setup.render.engine = "CYCLES"
     setup.cycles.samples, setup.cycles.device = 1, "CPU"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions, and doubles of the package's parts that work on it."""
+"""A head without expressions, and substitutes for parts of the package that use it."""
 
 from types import SimpleNamespace
 
@@ -25,13 +25,13 @@ WORDS = {
 
 
 def to_blender(points):
-    """Centimetres with y up as metres with z up."""
+    """Convert centimetres with y up to metres with z up."""
     points = np.asarray(points, np.float64)
     return np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1) * METRES
 
 
 def plain_head(name="Egg"):
-    """The active object, without shape keys."""
+    """Add a head without shape keys as the active object."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(to_blender(positions).tolist(), [], faces.tolist())
@@ -64,7 +64,7 @@ class Package:
 
 
 def opened(positions):
-    """What opens the mouth of the double: the lower half goes down by 1 cm."""
+    """Displacements that open the mouth: the lower half moves down by 1 cm."""
     low = positions[:, 1] < positions[:, 1].mean()
     return low[:, None] * np.array([0.0, -1.0, 0.0])
 

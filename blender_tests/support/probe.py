@@ -8,14 +8,14 @@ import numpy as np
 
 
 class Probe(bpy.types.RenderEngine):
-    """Reads the dependency graph of the render, also between frames as for motion blur."""
+    """Reads the depsgraph of a render, also between frames as for motion blur."""
 
     bl_idname = "RISORIUS_TEST_PROBE"
     bl_label = "Probe"
     bl_use_preview = False
 
     seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
-    between = ()  # offsets from each frame that are looked at as well
+    between = ()  # offsets from each frame at which vertices are also recorded
 
     def render(self, depsgraph):
         frame = depsgraph.scene_eval.frame_current

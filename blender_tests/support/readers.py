@@ -22,7 +22,7 @@ import numpy as np
 
 
 def _colors(picture, uvs):
-    """float[V, 4] of a picture at UV coordinates, v upwards."""
+    """Colours of a picture at UV coordinates with v upwards, float[V, 4]."""
     from PIL import Image
 
     with Image.open(picture) as image:
@@ -70,7 +70,7 @@ def _tree(content):
 
 
 def fbx(path):
-    """By Assimp's program, which tells all that it read as JSON."""
+    """Read an FBX with Assimp's program, which writes its content as JSON."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "told.json"
         command = ["assimp", "export", str(path), str(told), "-fassjson"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Short functions for edits of a scene in tests."""
+"""Short functions with which tests edit and read a scene."""
 
 import sys
 
@@ -19,7 +19,7 @@ def submodule(name):
 
 
 def load(path, mode="AUTO", **options):
-    """Import a file; returns the deforming armature."""
+    """Import a DNA file. Returns the deforming armature."""
     before = set(bpy.data.objects)
     assert bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode, **options) == {
         "FINISHED"
@@ -28,7 +28,7 @@ def load(path, mode="AUTO", **options):
 
 
 def add_board(kind="COMPLETE"):
-    """Give the active face a board; the mode is object mode then."""
+    """Add a board to the active face and return to object mode."""
     assert bpy.ops.risorius.add_board(kind=kind) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
 
@@ -50,14 +50,14 @@ def meshes(rig):
 
 
 def update(*items):
-    """Tag objects and evaluate."""
+    """Tag objects and evaluate the scene."""
     for item in items:
         item.update_tag()
     bpy.context.view_layer.update()
 
 
 def set_controls(rig, **values):
-    """Set sliders by the ends of their names, as an edit does."""
+    """Set sliders by the ends of their names, and update."""
     bone = face(rig)
     for end, value in values.items():
         name = next(k for k in bone.keys() if k.endswith(end))  # noqa: SIM118
@@ -66,7 +66,7 @@ def set_controls(rig, **values):
 
 
 def evaluated(item):
-    """float64[V, 3] of the mesh that Blender shows, in world space."""
+    """The evaluated vertices of a mesh in world space, float64[V, 3]."""
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = seen.to_mesh()
     flat = np.empty(len(mesh.vertices) * 3, np.float32)
@@ -77,13 +77,13 @@ def evaluated(item):
 
 
 def raw_of(rig, path):
-    """The raw controls that the sliders ask for now, by index."""
+    """The raw controls from the current values of the sliders, float32[R]."""
     labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
 
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
-    """Largest distance between Blender's vertices and the oracle's, over the mesh's size.
+    """The largest distance of Blender's vertices from the oracle's, as a share of the mesh's size.
 
     The face may be at any place.
     """
@@ -110,7 +110,7 @@ def curves(item):
 
 
 def pose_bones(rig):
-    """Let a face leave Direct mode: the bones of its deforming armature are posed from now on."""
+    """Take a face out of Direct mode, so that the bones of its deforming armature are posed."""
     rig["risorius_skinning"] = "LIVE"
     update(controls(rig))
 
@@ -121,7 +121,7 @@ def snapshot(rig):
 
 
 def counts():
-    """How many datablocks of every kind there are."""
+    """The number of datablocks of every kind."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
@@ -130,7 +130,7 @@ def counts():
 
 
 def invalid_drivers():
-    """Data paths of drivers that do not work, anywhere in the file."""
+    """Data paths of invalid drivers in the file, and the number of all drivers."""
     owners = [
         *bpy.data.objects,
         *bpy.data.shape_keys,

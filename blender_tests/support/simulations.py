@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A moving face, simulations on it, and recordings of both."""
+"""A moving face, simulations on it, and recordings of their vertices."""
 
 import bpy
 import numpy as np
@@ -8,12 +8,12 @@ from . import scene
 from .animation import animate
 
 FRAMES = range(1, 11)
-NEAR = 1e-5  # of the size, where every vertex is pinned
-FREE = 2e-3  # of the size, where cloth hangs free
+NEAR = 1e-5  # tolerance as a share of the size, for pinned vertices
+FREE = 2e-3  # the same for cloth that hangs freely
 
 
 def film(item, frames=FRAMES):
-    """Frame -> vertices of a mesh as Blender shows it then."""
+    """Frame -> vertices of the evaluated mesh."""
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
@@ -22,13 +22,13 @@ def film(item, frames=FRAMES):
 
 
 def apart(film, wanted):
-    """The largest distance over all frames, over the size of the mesh."""
+    """The largest distance over all frames, as a share of the mesh's size."""
     size = np.ptp(wanted[min(wanted)], axis=0).max()
     return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
 
 
 def moving(dna_file, mode, far=0.2):
-    """A face with a keyed jaw, head and place, and its head mesh."""
+    """A face with keys of jaw, head and location, and its head mesh."""
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):
@@ -54,7 +54,7 @@ def cloth(item, pinned=1.0):
 
 
 def mean_places(places):
-    """Frame -> the result of `trail` for given vertices. Args: places a film."""
+    """Frame -> the result of `trail` for these vertices. Args: places  a film."""
     found, state = {}, None
     for frame in sorted(places):
         state = places[frame] if state is None else (state + places[frame]) / 2
@@ -63,7 +63,7 @@ def mean_places(places):
 
 
 def trail(item):
-    """Simulation nodes whose state moves half the way to the input at each step."""
+    """Add simulation nodes whose state moves halfway to the input at each step."""
     tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

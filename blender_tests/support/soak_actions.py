@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random actions of a user on faces, and the conditions after each."""
+"""Random actions of a user on faces, and the conditions that must hold after each."""
 
 import hashlib
 import random
@@ -12,7 +12,7 @@ import risorius
 
 from . import faces, oracle, scene
 
-LIMIT = 6  # characters beyond which none is added
+LIMIT = 6  # largest number of characters
 CONTROLS = [c for c in faces.CONTROLS if c.startswith("CTRL") and len(c) < 60]
 
 
@@ -21,7 +21,7 @@ class WrongFaceError(AssertionError):
 
 
 class World:
-    """Random actions on the open file. It holds no Blender object; all are looked up again."""
+    """Random actions on the open file. Objects are looked up anew for each action, never stored."""
 
     def __init__(self, folder, seed, characters):
         self.folder, self.seed, self.characters = folder, seed, characters
@@ -41,7 +41,7 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """An empty file with undo, one library with a character, and the first characters."""
+        """Make an empty file with undo, a library with a character, and the first characters."""
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
@@ -50,7 +50,7 @@ class World:
         while len(self.rigs()) < self.characters:
             self._import("AUTO")
         self._settings()
-        self.render()  # what the engine keeps from its first picture on is no growth
+        self.render()  # the engine's allocations at its first render are no growth
         bpy.ops.ed.undo_push(message="begin")
         bpy.ops.wm.save_as_mainfile(filepath=str(self.blend))
 
@@ -66,7 +66,7 @@ class World:
 
     @staticmethod
     def rigs():
-        """Deforming armatures that are in the scene, linked ones left out; by name."""
+        """Deforming armatures in the scene without linked ones, sorted by name."""
         inside = bpy.context.scene.objects
         found = [o for o in inside if o.library is None and o.get("risorius_controls")]
         return sorted(found, key=lambda o: o.name)
@@ -76,7 +76,7 @@ class World:
 
     @staticmethod
     def _meshes(rig):
-        """DNA mesh index -> its own mesh: a copy of some parts points to another's meshes."""
+        """DNA mesh index -> mesh of this rig; copies may point to meshes of another rig."""
         held = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
         own = [m for m in held if m is not None and m.get("risorius_rig") == rig]
         return {m["dna_mesh"]: m for m in own}
@@ -91,7 +91,7 @@ class World:
     def _push(self, message):
         bpy.ops.ed.undo_push(message=message)
 
-    # -- what a user does -------------------------------------------------------------------
+    # -- actions of a user ------------------------------------------------------------------
 
     def slider(self):
         rig = self._rig()
@@ -151,7 +151,7 @@ class World:
         scene.update(controls)
 
     def attach(self):
-        """Hang a face on a body, move the body, or take it off again."""
+        """Attach a face to a body, or detach it, and move the body."""
         rig = self._rig()
         self._activate(rig)
         body = bpy.context.scene.objects.get("body") or self._body()
@@ -175,7 +175,7 @@ class World:
         return body
 
     def test_channel(self):
-        """Try a shape by hand; a change of the frame or of a control ends it, or the user does."""
+        """Test a channel; the user, a change of the frame or of a control ends the test."""
         self._activate(self._rig())
         bpy.ops.risorius.test_channel(channel="1", value=self.random.random())
         if self.random.random() < 0.5:
@@ -260,7 +260,7 @@ class World:
             self._delete(self._rig())
 
     def _delete(self, rig):
-        """As a user does, or with its data at once, or the whole collection."""
+        """Delete a face like a user: its objects, with their data, or the whole collection."""
         objects = self._objects(rig)
         controls = rig["risorius_controls"]
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
@@ -279,7 +279,7 @@ class World:
         bpy.context.view_layer.update()
 
     def delete_part(self):
-        """A part goes, frames pass, undo brings it back."""
+        """Delete a part, play frames, and undo the deletion."""
         self._push("whole")
         item = self.random.choice(self._objects(self._rig()))
         bpy.data.objects.remove(item)
@@ -308,7 +308,7 @@ class World:
             bpy.ops.risorius.reload()
 
     def replace(self):
-        """The same file, or another with other axes and shapes."""
+        """Replace the file by the same one, or by one with other axes and shapes."""
         rig = self._rig()
         if not rig.override_library:
             self._activate(rig)
@@ -373,7 +373,7 @@ class World:
         bpy.ops.outliner.orphans_purge(do_recursive=True)
 
     def other_scene(self):
-        """Another scene is open for a while: once empty, once with the same characters."""
+        """Open another scene for a while: an empty one, or one with the same characters."""
         here = bpy.context.window.scene
         there = bpy.data.scenes.new("there")
         if self.random.random() < 0.5:
@@ -412,10 +412,10 @@ class World:
             self._enable()
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
 
-    # -- what must hold ---------------------------------------------------------------------
+    # -- conditions that must hold ----------------------------------------------------------
 
     def check(self):
-        """Every face of the scene against the oracle, and every driver.
+        """Compare every face of the scene with the oracle, and check every driver.
 
         Returns:
             The largest error, of a mesh's size.
@@ -444,7 +444,7 @@ class World:
         return worst
 
     def _error(self, rig):
-        """Largest distance to the oracle over the mesh's size, and the mesh's name."""
+        """The largest distance from the oracle as a share of a mesh's size, and its name."""
         dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
         depsgraph = bpy.context.evaluated_depsgraph_get()
         bone = rig["risorius_controls"].evaluated_get(depsgraph).pose.bones["face"]
@@ -465,7 +465,7 @@ class World:
         return worst
 
     def calm(self):
-        """As many characters as at the start, in a file freshly loaded: for samples."""
+        """Restore the number of characters at the start and reload the file, for samples."""
         while len(self.rigs()) > self.characters:
             self._delete(self.rigs()[-1])
         while len(self.rigs()) < self.characters:
@@ -493,7 +493,7 @@ class World:
             for p in kinds
             if p.identifier != "libraries"
         }
-        # Reports are Texts that the user may read, and keep.
+        # Reports are Texts for the user, which may stay.
         local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
         counts = {name: len(found) for name, found in local.items()}
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply, Set Origin and their relatives on any part of a face: it keeps its form and its place."""
+"""Apply, Set Origin and similar steps on any part of a face keep its form and place."""
 
 import bpy
 import numpy as np
@@ -8,8 +8,8 @@ from support import scene
 from support.faces import other_face, small_face
 from support.layout import drawn
 
-NEAR = 1e-5  # of the face's size
-ROLL = 3e-4  # the same for bones: Blender keeps an axis as an angle, which each step rounds
+NEAR = 1e-5  # tolerance as a share of the face's size
+ROLL = 3e-4  # the same for bones, whose roll angle is rounded at each step
 
 APPLY = bpy.ops.object.transform_apply
 ORIGIN = bpy.ops.object.origin_set
@@ -73,7 +73,7 @@ def _objects(rig):
 
 
 def _parts(rig):
-    """All values that these steps of Blender change, by name."""
+    """All values that these steps of Blender may change, by name."""
     found = {}
     for item in _objects(rig):
         found[item.name, "matrix"] = np.array(item.matrix_basis)
@@ -95,7 +95,7 @@ def _update():
 
 
 def _hang(parent, bone=""):
-    """Something of the user's that hangs on an object or a bone of the face."""
+    """Add an empty of the user that is parented to an object or a bone of the face."""
     hat = bpy.data.objects.new("Hat", None)
     bpy.context.scene.collection.objects.link(hat)
     hat.parent, hat.parent_type, hat.parent_bone = parent, "BONE" if bone else "OBJECT", bone
@@ -104,7 +104,7 @@ def _hang(parent, bone=""):
 
 
 def _put(rig, jaw):
-    """Move the jaw, and let all that waits for an update be done."""
+    """Move the jaw and update, so that all delayed work is done."""
     scene.set_controls(rig, jawOpen=jaw)
     scene.update(scene.controls(rig))
 
@@ -114,7 +114,7 @@ def _far(before, now):
 
 
 def _try(rigs, hats, steps):
-    """Do steps on the first of the faces: whatever they did, all faces move as they did before."""
+    """Do steps on the first face; afterwards all faces must move as before."""
     first = rigs[0]
     wanted, whole = {}, {}
     for jaw in (0.2, 0.7):
@@ -138,7 +138,7 @@ def _try(rigs, hats, steps):
 
 
 def _replaced(rig, tmp_path):
-    """Another file for a face that went through the steps: it is as that file has it."""
+    """Replace the file of a face that went through the steps, and check it against that file."""
     path = tmp_path / "other.dna"
     other_face(head_grid=(6, 7)).save(str(path))
     bpy.context.view_layer.objects.active = scene.controls(rig)
@@ -180,7 +180,7 @@ def test_the_main_steps_on_a_face_on_a_body_with_keys_of_its_own(small_file, tmp
 
 
 def _on_a_body(path):
-    """A face in real keys, on the only bone of a turned body."""
+    """A face with real keys, attached to the only bone of a rotated body."""
     rig = scene.load(path, "KEYS")
     controls = scene.controls(rig)
     controls.scale = (1.5, 1.5, 1.5)

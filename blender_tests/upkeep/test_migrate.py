@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters of older files are updated to the current form; newer ones stay."""
+"""Characters of older files are updated to the current form; newer ones are not changed."""
 
 import bpy
 import numpy as np
@@ -118,7 +118,7 @@ def test_an_old_bake_whose_tracks_are_gone_is_brought_up(capsys):
     with bpy.data.libraries.load(str(FOLDER / "baked_controls.blend")) as (there, into):
         into.objects = [name for name in there.objects if name.endswith("_controls")]
     controls = into.objects[0]
-    assert not controls["risorius_before"]["tracks"][0].startswith("[")  # by their order
+    assert not controls["risorius_before"]["tracks"][0].startswith("[")  # stored by their index
     controls.animation_data_clear()
     note = scene.submodule("scene.animation.actions").note_tracks_by_name
     assert note(controls) is False

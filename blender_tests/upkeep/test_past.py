@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of an older Risorius play the same values bit for bit and look the same.
+"""Files of older versions play the same values bit for bit.
 
 Bones and keys are compared in Live mode, whose form these files have; Direct mode shows the same.
 """
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from support import past
 
-NEAR = 1e-5  # of a mesh's size
-# Files whose first face is never Direct: it has keyed joints or real shape keys, or is an override.
+NEAR = 1e-5  # tolerance as a share of a mesh's size
+# Files whose first face is never in Direct mode: keyed joints, real shape keys, or an override.
 ORDINARY = ("baked_result", "baked_controls", "overridden_live", "overridden_keys")
 
 MAKERS = sorted(p.name for p in past.DATA.iterdir() if p.is_dir())
@@ -25,7 +25,7 @@ def _same_on_every_processor():
 
 
 def folder_of(maker, tmp_path):
-    """A copy of the files that a Blender saved; not run where this Blender cannot open them."""
+    """A copy of the files that a version of Blender saved; skipped if this Blender is older."""
     made_by = tuple(int(n) for n in maker.split("."))
     if made_by[0] > bpy.app.version[0]:
         pytest.skip(
@@ -44,7 +44,7 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Play a film in both modes and compare the vertices; the mode is Live afterwards."""
+    """Play a film in both modes and compare the vertices; afterwards the mode is Live."""
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")
     films = {}

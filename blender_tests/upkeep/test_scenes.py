@@ -12,7 +12,7 @@ HEAD = "head"
 
 @pytest.fixture
 def rig(dna_file, mode):
-    """Keys on the jaw and the head bone between frame 1 and 10."""
+    """A face with keys on the jaw and the head bone at frames 1 and 10."""
     made = scene.load(dna_file, mode)
     bone, head = scene.face(made), scene.controls(made).pose.bones[HEAD]
     head.rotation_mode = "XYZ"
@@ -65,7 +65,7 @@ def _small_render(setup):
 
 
 def _rendered(rig, folder, setup):
-    """Frame -> values of the render, read when each frame is written."""
+    """Frame -> rendered vertices, read when each frame is written."""
     found = {}
     meshes = [m for _, m in sorted(scene.meshes(rig).items())]
 
@@ -112,7 +112,7 @@ def test_render_of_a_scene_that_is_not_open(rig, tmp_path):
 
 
 def test_saved_with_another_scene_open(rig, dna_file, tmp_path):
-    """A character of a scene that is not open is left alone, and right when it is opened."""
+    """A character of a closed scene is not updated; it is right when its scene is opened."""
     wanted = _play(rig, 1, 10)
     bpy.context.window.scene = bpy.data.scenes.new("A other")
     bpy.context.view_layer.update()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hundred mixed steps, undone and redone one by one: every state comes back as it was."""
+"""A hundred mixed steps are undone and redone one by one; every state is restored."""
 
 import random
 
@@ -17,7 +17,7 @@ def _rigs():
 
 
 def _state():
-    """Character -> shown vertices at the frame of the scene."""
+    """Character -> evaluated vertices at the current frame."""
     bpy.context.view_layer.update()
     found = {}
     for rig in _rigs():
@@ -31,7 +31,7 @@ def _activate(rig):
 
 
 def _slide(chance, rig):
-    """Do not use the jaw: Blender resets keyed values that change without a key."""
+    """Move a slider other than the jaw, because Blender resets unkeyed changes of keyed values."""
     name = chance.choice(("mouthCornerPullL", "mouthCornerPullR", "browDownL", "eyeLookUpL"))
     scene.set_controls(rig, **{name: chance.random()})
 
@@ -110,4 +110,4 @@ def test_a_hundred_steps_back_and_forth(dna_file, seed):
     assert not bad
     assert seen
     distinct = {p.tobytes() for s in states for p in s.values()}
-    assert len(distinct) > STEPS / 3  # the steps did something
+    assert len(distinct) > STEPS / 3  # the steps had an effect

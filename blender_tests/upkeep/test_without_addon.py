@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender without the add-on shows the last pose and loses nothing, and its edits take effect
-later."""
+"""A Blender without the add-on shows the last pose and loses nothing.
+
+Edits made there take effect when the add-on is back.
+"""
 
 import os
 import sys
@@ -38,7 +40,7 @@ os._exit(0)
 
 
 def _in_another_blender(blend, folder):
-    """Open and save a file in a Blender without the add-on. Returns: the shown vertices."""
+    """Open and save a file in a Blender without the add-on. Returns the shown vertices."""
     script, out = folder / "other.py", folder / "shown.npy"
     script.write_text(_OTHER, encoding="utf-8")
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "nobody"))

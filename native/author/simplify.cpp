@@ -87,7 +87,7 @@ class Slivers {
 
  private:
   struct Side {
-    std::uint32_t triangle = 0, other = 0;  // and its corner that is not at the edge
+    std::uint32_t triangle = 0, other = 0;  // a triangle at the edge, and its corner off the edge
   };
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
 

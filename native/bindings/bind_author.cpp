@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joint rigs made from shapes, and packed buffers of meshes.
+// Python bindings of author/: fits of joint rigs, simplification, and packed buffers of meshes.
 #include <array>
 #include <string>
 #include <string_view>
@@ -20,7 +20,8 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// [V, 3], [E, V, 3] and [edges, 2] as Shapes. Raises ValueError where shapes do not agree.
+/// Makes Shapes from arrays [V, 3], [E, V, 3] and [edges, 2]. Raises ValueError if their shapes do
+/// not agree.
 author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                       const Doubles& importance) {
   if (neutral.ndim() != 2 || neutral.shape(1) != 3) shape_error("neutral", "(V, 3)", neutral);
@@ -50,8 +51,8 @@ author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const
   return out;
 }
 
-/// Positions [J, 3] and motions [E, J, 3] of joints that are there, as GivenJoint.
-/// A joint that no expression moves has no motions.
+/// Makes GivenJoints from positions [J, 3] and motions [E, J, 3] of existing joints.
+/// A joint that no expression moves gets an empty list of motions.
 std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Doubles& rotations,
                                              const Doubles& translations, std::size_t expressions) {
   const auto joints = static_cast<std::size_t>(positions.shape(0));
@@ -80,12 +81,13 @@ std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Dou
   return out;
 }
 
-/// Joints that are there, with the motions of each.
+/// Existing joints with their motions.
 struct GivenJoints {
   std::vector<author::GivenJoint> joints;
 };
 
-/// float64[J, 3] positions, float64[E, J, 3] motions and uint32[J] or no joints of the other side.
+/// Makes GivenJoints from positions [J, 3], rotations and translations [E, J, 3], and indices [J]
+/// of mirrored joints, or an empty array.
 GivenJoints given(const Doubles& positions, const Doubles& rotations, const Doubles& translations,
                   const Indices& mirrored) {
   if (positions.ndim() != 2 || positions.shape(1) != 3) {
@@ -115,7 +117,8 @@ author::StartWeights start_weights(const Indices& joints, const Floats& weights)
   return out;
 }
 
-/// The options with the given joints, whose motions are of the shapes' expressions.
+/// Adds the given joints to the options. Raises ValueError if their motions have another number of
+/// expressions than the shapes.
 author::FitOptions with_given(author::FitOptions options, const author::Shapes& shapes,
                               const GivenJoints& given) {
   for (const author::GivenJoint& joint : given.joints) {
@@ -128,7 +131,7 @@ author::FitOptions with_given(author::FitOptions options, const author::Shapes& 
   return options;
 }
 
-/// What `work` returns, without the GIL.
+/// Runs `work` without the GIL. Raises its error or returns its fit.
 template <class Work>
 Fit fitted(const Work& work) {
   auto result = [&] {
@@ -163,7 +166,7 @@ Fit fit_motions(const author::Shapes& shapes, const GivenJoints& given,
   return fitted([&] { return author::fit_motions(shapes, all, weights, at); });
 }
 
-/// float64[expressions, joints, 3] of one half of the motions.
+/// float64[expressions, joints, 3]: the rotations or the translations of the motions.
 Doubles motions(const Fit& fit, author::Vector3 author::JointMotion::* half) {
   const std::size_t joints = fit.joints.size(), count = fit.motions.size() / joints;
   Doubles out({static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(joints), py::ssize_t{3}});
@@ -184,7 +187,7 @@ py::array_t<T> rows(const std::vector<T>& values, std::size_t width) {
   return out;
 }
 
-/// uint32[n, 3] triangles and the error: see risorius.author.simplify.
+/// Returns triangles uint32[n, 3] and the error, see risorius.author.geometry.simplify.
 py::tuple simplify(const Floats& positions, const Floats& attributes, const Indices& triangles,
                    std::size_t count) {
   if (positions.ndim() != 2 || positions.shape(1) != 3)
@@ -221,17 +224,17 @@ void bind_fit_inputs(py::module_& m) {
   py::class_<author::Shapes>(m, "FitShapes", "A mesh and the displacements of its expressions.")
       .def(py::init(&shapes), py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
            py::arg("importance") = Doubles(0));
-  py::class_<GivenJoints>(m, "GivenJoints", "Joints that are there, and their motions.")
+  py::class_<GivenJoints>(m, "GivenJoints", "Existing joints and their motions.")
       .def(py::init(&given), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
            py::arg("mirrored") = Indices(0));
-  py::class_<author::Pivot>(m, "FitPivot", "A point that some expressions turn about.")
+  py::class_<author::Pivot>(m, "FitPivot", "A point about which some expressions turn.")
       .def(py::init(&pivot), py::arg("position"), py::arg("expressions"));
   py::class_<author::StartWeights>(m, "FitWeights", "Joints and weights of each vertex.")
       .def(py::init(&start_weights), py::arg("joints"), py::arg("weights"));
   using Options = author::FitOptions;
   py::class_<Options>(m, "FitSettings", "risorius.author.FitOptions, and the pivots.")
       .def(py::init<>())
-      .def_readwrite("joints", &Options::joints, "New ones.")
+      .def_readwrite("joints", &Options::joints, "Number of new joints.")
       .def_readwrite("influences", &Options::influences)
       .def_readwrite("smoothness", &Options::smoothness)
       .def_readwrite("symmetric", &Options::symmetric)
@@ -244,7 +247,7 @@ void bind_fit_inputs(py::module_& m) {
 }
 
 void bind_fits(py::module_& m) {
-  py::class_<Fit>(m, "JointFit", "Joints, weights and joint motions that repeat shapes.")
+  py::class_<Fit>(m, "JointFit", "Joints, weights and joint motions that reproduce shapes.")
       .def_property_readonly(
           "joints",
           [](const Fit& f) {
@@ -256,13 +259,13 @@ void bind_fits(py::module_& m) {
           "float64[J, 3]: neutral positions.")
       .def_property_readonly(
           "mirrored", [](const Fit& f) { return rows(f.mirrored, 1).attr("ravel")(); },
-          "uint32[J]: the joint of the other side, itself in the middle.")
+          "uint32[J]: the joint of the other side; a joint in the middle names itself.")
       .def_property_readonly(
           "weight_joints", [](const Fit& f) { return rows(f.weight_joints, f.influences); },
           "uint16[V, influences]: joints of each vertex.")
       .def_property_readonly(
           "weights", [](const Fit& f) { return rows(f.weights, f.influences); },
-          "float32[V, influences]: their weights, rows sum to 1.")
+          "float32[V, influences]: weights of these joints; rows sum to 1.")
       .def_property_readonly(
           "rotations", [](const Fit& f) { return motions(f, &author::JointMotion::rotation); },
           "float64[E, J, 3]: rotation vectors about the joint, radians.")
@@ -278,12 +281,12 @@ void bind_fits(py::module_& m) {
         py::arg("weights"), py::arg("at"),
         "JointFit with these weights: see risorius.author.fitting.");
   m.def("simplify", &simplify, py::arg("positions"), py::arg("attributes"), py::arg("triangles"),
-        py::arg("count"), "See risorius.author.simplify.");
+        py::arg("count"), "See risorius.author.geometry.simplify.");
 }
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The value of that name. Raises ValueError: none of the names.
+/// The value with a name. Raises ValueError if the name is unknown.
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {
@@ -311,7 +314,7 @@ author::Packing packing(std::size_t count, std::size_t stride, const std::string
   return {count, stride, named("mode", mode, kModes), named("filter", filter, kFilters)};
 }
 
-/// What `work` gives, without the GIL. Raises ValueError with the error's sentence.
+/// Runs `work` without the GIL and returns its bytes. Raises ValueError with the error's sentence.
 template <class Work>
 py::bytes worked(const Work& work) {
   const core::Result<Bytes> result = [&] {
@@ -337,8 +340,8 @@ void bind_packed(py::module_& m) {
         return worked([&] { return author::unpack(span, how); });
       },
       py::arg("packed"), py::arg("count"), py::arg("stride"), py::arg("mode"), py::arg("filter"),
-      "The bytes of a buffer view of glTF's EXT_meshopt_compression, whose words the arguments "
-      "are.");
+      "Unpacks a buffer view of glTF's EXT_meshopt_compression. The arguments have the names and "
+      "values of the extension.");
   m.def(
       "pack_buffer",
       [](const py::bytes& rows, std::size_t count, std::size_t stride, const std::string& mode,
@@ -348,7 +351,7 @@ void bind_packed(py::module_& m) {
         return worked([&] { return author::pack(span, how); });
       },
       py::arg("rows"), py::arg("count"), py::arg("stride"), py::arg("mode"), py::arg("filter"),
-      "Bytes that unpack_buffer gives back; with a filter, rows of filter_buffer.");
+      "Packs rows for unpack_buffer. With a filter, the rows must come from filter_buffer.");
   m.def(
       "filter_buffer",
       [](const py::array_t<float, py::array::c_style | py::array::forcecast>& values,
@@ -360,7 +363,7 @@ void bind_packed(py::module_& m) {
         return worked([&] { return author::filtered(span, how, bits); });
       },
       py::arg("values"), py::arg("stride"), py::arg("filter"), py::arg("bits"),
-      "Rows of `stride` bytes that the filter of unpack_buffer turns into values[n, k].");
+      "Encodes values[n, k] as rows of `stride` bytes that the filter of unpack_buffer decodes.");
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ void write_clip(const std::filesystem::path& path, const py::bytes& bytes) {
   taken(std::move(written));
 }
 
-// A Reader caches a block, so that Python threads take turns.
+// A clip file for Python. A mutex lets one thread read at a time, because a Reader caches a block.
 class ClipFile {
  public:
   ClipFile(const py::object& source, bool recover) {
@@ -136,7 +136,7 @@ class ClipFile {
   std::mutex mutex_;
 };
 
-// Serialises the frames of several threads.
+// A writer for Python. A mutex lets one thread append frames at a time.
 class ClipFileWriter {
   template <class What>
   auto locked(What&& what) {

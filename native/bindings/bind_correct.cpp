@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What goes wrong where expressions meet.
+// Python bindings of author/correct.h: faults of a skin in combined expressions, and their repair.
 #include <algorithm>
 #include <utility>
 
@@ -57,28 +57,29 @@ SkinFaults faults(const Floats& depth, const Floats& stretch, const Floats& fold
 }
 
 void bind_faults(py::module_& m) {
-  py::class_<FaultSums>(m, "FaultSums", "What is worse than allowed, in one number of each kind.")
-      .def_readonly("volume", &FaultSums::volume, "mm3: depth times area.")
-      .def_readonly("deepest", &FaultSums::deepest, "mm beyond what is allowed.")
-      .def_readonly("stretched", &FaultSums::stretched, "Faces of more than 2.5 times their area.")
-      .def_readonly("widest", &FaultSums::widest, "Times its area, of the most stretched of these.")
-      .def_readonly("folded", &FaultSums::folded, "Edges whose faces lie on one another.");
-  py::class_<SkinFaults>(m, "SkinFaults", "What may be wrong with a pose of a skin.")
+  py::class_<FaultSums>(m, "FaultSums", "Sums of the faults beyond the allowed ones.")
+      .def_readonly("volume", &FaultSums::volume, "Depth times area, mm3.")
+      .def_readonly("deepest", &FaultSums::deepest, "Largest depth beyond the allowed one, mm.")
+      .def_readonly("stretched", &FaultSums::stretched, "Faces with over 2.5 times their area.")
+      .def_readonly("widest", &FaultSums::widest, "Largest of these ratios of areas.")
+      .def_readonly("folded", &FaultSums::folded,
+                    "Number of edges whose faces are folded together.");
+  py::class_<SkinFaults>(m, "SkinFaults", "The faults of a posed skin.")
       .def(py::init(&faults), py::arg("depth"), py::arg("stretch"), py::arg("fold"))
       .def_property_readonly(
           "depth", [](const SkinFaults& f) { return array(f.depth); },
-          "float32[V], mm inside of a solid, or of the skin itself.")
+          "float32[V]: depth of each vertex inside a solid or the skin itself, mm.")
       .def_property_readonly(
           "stretch", [](const SkinFaults& f) { return array(f.stretch); },
-          "float32[F], area beside the neutral one.")
+          "float32[F]: area of each face relative to the neutral pose.")
       .def_property_readonly(
           "fold", [](const SkinFaults& f) { return array(f.fold); },
-          "float32[inner edges], cosine between the normals of both faces.");
+          "float32[inner edges]: cosine between the normals of both faces.");
 }
 
 using CheckerClass = py::class_<SkinChecker>;
 
-// The methods that read a skin and change nothing.
+// Binds the methods that only read a skin.
 void bind_looks(CheckerClass& c) {
   c.def_property_readonly(
        "shown",
@@ -88,7 +89,7 @@ void bind_looks(CheckerClass& c) {
          std::ranges::copy(shown, out.mutable_data());
          return out;
        },
-       "bool[V]: what somebody may see; nothing else is asked to stay outside.")
+       "bool[V]: whether a vertex can be visible. Only visible vertices must stay out of solids.")
       .def(
           "nearest",
           [](const SkinChecker& checker, const Doubles& points, const Doubles& normals) {
@@ -105,9 +106,8 @@ void bind_looks(CheckerClass& c) {
             return py::make_tuple(corners, shares, distances);
           },
           py::arg("points"), py::arg("normals"),
-          "uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] shares "
-          "of "
-          "them, float64[n] mm.")
+          "uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] weights "
+          "of the corners, float64[n] distances in mm.")
       .def(
           "look",
           [](const SkinChecker& checker, const Doubles& skin, const std::vector<Doubles>& solids) {
@@ -118,13 +118,13 @@ void bind_looks(CheckerClass& c) {
             }();
             return unwrap(std::move(result));
           },
-          py::arg("skin"), py::arg("solids"), "SkinFaults of a pose.")
+          py::arg("skin"), py::arg("solids"), "Returns the SkinFaults of a pose.")
       .def(
           "sum",
           [](const SkinChecker& checker, const SkinFaults& found, const SkinFaults& allowed) {
             return unwrap(checker.sum(found, allowed));
           },
-          py::arg("faults"), py::arg("allowed"), "FaultSums.");
+          py::arg("faults"), py::arg("allowed"), "Returns FaultSums.");
 }
 
 void bind_repair(CheckerClass& c) {
@@ -145,7 +145,7 @@ void bind_repair(CheckerClass& c) {
         return py::make_tuple(moved, out.before, out.after);
       },
       py::arg("skin"), py::arg("solids"), py::arg("allowed"), py::arg("without"),
-      "float64[V, 3] to be added, FaultSums before and after.");
+      "Returns displacements float64[V, 3] to be added, and FaultSums before and after.");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The layers that versions 2.3 to 2.6 added. Enumerations are the format's numbers.
+// Binds the DNA layers of versions 2.3 to 2.6. Enumerations have the numbers of the format.
 #include "bindings/fields.h"
 
 namespace risorius::bindings {
@@ -181,7 +181,7 @@ void bind_rbf(py::module_& m) {
   parts(ext, "poses", [](auto& s) -> auto& { return s.poses; });
 }
 
-// [J, 3]: translation, rotation, scale.
+// uint16[J, 3]: the representations of translation, rotation and scale, as numbers of the format.
 py::array representations(const dna::JointBehaviorMetadata& s) {
   const auto& list = s.joint_representations;
   py::array_t<std::uint16_t> out({static_cast<py::ssize_t>(list.size()), py::ssize_t{3}});

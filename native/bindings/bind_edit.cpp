@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Operations from Dna to Dna.
+// Binds the functions that make a new Dna from another Dna.
 #include "bindings/fields.h"
 #include "dna/convert/lods.h"
 #include "edit/regroup.h"

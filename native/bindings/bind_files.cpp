@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files that Python writes and that appear only when they are complete.
+// Binds atomic writing: a file gets its name only after Python has written its whole content.
 #include "bindings/numpy_arrays.h"
 #include "bytes/file_write.h"
 #include "bytes/path_text.h"
@@ -17,7 +17,7 @@ namespace {
   throw py::error_already_set();
 }
 
-// Python writes the content; everything else is as in write_file_atomically.
+// Replaces a file atomically as write_file_atomically does, but Python writes the content.
 class FileReplacement {
  public:
   FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {

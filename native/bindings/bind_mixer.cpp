@@ -13,9 +13,9 @@ using CurvesPtr = std::shared_ptr<const clip::LayerCurves>;
 struct PyLayerCurves {
   CurvesPtr curves;
 };
-// controls, weights, delay, attack, hold, release
+// Arguments of a part: controls, weights, delay, attack, hold, release.
 using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, double>;
-// by, of, measure, amount
+// Arguments of a yield: by, of, measure, amount.
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
 // Errors of a mixer are plain ValueErrors, because no file is involved.
@@ -165,7 +165,7 @@ FloatArray mix(clip::Mixer& mixer, double time, const py::object& base, const py
   return result;
 }
 
-// In: base  one frame for all times, or one for each time
+// In: base  [controls] a frame for all times, or [times, controls]
 FloatArray mix_batch(clip::Mixer& mixer, const DoubleArray& times, const py::object& base) {
   if (times.ndim() != 1) shape_error("times", "(n,)", times);
   const auto count = static_cast<py::ssize_t>(mixer.control_count());

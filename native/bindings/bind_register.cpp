@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surfaces laid onto others.
+// Python bindings of register/: closest points, surface registration, sparse Cholesky factors.
 #include <exception>
 #include <functional>
 #include <utility>
@@ -33,7 +33,7 @@ std::vector<registering::Triangle> corners(const Integers& values) {
   std::vector<registering::Triangle> out(static_cast<std::size_t>(values.shape(0)));
   for (std::size_t i = 0; i < out.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
-      // A negative corner becomes a number beyond every vertex, which make refuses.
+      // A negative index becomes larger than any vertex index, and ClosestPoints::make rejects it.
       out[i][k] = static_cast<std::uint32_t>(values.data()[3 * i + k]);
     }
   }
@@ -92,7 +92,7 @@ Doubles solve(const SparseCholesky& factors, const Doubles& right, std::size_t t
 void bind_closest(py::module_& m) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   py::class_<ClosestPoints>(m, "ClosestPoints",
-                            "A surface of triangles that finds its points closest to others.")
+                            "A surface of triangles that finds its closest points to given points.")
       .def(py::init([](const Doubles& points, const Integers& triangles) {
              return unwrap_argument(
                  ClosestPoints::make(vectors(points, "points"), corners(triangles)));
@@ -100,13 +100,13 @@ void bind_closest(py::module_& m) {
            py::arg("points"), py::arg("triangles"))
       .def("nearest", &nearest, py::arg("queries"), py::arg("normals") = py::none(),
            py::arg("least_cosine") = -1.0, py::arg("farthest") = kFar, py::arg("threads") = 0,
-           "int32[n] triangle (-1: none), float64[n, 3] barycentric coordinates, float64[n] "
-           "distance. With normals, only triangles count whose normal has at least that cosine "
-           "with the normal of the query.")
+           "Returns int32[n] triangle (-1: none), float64[n, 3] barycentric coordinates and "
+           "float64[n] distance. With normals, only triangles are considered for which the cosine "
+           "between their normal and the query's normal is at least `least_cosine`.")
       .def("first_hit", &first_hit, py::arg("origins"), py::arg("directions"),
            py::arg("farthest") = kFar, py::arg("threads") = 0,
-           "int32[n] the first triangle on each ray (-1: none), float64[n, 3] barycentric "
-           "coordinates, float64[n] distance from the origin.");
+           "Returns int32[n] the first triangle on each ray (-1: none), float64[n, 3] barycentric "
+           "coordinates and float64[n] distance from the origin.");
 }
 
 registering::Mesh mesh(const Doubles& points, const Integers& triangles) {
@@ -175,7 +175,8 @@ void bind_registration(py::module_& m) {
         py::arg("target_points"), py::arg("target_triangles"), py::arg("pair_vertices"),
         py::arg("pair_points"), py::arg("pair_weights"), py::arg("start"), py::arg("options"),
         py::arg("progress"),
-        "points, triangle, shares, distance, trusted: see risorius.anyhead.registration.");
+        "Returns points, triangle, shares, distance and trusted, see "
+        "risorius.anyhead.registration.");
 }
 
 }  // namespace
@@ -197,7 +198,8 @@ void bind_register(py::module_& m) {
              return unwrap_argument(std::move(made));
            }),
            py::arg("rows"), py::arg("columns"), py::arg("values"), py::arg("size"))
-      .def("solve", &solve, py::arg("right"), py::arg("threads") = 0, "float64[n, sides].");
+      .def("solve", &solve, py::arg("right"), py::arg("threads") = 0,
+           "Returns the solutions float64[n, sides] of the right sides.");
 }
 
 }  // namespace risorius::bindings

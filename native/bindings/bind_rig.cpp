@@ -56,7 +56,7 @@ PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
           copied(pose.controls, {size(pose.controls)})};
 }
 
-// One of two names; raises ValueError for any other.
+// True for the second of two names, False for the first; raises ValueError for any other name.
 bool is_second(const char* name, const std::string& given, const char* first, const char* second) {
   if (given == second) return true;
   if (given == first) return false;
@@ -150,7 +150,7 @@ std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optio
   return std::make_shared<rig::Rig>(unwrap(open()));
 }
 
-// float32[R] or float32[N, R].
+// Converts frames of raw controls: float32[R] or float32[N, R]. Raises ValueError for others.
 FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
   FloatArray in = FloatArray::ensure(raw);
   if (!in) throw py::value_error("raw: an array of numbers was expected");
@@ -162,7 +162,7 @@ FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
   return in;
 }
 
-// [(frame, name, value)]
+// Returns [(frame, name, value)] of the raw controls that are not finite.
 py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
   const FloatArray in = frames_argument(rig, raw);
   const auto frames = static_cast<std::size_t>(in.ndim() == 1 ? 1 : in.shape(0));
@@ -174,7 +174,7 @@ py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
   return out;
 }
 
-// (distances, weights) of a solver's poses.
+// Returns (float64[poses], float32[poses]): distances and weights of a solver's poses.
 py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::object& controls) {
   if (index >= rig.rbf_solvers.size()) {
     throw py::index_error("index: a solver below " + std::to_string(rig.rbf_solvers.size()) +
@@ -189,8 +189,8 @@ py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::objec
   return py::make_tuple(distances, weights);
 }
 
-// The workspaces of this thread for the last few Rigs that it evaluated: making one takes longer
-// than an evaluation, and a kept workspace makes the next evaluation shorter.
+// The workspace of a Rig. Each thread keeps the workspaces of the last 8 Rigs that it evaluated,
+// because making a workspace takes longer than an evaluation.
 rig::Workspace& workspace_of(const rig::Rig& rig) {
   struct Kept {
     std::uint64_t rig;
@@ -216,7 +216,7 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
   const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
-  } else {  // it reads the controls of the frame before, which do not exist
+  } else {  // needs a new workspace, because a kept one has the controls of an earlier frame
     rig::Workspace work = rig::make_workspace(rig);
     rig::evaluate(rig, in.data(), lod, false, work, pose);
   }

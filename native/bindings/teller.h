@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Progress of native work, told to Python.
+// Reports the progress of native work to a Python function.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -8,7 +8,8 @@
 
 namespace risorius::bindings {
 
-/// Told of progress under the GIL; what Python raises there stops the work and is raised again.
+/// Calls the Python function `told` with the progress, under the GIL. An exception of the function
+/// stops the work and is kept in `raised`, to be thrown again by the caller.
 struct Teller {
   pybind11::object told;
   std::exception_ptr raised;

@@ -111,7 +111,7 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   rig::JointGroup group;
   group.row_count = *rows;
   std::vector<std::uint16_t>& outputs = out.joint_outputs;
-  // The rows of a wide group fill whole vectors. The rows added for that have no place in a pose.
+  // The rows of a wide group fill whole vectors. Padding rows are not written to poses.
   const auto fill = [&] {
     if (*rows < simd::kWidest) return;
     outputs.resize(simd::rounded_up(outputs.size()), g.output_indices[0]);

@@ -64,7 +64,7 @@ template <class T>
 Array<T> only(const Array<T>& values, const std::vector<bool>& keep) {
   std::vector<T> out;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (keep[i % keep.size()]) out.push_back(values[i]);  // a matrix: by column
+    if (keep[i % keep.size()]) out.push_back(values[i]);  // `keep` applies to the columns
   }
   return out;
 }
@@ -193,7 +193,7 @@ void drop_layer(std::string_view id, Dna& dna) {
   });
   dna.unread_controls = {};
   const ControlCounts after = control_counts(dna);
-  // Without rbfe each pose is a control, so that there may be more pose controls than before.
+  // Without layer rbfe each pose is a control, so that the number of pose controls may grow.
   dna.unread_controls = {before.psd - after.psd, before.ml - after.ml,
                          before.rbf_pose - std::min(before.rbf_pose, after.rbf_pose)};
 }

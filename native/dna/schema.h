@@ -4,7 +4,6 @@
 //
 // A visitor has
 //   field(name, value)              numbers, texts, Arrays, lists of them, structs with a describe
-// group(name, body)               a struct of the format that Dna lacks; only JSON nests it
 //   group(name, body)               a struct of the format that Dna lacks; only JSON nests it
 //   sized(name, list, mapping)      a list whose elements are preceded by their size; mapping tells
 //                                   which elements a LOD needs, or is null

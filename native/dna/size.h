@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The size of a Dna, by which the limits of later stages are set.
+// The size of a Dna, from which the limits of later stages are computed.
 #pragma once
 
 #include <cstdint>

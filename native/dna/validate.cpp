@@ -547,7 +547,7 @@ void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_setups(c, "twist_swing_behavior.swings", dna.twist_swing_behavior.swings, dna);
 }
 
-// The first error, or the warnings.
+// Fails with the first error among the findings; otherwise adds the findings to `warnings`.
 Status told(std::vector<Finding> findings, std::vector<Warning>& warnings) {
   for (Finding& f : findings) {
     if (f.is_error) return core::Unexpected{std::move(f.error)};

@@ -25,8 +25,8 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // The key of a new group. Groups are written in ascending order of keys, because later rows win.
 struct GroupKey {
   std::uint32_t below;  // higher layers come first
-  // levels: number of LODs, set only if units of one order cannot share a group; else 0. The group
-  // of a bundle has no region.
+  // levels: number of LODs if rows with the same order of columns cannot share a joint group, else
+  // 0. The group of a bundle has no region.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };

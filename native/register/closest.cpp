@@ -45,7 +45,7 @@ ClosestPoints::Hit hit_of(const Nearest::Hit& found) {
 struct ClosestPoints::Impl {
   std::vector<Vec3> points;
   std::vector<Triangle> triangles;
-  std::vector<Vec3> normals;  // of the triangles, of length 1; 0 without an area
+  std::vector<Vec3> normals;  // unit normals of the triangles; 0 for a triangle without area
   std::unique_ptr<Nearest> tree;
 };
 

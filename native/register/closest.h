@@ -27,12 +27,12 @@ class ClosestPoints {
     double distance = std::numeric_limits<double>::infinity();
   };
   struct Limits {
-    double least_cosine = -1.0;  // between the normal of a query and of its triangle
+    double least_cosine = -1.0;  // least cosine between the normals of a query and its triangle
     double farthest = std::numeric_limits<double>::infinity();
     std::size_t threads = 0;  // 0: one for each core
   };
 
-  /// In: points     [V] in any one unit
+  /// In: points     [V] in any unit
   ///     triangles  counter-clockwise seen from outside
   /// Fails: kInvalidValue (a point that is not finite), kInvalidIndex (a corner), kLimitExceeded
   static core::Result<ClosestPoints> make(std::vector<Vector3> points,

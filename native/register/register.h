@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A template surface laid onto a target surface of any topology.
+// Registers a template surface onto a target surface of any topology.
 //
 // Sources: Amberg, Romdhani and Vetter, "Optimal Step Nonrigid ICP Algorithms for Surface
 // Registration" (2007): closest points, a stiffness that decreases, landmarks; Sumner, Schmid and
 // Pauly, "Embedded Deformation for Shape Manipulation" (2007): affine motions of few nodes carry
 // the many vertices; Li, Sumner and Pauly, "Global Correspondence Optimization for Non-Rigid
-// Registration of Depth Scans" (2008): matches that are not trusted; Pottmann et al., "Integral
-// Invariants for Robust Geometry Processing" (2009): how a surface bends, seen over a radius.
+// Registration of Depth Scans" (2008): weights of uncertain matches; Pottmann et al., "Integral
+// Invariants for Robust Geometry Processing" (2009): the bending of a surface within a radius.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ struct Mesh {
 struct Pair {
   std::uint32_t vertex = 0;
   Vector3 point{};
-  double weight = 1.0;  // beside other pairs
+  double weight = 1.0;  // against other pairs, 0 to 1e6
 };
 
 struct RegisterOptions {
@@ -42,39 +42,40 @@ struct RegisterOptions {
   static constexpr std::size_t kMostTriangles = 4'000'000;  // of the target
   static constexpr std::size_t kLeast = 100;                // triangles of either surface
 
-  /// Millimetres of one unit of the template; a head of another size is measured as if it had the
-  /// size of the template.
+  /// Millimetres per unit of the template. The target is scaled to the template's size before
+  /// lengths are compared with limits in mm.
   double mm = 10.0;
-  /// [template vertices] not 0: the vertex has a counterpart on the target, if that is whole there.
-  /// Others are carried along. Empty: every vertex that is not hidden in a cavity has one.
+  /// [template vertices] not 0: the vertex has a counterpart on a target without holes; other
+  /// vertices follow their neighbours. Empty: all vertices outside cavities have a counterpart.
   std::vector<std::uint8_t> trusted;
-  /// [template vertices] the vertex of the other side, itself in the middle; empty: no symmetry.
+  /// [template vertices] the mirror vertex, in the middle the vertex itself; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  /// How much what one side finds counts for the other; 1: as much as what that finds itself.
+  /// Weight of the match of a vertex for its mirror vertex, in shares of that match's weight.
   double symmetry = 0.0;
-  std::size_t nodes = 2000;  // of the first, coarse steps
-  double noise = 2.0;        // mm, of the points of pairs
+  std::size_t nodes = 2000;  // number of nodes of the coarse steps
+  double noise = 2.0;        // expected error of the points of pairs in mm
   std::size_t threads = 0;   // 0: one for each core; the result does not depend on it
 };
 
 struct Registered {
-  std::vector<Vector3> points;         // [template vertices] on the target
-  std::vector<std::int32_t> triangle;  // [template vertices] of the target; -1: none
-  std::vector<Vector3> shares;         // barycentric coordinates in it, sum 1
-  std::vector<double> distance;        // from it, in the target's unit
-  std::vector<std::uint8_t> trusted;   // not 0: the target has this vertex
+  std::vector<Vector3> points;         // [template vertices] positions on the target
+  std::vector<std::int32_t> triangle;  // [template vertices] nearest target triangle; -1: none
+  std::vector<Vector3> shares;         // barycentric coordinates in the triangle, sum 1
+  std::vector<double> distance;        // from the triangle, in the target's unit
+  std::vector<std::uint8_t> trusted;   // not 0: the vertex has a counterpart on the target
 };
 
-/// Told of what is done, 0 to 1; false stops the work.
+/// Receives the finished share of the work, 0 to 1; stops the work if it returns false.
 using Progress = std::function<bool(double)>;
 
-/// Lays a template onto a target.
-/// In: start  [template vertices] the template near the target; empty: what the pairs tell, at
-///            least three that lie on no line
-/// Fails: kInvalidArgument (options, too few triangles or pairs, nothing of the target is near the
-///        start; "stopped" where progress said so), kInvalidLength (start, options), kInvalidIndex
-///        (a corner, a pair's vertex), kInvalidValue (not finite), kLimitExceeded (vertices)
-/// Cost: some 60 bytes for each vertex of the target and 2 kB for each of the template
+/// Registers a template onto a target.
+/// In: start  [template vertices] positions near the target; empty: computed from the pairs, of
+///            which at least three must not lie on a line
+/// Fails: kInvalidArgument (options, too few triangles or pairs, no surface of the target near the
+///        start; "stopped" if progress returned false), kInvalidLength (start, options),
+///        kInvalidIndex (a corner, a pair's vertex), kInvalidValue (not finite), kLimitExceeded
+///        (vertices)
+/// Cost: about 60 bytes per vertex of the target and 2 kB per vertex of the template
 core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
                                           const std::vector<Pair>& pairs,
                                           const std::vector<Vector3>& start,

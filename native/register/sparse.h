@@ -15,9 +15,9 @@ namespace risorius::registering {
 /// The Cholesky factors of a matrix, for many right sides.
 class SparseCholesky {
  public:
-  /// In: rows, columns, values  of the lower triangle; entries at the same place are summed, those
-  ///     above the diagonal are not read
-  ///     size                   of the matrix
+  /// In: rows, columns, values  entries of the lower triangle; entries at the same place are
+  ///                            summed, entries above the diagonal are ignored
+  ///     size                   number of rows of the matrix
   /// Fails: kInvalidLength (lists), kInvalidIndex, kInvalidValue (not finite, or not positive
   ///     definite)
   static core::Result<SparseCholesky> make(std::span<const std::int32_t> rows,
@@ -28,9 +28,9 @@ class SparseCholesky {
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   std::size_t size() const;
-  /// In: right    [size][sides] by rows
-  ///     threads  0: one for each core; the sides are shared among them
-  /// Returns [size][sides]. Fails: kInvalidLength (right)
+  /// In: right    [size][sides] right sides in row-major order
+  ///     threads  0: one for each core; each solves some of the sides
+  /// Returns the solutions [size][sides]. Fails: kInvalidLength (right)
   core::Result<std::vector<double>> solve(std::span<const double> right, std::size_t sides,
                                           std::size_t threads = 0) const;
 

@@ -14,9 +14,9 @@
 namespace risorius::rig {
 
 enum class BlockCheck {
-  kHeader,  // version, sizes and offsets of the arrays: for bytes that this process wrote
-  kHash,    // and the hash, which finds every changed bit: for bytes that this program once wrote
-  kFull,    // and every index against its limit: for bytes of unknown origin, even forged ones
+  kHeader,  // checks version, sizes and offsets of the arrays: for bytes that this process wrote
+  kHash,    // also checks the hash, which finds every changed bit: for files of this program
+  kFull,    // also checks every index: for bytes of unknown origin, even forged ones
 };
 
 /// The joint_values of a Rig whose data has none. They are written straight into the block, because

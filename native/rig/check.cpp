@@ -37,7 +37,7 @@ class IndexCheck {
   Status status() const {
     if (where_ == nullptr) return core::ok();
     return fail(ErrorCode::kInvalidIndex, std::string("rig.") + where_,
-                "an index in it is out of range");
+                "an index in it points outside its range");
   }
 
  private:

@@ -47,7 +47,7 @@ enum class Traversal : std::uint8_t {
 /// same controls are not 0. In a film of 60 frames per second, five frames of six have the active
 /// controls of the frame before.
 struct KeptControls {
-  std::vector<std::uint16_t> controls;  // [controls]: the first count count
+  std::vector<std::uint16_t> controls;  // [controls]: the first `count` entries are valid
   std::size_t count = 0;
   std::uint64_t rig = 0;  // Rig::number; 0: nothing is kept
   std::uint32_t lod = 0;
@@ -79,14 +79,14 @@ struct alignas(128) Workspace {
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
   std::vector<std::uint16_t> firing;    // watched correctives that may not be 0; the first
-  std::size_t firing_count = 0;         // firing_count count
-  bool fires_all = false;               // none of their factors is 0
+  std::size_t firing_count = 0;         // firing_count entries are valid
+  bool fires_all = false;               // true: no factor of the listed correctives is 0
   std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
   std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
   KeptControls listed_for;  // the active controls for which moves and blocks hold
-  // The order for which they hold; for kAdded columns and ends do not.
+  // The traversal for which moves and blocks hold; after kAdded, columns and ends are not valid.
   Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
@@ -98,7 +98,7 @@ struct alignas(128) Workspace {
   std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
-  std::size_t live_count = 0;              // first live_count count
+  std::size_t live_count = 0;              // first live_count entries are valid
   // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes
   // it, so all other blocks are 0 already. Empty: the content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;

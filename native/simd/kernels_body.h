@@ -102,7 +102,7 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
   });
 }
 
-// Adds kWidest values.
+// to = sums + weight * values, for kWidest values.
 template <class T>
 RISORIUS_INLINE void add(V::Reg weight, const T* values, const float* sums, float* to) {
   for (std::size_t l = 0; l < kWidest; l += V::kLanes) {

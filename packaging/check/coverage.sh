@@ -1,21 +1,21 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# coverage.sh: the lines that no test runs, by file and function: of native/ (gcovr) in GoogleTest and in
-# the Python tests, of the package and of the add-on (coverage.py) in those and in the Blender tests of
-# bpy 4.5. Prints the list and leaves it in build/coverage/never_run.txt; why no test runs them is written
-# in docs/development.md. A test that fails is shown, and its lines count. No part of test.sh.
+# coverage.sh: lists the lines that no test runs, by file and function. gcovr counts native/ in GoogleTest and
+# the Python tests. coverage.py counts the package and the add-on in the Python tests and in the Blender tests
+# of bpy 4.5. Prints the list and writes it to build/coverage/never_run.txt; docs/development.md gives the
+# reasons. A failed test is shown, and its lines count. Not part of test.sh.
 set -euo pipefail
 source "$(dirname "$0")/../setup.sh"
 cd "$project"
 out="$project/build/coverage"
 mkdir -p "$out"
-# Left out: minutes of the same few lines, unoptimised.
+# Left out, because they run the same few lines for minutes without optimisation.
 slow=(tests/python/rigs/test_rig_behavior.py tests/python/rigs/test_rig_golden.py
   tests/python/rigs/test_rig_thousand.py tests/faults tests/mutants
   blender_tests/extension/test_hostile.py blender_tests/extension/test_soak.py)
 changed_bytes='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|Changes.*Reads'
 
-# counted FOLDER PROGRAM...: Python with the package of FOLDER, whose lines coverage.py counts
+# counted FOLDER ARGUMENT...: runs Python with the package in FOLDER; coverage.py counts its lines
 counted() {
   local folder=$1
   shift
@@ -34,8 +34,8 @@ build_wheel
 find "$out" -name '*.gcda' -delete
 rm -rf "$out/data" "$out/native_counts" "$out/quick"
 mkdir -p "$out/data" "$out/native_counts" "$out/quick"
-# The package as it lies in the tree: with the module that counts, and with the wheel's for Blender, which
-# ends without a word (os._exit), so that native lines could not be counted in it.
+# Two copies of the package: with the instrumented module, and with the wheel's module for Blender. Blender's
+# tests end with os._exit, so native lines cannot be counted in them.
 cp -r native/python/risorius native/python/risorius_people "$out/native_counts/"
 cp "$(find "$out/native" -name '_native*.so')" "$out/native_counts/risorius/"
 cp -r native/python/risorius native/python/risorius_people "$out/quick/"

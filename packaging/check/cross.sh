@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# cross.sh: native/ for systems and processors that this machine is not. Libraries for macOS and
-# Windows; programs for aarch64 Linux, whose GoogleTests an emulator runs with each instruction set;
-# the bits of the scalar path between compilers, optimisation and processors. Warnings are errors.
+# cross.sh: compiles native/ for other systems and processors: libraries for macOS and Windows, and
+# GoogleTest programs for aarch64 Linux, which an emulator runs with each instruction set. Also compares the
+# bits of the scalar path between compilers, optimisation levels and processors. Warnings are errors.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
-#   cross.sh         what may differ there: see tests/layers/test_processors.py for what may not
-#   cross.sh --all   all libraries for macOS too, and all quick GoogleTests on aarch64
+#   cross.sh         only code that may depend on the processor or system; tests/layers/test_processors.py
+#                    checks that the other folders do not
+#   cross.sh --all   all libraries for macOS too, and all fast GoogleTests on aarch64
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 source "$project/packaging/ship/cross/zig.sh"
@@ -14,9 +15,9 @@ source "$project/packaging/ship/cross/zig.sh"
 out=$cross
 logs="$project/build/logs/cross"
 jobs=$(nproc)
-# Of what asks for the processor, and of what stands on it; the system is the one that the other tests
-# run on. That char is unsigned there is tried by the sanitizers' build. The hostile bytes of hostile_test
-# take minutes here and mean the same everywhere.
+# Tests of code that depends on the processor. Linux itself is tested elsewhere. The sanitizers' build tests
+# that char may be unsigned, as on aarch64. hostile_test is left out, because it takes minutes in the emulator
+# and its bytes have the same meaning on every processor.
 programs=(byte_order_test simd_test rig_test)
 of_macos=(risorius_core risorius_simd risorius_bytes)
 case "${1:-}" in
@@ -26,13 +27,13 @@ case "${1:-}" in
 esac
 failed=0
 
-row() { # row NAME PASSED FAILED; no test at all is a failure
+row() { # row NAME PASSED FAILED: prints a row; zero tests count as a failure
   local bad=$3
   if [ $(($2 + $3)) -eq 0 ]; then bad=1; fi
   [ "$bad" -eq 0 ] || failed=1
   printf 'row\t%s\t%d\t%d\n' "$1" "$2" "$bad"
 }
-works() { # works NAME LOG COMMAND...: one row
+works() { # works NAME LOG COMMAND...: runs the command with its output in LOG, and prints a row
   local name=$1 log="$logs/$2.log"
   shift 2
   if "$@" > "$log" 2>&1; then
@@ -65,10 +66,10 @@ configure() { # configure TARGET FLAGS [OPTION...]
     -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_BUILD_LIBRARY=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_UNITY_BUILD=ON "$@"
 }
-# Warnings need no optimisation and no lines for a debugger, and zig's own checks of undefined behavior
-# would only take time. -c reaches the program that tells CMake what the compiler is: to link it takes
-# minutes.
-build_libraries() { # build_libraries TARGET [LIBRARY...]
+# build_libraries TARGET [LIBRARY...]: compiles without optimisation, debug information and zig's checks of
+# undefined behaviour, because only the warnings count. -c also applies to CMake's test program, which would
+# take minutes to link.
+build_libraries() {
   local target=$1
   shift
   configure "$target" "-c -O0 -g0 -fno-sanitize=undefined" &&
@@ -81,20 +82,21 @@ build_programs() {
 }
 run_programs() {
   local log="$logs/ctest.log" total bad neon
-  # What was not built has a placeholder for a test; patching every byte takes a minute here.
+  # Left out: the placeholder tests of programs that are not built, and a test that takes a minute here.
   ctest --test-dir "$out/aarch64-linux-gnu" -j"$jobs" -E 'NOT_BUILT|EveryPatchedByte' \
     --output-on-failure > "$log" 2>&1
   total=$(grep -oE 'out of [0-9]+' "$log" | grep -oE '[0-9]+' || echo 0)
   bad=$(grep -oE '[0-9]+ tests failed' "$log" | grep -oE '^[0-9]+' || echo 0)
   [ "$bad" -eq 0 ] || tail -n 40 "$log"
   row "GoogleTest, aarch64 in qemu" $((total - bad)) "$bad"
-  # The forced one ran: the test fails unless the rig says that it is NEON.
+  # The test passes only if the rig reports the forced instruction set NEON.
   neon=$(grep -cE 'neon\.ForcedSimd\.EnvironmentReachesTheRig \.+ +Passed' "$log")
   row "NEON was executed" "$neon" 0
 }
 
-# scalar_bits NAME COMPILER FLAGS...: the program of tests/rig with the arithmetic of `sources`
-# compiled so; the rest of it comes from the preset tests. What is of one folder is compiled at once.
+# scalar_bits NAME COMPILER FLAGS...: compiles `sources`, the arithmetic of the scalar path, with these flags,
+# links them with the libraries of preset `tests`, and writes the program's hash to a file. Each folder of
+# native/ is one unit.
 sources=("$out/rig.cpp" "$out/compile.cpp" "$project"/native/simd/kernels_scalar.cpp
   "$project"/tests/rig/scalar_bits.cpp)
 scalar_bits() {
@@ -132,7 +134,7 @@ same_bits() {
 }
 emulator=qemu-aarch64
 aarch64="$out/aarch64-linux-gnu/tests/rig/scalar_bits"
-# Fused operations must be found out, or the equality above means nothing.
+# Checks that fused multiply-add changes the bits. Otherwise the equality above would prove nothing.
 other_bits() {
   sources=("$project"/native/simd/kernels_scalar.cpp "$project"/tests/rig/scalar_bits.cpp)
   scalar_bits fused g++ -O2 -mfma -ffp-contract=fast &&
@@ -144,8 +146,8 @@ step "tools" && install_packages clang-14 googletest g++-aarch64-linux-gnu qemu-
   get_zig x86_64-windows-gnu aarch64-macos x86_64-macos && gather_headers || exit 1
 step "x86_64-windows-gnu"
 works "libraries, x86_64-windows-gnu" x86_64-windows-gnu build_libraries x86_64-windows-gnu
-# The other folders ask for no system and no processor (tests/layers/test_processors.py), and the
-# standard library is the one that Windows had above.
+# The other folders depend on no system and no processor (tests/layers/test_processors.py), and zig has the
+# same standard library for Windows and macOS.
 step "aarch64-macos"
 works "libraries, aarch64-macos" aarch64-macos build_libraries aarch64-macos "${of_macos[@]}"
 step "x86_64-macos"

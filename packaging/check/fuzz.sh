@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# fuzz.sh MINUTES: looks that long for bytes that break the native code, with every target of
-# tests/fuzz, as many at a time as there are cores. fuzz.sh --each SECONDS gives each target so long.
-# Exit code 0 only if nothing was found. What was learnt stays in build/fuzz-corpus.
+# fuzz.sh MINUTES: runs all fuzz targets of tests/fuzz for this total time, one per core in parallel.
+# fuzz.sh --each SECONDS: runs each target for this time. Exit code 0 only if no target found a fault.
+# build/fuzz-corpus keeps the corpus for the next run.
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 
@@ -26,8 +26,8 @@ build_targets() {
     { tail -n 30 "$logs/build.log" && return 1; }
 }
 
-# run_target TARGET SECONDS: its log has the numbers of the table. Short stacks of allocations: full
-# ones take a fourth of the time, and a find is run again anyway.
+# run_target TARGET SECONDS: runs a target; its log has the numbers of the table. Allocation stacks are short,
+# because full stacks take a quarter of the time, and a find is run again anyway.
 run_target() {
   local longest=4400
   case $1 in json) longest=8192 ;; rig) longest=14000 ;; esac
@@ -38,21 +38,22 @@ run_target() {
     "$corpora/$1" "$corpora/seeds/$1" > "$logs/$1.log" 2>&1
 }
 
-# A target with a mistake in it must be found out, or the silence of the others means nothing.
-find_planted() { # find_planted TARGET WORDS
+# find_planted TARGET WORDS: checks that fuzzing finds the fault in a target with a planted fault. Otherwise no
+# finds in the other targets would prove nothing.
+find_planted() {
   rm -f "$finds/$1"-*
   ! run_target "$1" 60 && [ -n "$(ls "$finds/$1"-* 2> /dev/null)" ] &&
     grep -q "broken promise: $2" "$logs/$1.log" && rm -f "$finds/$1"-*
 }
 
-# Faces whose lists multiply each other, once each: too slow to be changed and run again.
+# Runs files whose lists multiply each other once each. They are too slow for mutation.
 run_bombs() {
   limited 300 "$programs/evaluate_fuzz" -timeout=600 -rss_limit_mb=2048 -artifact_prefix="$finds/bombs-" \
     "$corpora/seeds/bombs"/* > "$logs/bombs.log" 2>&1
 }
 
 number() { grep -oE "stat::$2: +[0-9]+" "$logs/$1.log" | grep -oE '[0-9]+$' || echo 0; }
-print_row() { # print_row TARGET: fails when the target found something or did not run
+print_row() { # print_row TARGET: prints a row; fails if the target found a fault or did not run
   local found runs coverage
   found=$(ls "$finds/$1"-* 2> /dev/null | wc -l)
   runs=$(number "$1" number_of_executed_units)

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# hooks.sh: makes .venv where it is missing, and installs the hooks of .pre-commit-config.yaml into this
-# clone: git commit then runs the checks of style.sh. The hooks fetch nothing: they use the tools of .venv.
+# hooks.sh: makes .venv if it is missing, and installs the hooks of .pre-commit-config.yaml into this clone, so
+# that git commit runs the checks of style.sh. The hooks download nothing, because they use the tools of .venv.
 #
 #   hooks.sh            installs the hooks
-#   hooks.sh --all      runs every hook on every file, as the workflow does; installs what a bare Debian lacks
+#   hooks.sh --all      runs all hooks on all files, like the workflow; first installs missing Debian packages
 set -euo pipefail
 source "$(dirname "$0")/../setup.sh"
 cd "$project"

@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# host.sh: the C library as other programs have it. It is installed into an empty folder; the sample
-# host of native/example is built from there with find_package, and run; golden values are compared
-# through ctypes.
+# host.sh: tests the installed C library. Installs it into an empty folder, builds the sample host of
+# native/example against it with find_package, runs the host, and compares golden values through ctypes.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
-#   host.sh             for this machine
-#   host.sh --windows   then for Windows too: compiled by zig, run in wine, whose host has to say the same
+#   host.sh             on this machine
+#   host.sh --windows   also for Windows: compiled by zig and run in wine; the host must print the same text
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 source "$project/packaging/check/works.sh"
@@ -15,7 +14,7 @@ out="$project/build/host"
 logs="$project/build/logs/host"
 golden="$project/tests/data/golden"
 face="$golden/medium.dna"
-run=() # what begins a command that runs a program of the system that was built for
+run=() # prefix of commands that run a built program: empty, or wine
 for_windows=
 case "${1:-}" in
   "") ;;
@@ -23,23 +22,23 @@ case "${1:-}" in
   *) echo "host.sh: $1 is not --windows" >&2 && exit 2 ;;
 esac
 
-# install_library FOLDER [OPTION...]: into FOLDER/prefix
+# install_library FOLDER [OPTION...]: builds the library and installs it into FOLDER/prefix
 install_library() {
   local to=$1
   shift
   rm -rf "$to/prefix"
-  # As preset tests: ccache has these objects.
+  # The options of preset `tests`, so that ccache has the objects.
   cmake -S "$project" -B "$to-library" -G Ninja -DCMAKE_BUILD_TYPE=Release -DRISORIUS_BUILD_BINDINGS=OFF -DCMAKE_UNITY_BUILD=ON \
     -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" &&
     cmake --build "$to-library" -j"${RISORIUS_JOBS:-$(nproc)}" --target risorius_shared risorius_static &&
     cmake --install "$to-library" --prefix "$to/prefix"
 }
-# What a packager would miss: a file more or less. The version of the files is the project's.
-is_whole() { # is_whole FOLDER LIST
+# is_whole FOLDER LIST: checks that the installed files are exactly those of a list in check/host/
+is_whole() {
   (cd "$1/prefix" && find . -type f -o -type l | sed 's|^\./||' | sed -E 's/\.so\.[0-9]+\.[0-9]+\.[0-9]+$/.so.VERSION/' |
     LC_ALL=C sort) | diff - "$project/packaging/check/host/$2"
 }
-# build_example FOLDER [OPTION...]: of what FOLDER/prefix has, and of nothing else
+# build_example FOLDER [OPTION...]: builds the sample host with the library installed in FOLDER/prefix
 build_example() {
   local to=$1
   shift
@@ -47,9 +46,9 @@ build_example() {
   cmake -S "$project/native/example" -B "$to/example" -G Ninja -DCMAKE_BUILD_TYPE=Release \
     -DCMAKE_PREFIX_PATH="$to/prefix" "$@" && cmake --build "$to/example"
 }
-# Both ways of linking say the same, and it is the face of the file.
-example_runs() { # example_runs FOLDER [ENDING]
-  # The scalar path has the same bits whoever compiled it, so its text is the same in every system.
+# example_runs FOLDER [ENDING]: checks that the shared and the static host print the same text on the face
+example_runs() {
+  # The scalar path gives the same bits with every compiler, so the text is the same on every system.
   export RISORIUS_SIMD=scalar
   "${run[@]}" "$1/example/smile_risorius${2:-}" "$face" | tr -d '\r' > "$1/shared.txt" &&
     "${run[@]}" "$1/example/smile_static${2:-}" "$face" | tr -d '\r' > "$1/static.txt" && cat "$1/shared.txt" &&
@@ -59,7 +58,7 @@ example_runs() { # example_runs FOLDER [ENDING]
   unset RISORIUS_SIMD
   return $code
 }
-refuses() { # refuses FOLDER [ENDING]: a file that is cut short, in one sentence and with exit code 1
+refuses() { # refuses FOLDER [ENDING]: checks that a truncated file gives one sentence and exit code 1
   local code
   head -c 3000 "$face" > "$1/cut.dna"
   "${run[@]}" "$1/example/smile_risorius${2:-}" "$1/cut.dna" 2> "$1/refused.txt"
@@ -67,7 +66,7 @@ refuses() { # refuses FOLDER [ENDING]: a file that is cut short, in one sentence
   cat "$1/refused.txt" && [ $code -eq 1 ] && [ "$(wc -l < "$1/refused.txt")" -eq 1 ] &&
     grep -qE '^smile: (truncated|invalid_).* at byte [0-9]+' "$1/refused.txt"
 }
-# The header alone, in C99 and in C++, as strict as compilers are.
+# Checks that the header compiles by itself in C99 and C++11 with strict warnings.
 header_compiles() {
   local header="$out/prefix/include/risorius.h"
   gcc -std=c99 -Wall -Wextra -Wstrict-prototypes -pedantic-errors -Werror -fsyntax-only -x c "$header" &&
@@ -84,7 +83,7 @@ windows_tools() {
 }
 windows_library() {
   local target=x86_64-windows-gnu there="$out/windows" site="$windows/site-host" toolchain run=("$wine")
-  # Ours is compiled as in Release; zig would compile its own C++ library once more to link it so.
+  # -O0 applies to linking only. Otherwise zig would compile its C++ library again for the link step.
   toolchain=(--toolchain "$project/packaging/ship/cross/toolchain.cmake" "-DRISORIUS_TARGET=$target"
     "-DRISORIUS_TOOLS=$tools" -DCMAKE_SHARED_LINKER_FLAGS=-O0 -DCMAKE_EXE_LINKER_FLAGS=-O0)
   mkdir -p "$there"
@@ -95,7 +94,7 @@ windows_library() {
   works "C library, Windows: what is installed" windows-installed is_whole "$there" windows.txt
   works "sample host, Windows: built by find_package" windows-example build_example "$there" "${toolchain[@]}" \
     "-DRISORIUS_PREFIX=$there/prefix" -DCMAKE_C_FLAGS=-fno-sanitize=undefined -DCMAKE_CXX_FLAGS=-fno-sanitize=undefined || return
-  cp "$there/prefix/bin/"*.dll "$there/example/" # where a program finds it
+  cp "$there/prefix/bin/"*.dll "$there/example/" # Windows finds a DLL beside the program
   works "sample host in wine, shared and static" windows-run example_runs "$there" .exe &&
     works "sample host in wine says what it says here" windows-same cmp "$there/shared.txt" "$out/shared.txt"
   works "sample host in wine, a file cut short" windows-refused refuses "$there" .exe

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Run a command until it ends, has used up its CPU seconds, or stands still.
+"""Runs a command with a limit on CPU seconds, and kills it if it hangs.
 
     limits.py CPU_SECONDS COMMAND [ARGUMENT...]
 
-A limit by the clock kills sound programs on a busy machine: beside twenty jobs on two cores, all
-takes ten times as long. CPU seconds count the same on every machine, and a program that waits for
-ever uses none. The limit covers the command and all processes that it starts. The exit code is the
-command's, or 137 (as of `timeout -s KILL`) after a kill, with a sentence on the standard error.
+A limit in wall time would kill working programs on a busy machine: beside twenty jobs on two cores,
+everything takes ten times as long. CPU seconds do not depend on other jobs. A program that waits
+for ever uses no CPU, so a second limit kills it. The limits cover the command and all processes
+that it starts. The exit code is the command's. After a kill it is 137 (like `timeout -s KILL`), and
+a sentence on standard error gives the reason.
 
-Linux counts the seconds of each process (proc(5)). On other systems the limit is ten times as many
-seconds of the clock.
+Linux counts the CPU seconds of each process (proc(5)). On other systems the limit is
+10 * CPU_SECONDS + 300 s of wall time.
 """
 
 from __future__ import annotations
@@ -23,14 +24,15 @@ import time
 from pathlib import Path
 from typing import Any
 
-STILL = 300.0  # seconds by the clock
-LEAST_SHARE = 0.005  # of a core: a process of low priority beside twenty others gets six times that
-LOOK = 1.0  # seconds between two looks
+STILL = 300.0  # wall time in seconds in which a command must use LEAST_SHARE of a core
+# Fraction of a core. A process of low priority beside twenty others gets six times as much.
+LEAST_SHARE = 0.005
+LOOK = 1.0  # seconds between two checks
 KILLED = 128 + 9
 
 
 class Exceeded(subprocess.TimeoutExpired):
-    """The command was killed; `why` says at which limit."""
+    """The command was killed; `why` names the limit."""
 
     def __init__(self, command: object, limit: float, why: str) -> None:
         super().__init__(command, limit)  # type: ignore[arg-type]
@@ -47,13 +49,13 @@ def run(
 
     Args:
         command: program and arguments.
-        cpu: seconds of CPU that it and its children may use together.
-        still: seconds by the clock in which it must use at least 0.5 % of a core.
+        cpu: CPU seconds that the command and its children may use together.
+        still: wall time in seconds in which they must use at least 0.5 % of a core.
         text: whether the output is text.
-        options: of subprocess.Popen; `input` is given to the standard input.
+        options: options of subprocess.Popen; `input` is written to the standard input.
 
     Raises:
-        Exceeded: a limit was reached, and all its processes were killed.
+        Exceeded: a limit was reached, and all processes of the command were killed.
     """
     given = options.pop("input", None)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
@@ -66,7 +68,7 @@ def run(
             with contextlib.suppress(subprocess.TimeoutExpired):
                 out, err = process.communicate(given, timeout=LOOK)
                 return subprocess.CompletedProcess(command, process.returncode, out, err)
-            given = None  # communicate() keeps it
+            given = None  # the first communicate() keeps the input for later calls
             watch.look()
     except BaseException:
         watch.kill()
@@ -74,7 +76,7 @@ def run(
 
 
 class Watch:
-    """Counts the CPU seconds of a process that leads a session of its own."""
+    """Counts the CPU seconds of a process and its descendants. The process must lead a session."""
 
     def __init__(self, process: subprocess.Popen[Any], cpu: float, still: float) -> None:
         self.process, self.cpu, self.still = process, cpu, still
@@ -82,13 +84,13 @@ class Watch:
         self._since, self._then = time.monotonic(), 0.0
 
     def look(self) -> None:
-        """Count once; raises Exceeded when a limit is reached."""
+        """Check the limits once. Raises Exceeded, after killing all processes, at a limit."""
         now = time.monotonic()
         if not _PROC.is_dir():
             if now - self._since > 10 * self.cpu + self.still:
                 self._stop(f"after {now - self._since:.0f} s by the clock")
             return
-        # The sum falls when a child ends that nobody waits for: its seconds were counted before.
+        # The sum falls if a child ends and no process waits for it. Its seconds stay counted.
         total = sum(map(_seconds, _family(self.process.pid).values()))
         self.used, self._total = self.used + max(0.0, total - self._total), total
         if self.used > self.cpu:
@@ -99,7 +101,7 @@ class Watch:
             self._stop(f"it stood still for {self.still:.0f} s, after {self.used:.0f} s of CPU")
 
     def kill(self) -> None:
-        """End the process and all that it started."""
+        """Kill the process and all its descendants."""
         for pid in _family(self.process.pid):
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
@@ -120,7 +122,7 @@ def _own_session() -> dict[str, bool]:
 
 
 def _family(leader: int) -> dict[int, list[str]]:
-    """All processes of a session and all descendants of its leader, with their fields."""
+    """Process id -> fields of _fields(), for a session's processes and its leader's descendants."""
     known: dict[int, list[str]] = {}
     for entry in os.listdir("/proc") if _PROC.is_dir() else ():
         if entry.isdecimal() and (fields := _fields(int(entry))):
@@ -132,22 +134,22 @@ def _family(leader: int) -> dict[int, list[str]]:
 
 
 def _fields(pid: int) -> list[str]:
-    """The fields of /proc/PID/stat behind the program's name; [] if the process is gone."""
+    """The fields of /proc/PID/stat after the program's name; [] if the process has ended."""
     try:
         text = Path(f"/proc/{pid}/stat").read_text(errors="replace")
     except OSError:
         return []
-    # The name may hold blanks and brackets.
+    # The name may contain blanks and brackets.
     return text[text.rindex(")") + 2 :].split()
 
 
 def _seconds(fields: list[str]) -> float:
-    """Seconds of CPU of a process and of its children that have ended."""
+    """CPU seconds of a process and of its children that have ended. Args: fields  of _fields()."""
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def main(arguments: list[str]) -> int:
-    """Run the command line with this process's own input and output."""
+    """Run the command line with the input and output of this process. Returns the exit code."""
     if len(arguments) < 2 or not arguments[0].isdecimal():
         print("limits.py CPU_SECONDS COMMAND [ARGUMENT...]", file=sys.stderr)
         return 2

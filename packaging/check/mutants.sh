@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# mutants.sh PART [--under PATH...] [--count N] [--seed N] [--list] [--programs] [--survivors]: small
-# faults, drawn by a seed, in copies of the sources; which of them does a test see? PART is native,
-# package or scene. The last line counts them. What lived at the last run, and why, is in
-# tests/mutants/survivors.md.
+# mutants.sh PART [--under PATH...] [--count N] [--seed N] [--list] [--programs] [--survivors]: mutation tests.
+# Plants small random faults into copies of the sources, and checks for each whether a test fails. PART is
+# native, package or scene. The last line gives the counts. tests/mutants/survivors.md lists the mutants that
+# survived the last run, with the reasons.
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 make_venv || exit 1

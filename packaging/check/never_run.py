@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Lists the lines that no test ran, by file and function, as gcovr and coverage.py report them.
+"""Lists the lines that no test ran, by file and function, from reports of gcovr and coverage.py.
 
     python packaging/check/never_run.py native.json python.json
 
-Prints for each file its lines that never ran and how many lines it has, then each function with
-such lines; the files of Python that were never imported; a sum for each part of the project.
+Prints the Python files that were never imported. Prints for each file the number of lines that
+never ran and of all lines, then these lines by function. Prints a sum for each part of the project.
 """
 
 from __future__ import annotations
@@ -19,14 +19,21 @@ from pathlib import Path
 from typing import Any
 
 PROJECT = Path(__file__).resolve().parents[2]
-PARTS = {"native": "native/", "package": "native/python/", "add-on": "addon/"}  # and their folders
+# Part of the project -> its folder.
+PARTS = {"native": "native/", "package": "native/python/", "add-on": "addon/"}
 
 _QUIET = re.compile(r"\s*(return \w+;|\}+[;)]*)\s*(//.*)?$")
 
 
 @dataclass
 class File:
-    """A source file: how many of its lines count, and by function those that never ran."""
+    """A source file.
+
+    Attributes:
+        name: path in the project.
+        lines: number of lines with code.
+        never: function -> line numbers that never ran.
+    """
 
     name: str
     lines: int = 0
@@ -34,15 +41,15 @@ class File:
 
     @property
     def missing(self) -> int:
-        """How many lines never ran."""
+        """The number of lines that never ran."""
         return sum(map(len, self.never.values()))
 
 
 def short_name(function: str) -> str:
-    """A C++ function without its arguments, namespaces and what a lambda is called by.
+    """The name of a C++ function without arguments, template arguments and namespaces.
 
     Args:
-        function: the demangled name, e.g. "risorius::dna::(anonymous namespace)::read(int)".
+        function: demangled name, such as "risorius::dna::(anonymous namespace)::read(int)".
     """
     name = re.sub(r"\[abi:\w+\]|\(anonymous namespace\)::", "", function)
     name = re.sub(r"\{lambda.*", "lambda", name)
@@ -53,14 +60,15 @@ def short_name(function: str) -> str:
 
 
 def _only_cleans_up(source: list[str], number: int, before: int) -> bool:
-    """Whether a line runs without being counted: `return out;` and `}` after a statement that ran.
+    """Whether a line is `return name;` or `}` after a statement that ran.
 
-    The compiler makes the result in its place, so these hold only what an exception would run.
+    The compiler constructs the result in the caller's memory. Such a line then contains only code
+    for exceptions, so its count is 0 although it runs.
 
     Args:
         source: the lines of the file.
-        number: of the line in question, from 1.
-        before: of the counted line before it.
+        number: number of the line, from 1.
+        before: number of the preceding counted line if that ran, otherwise 0.
     """
     if not 0 < before < number <= len(source):
         return False
@@ -70,7 +78,7 @@ def _only_cleans_up(source: list[str], number: int, before: int) -> bool:
 
 
 def native_files(report: dict[str, Any]) -> list[File]:
-    """The files of a JSON report of gcovr; a line ran if it did in any build of its function."""
+    """The files of a JSON report of gcovr. Counts of all instances of a function are added."""
     files = []
     for told in report["files"]:
         ran: Counter[int] = Counter()
@@ -105,7 +113,7 @@ def python_files(report: dict[str, Any]) -> list[File]:
 
 
 def ranges(lines: Iterable[int]) -> str:
-    """Line numbers in words: "3-5, 9"."""
+    """Line numbers as text, for example "3-5, 9"."""
     spans: list[list[int]] = []
     for line in sorted(lines):
         if spans and line == spans[-1][1] + 1:
@@ -116,12 +124,12 @@ def ranges(lines: Iterable[int]) -> str:
 
 
 def part_of(name: str) -> str:
-    """The part of the project that a file belongs to; `native/python` is within `native`."""
+    """The part of the project to which a file belongs. The longest matching folder counts."""
     return max((p for p in PARTS if name.startswith(PARTS[p])), key=lambda p: len(PARTS[p]))
 
 
 def told(files: list[File]) -> str:
-    """The whole list as text."""
+    """The list of lines that never ran, as text."""
     out, lines, missing = [], Counter[str](), Counter[str]()
     for file in sorted(files, key=lambda f: f.name):
         lines[part_of(file.name)] += file.lines
@@ -135,7 +143,7 @@ def told(files: list[File]) -> str:
 
 
 def never_imported(files: list[File]) -> list[str]:
-    """The Python files of the project that no report knows."""
+    """The Python files of the project that no report contains."""
     known = {file.name for file in files}
     found = (p for part in ("package", "add-on") for p in (PROJECT / PARTS[part]).rglob("*.py"))
     return sorted(set(p.relative_to(PROJECT).as_posix() for p in found) - known)

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Runs the commands of a page of docs/ in its order, in a folder of their own.
+"""Runs the commands of a page of docs/ in their order, in a separate folder.
 
 python packaging/check/replay.py docs/authoring.md [FOLDER]
 
-Blocks of TOML that begin with a file's name are written, blocks of commands are run line by line
-with the `risorius` beside this Python; what needs the project's tree (python tests/...) is named
-and left out. What a page begins with is made first: the head of docs/authoring.md is the formula's
-face of face_shapes.py, in tests/python/support; those of docs/anyhead.md are packaging/films/
-any_heads.py's, and in the end there is a sheet of each face, to be looked at.
+A TOML block that begins with `# NAME.toml` is written to that file. Blocks of commands are run line
+by line with the `risorius` beside this Python. Lines that need the project's tree (python
+tests/...) are printed and skipped. The input files of a page are made first: the file
+tests/python/support/face_shapes.py makes the head of docs/authoring.md, the file
+packaging/films/any_heads.py makes the heads of docs/anyhead.md. For docs/anyhead.md, a sheet of
+each face is drawn at the end for visual inspection.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 def formula_face(folder: Path) -> None:
-    """The head of docs/authoring.md. Args: folder  where it is written."""
+    """Write the input head of docs/authoring.md into a folder."""
     sys.path.insert(0, str(PROJECT / "tests" / "python" / "support"))
     import face_shapes
 
@@ -34,14 +35,14 @@ def formula_face(folder: Path) -> None:
 
 
 def any_heads(folder: Path) -> None:
-    """Heads, a face and a word that is said, of docs/anyhead.md. Args: folder  for all of them."""
+    """Write the input files of docs/anyhead.md into a folder: heads, a voice and the sample man."""
     films = PROJECT / "packaging" / "films"
     subprocess.run([sys.executable, str(films / "any_heads.py"), str(folder)], check=True)
     shutil.copy(PROJECT / "build" / "sample" / "man.dna", folder)
 
 
 def sheets(folder: Path) -> None:
-    """A picture of each face that was made, and of all as they speak. Args: folder  has them."""
+    """Draw a sheet of each DNA file in a folder, a sheet of all, and a sheet of all speaking."""
     maker = [sys.executable, str(PROJECT / "packaging" / "films" / "any_heads_sheet.py")]
     faces = [str(face) for face in sorted(folder.glob("*.dna"))]
     for face in faces:
@@ -51,7 +52,7 @@ def sheets(folder: Path) -> None:
     subprocess.run([*maker, *spoken], check=True)
 
 
-# By the name of the page: what comes before it, and after it.
+# Name of a page -> (function that makes its input files, function that runs after its commands).
 AROUND = {"authoring.md": (formula_face, None), "anyhead.md": (any_heads, sheets)}
 
 
@@ -61,11 +62,11 @@ def blocks(text: str) -> list[tuple[str, str]]:
 
 
 def run(line: str, folder: Path) -> int:
-    """A command of the page; its output is shown.
+    """Run a command of the page and show its output. Returns the exit code.
 
     Args:
-        line: as it stands there.
-        folder: where it runs.
+        line: the command line.
+        folder: working folder.
     """
     print(f"$ {line}", flush=True)
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])

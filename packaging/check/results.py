@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Reads the reports of pytest and CTest, and prints the table that packaging/test.sh ends with.
+"""Reads the reports of pytest and CTest, and prints the table at the end of packaging/test.sh.
 
     python packaging/check/results.py rows NAME REPORT.xml EXIT [--files FILE ...]
-        the rows of one program of tests, to be appended to its lane's file: how many tests passed,
-        failed and were not run, and why not. A crash, a report without a test and a test file of
-        which no test was collected are failures
+        prints the rows of one test program for its lane's file: the numbers of passed, failed and
+        not run tests, and the reasons for the latter. A crash, a report without tests, and a test
+        file without a collected test are failures
     python packaging/check/results.py table FOLDER LANE ...
-        the table of what the lanes wrote into FOLDER/LANE; exit code 1 if anything failed or a lane
-        ended early
+        prints the table of the rows in FOLDER/LANE; exit code 1 if a test failed or a lane ended
+        early
 
-A row is one line: its kind, then its fields, divided by tabs: `row NAME PASSED FAILED NOT_RUN`,
+A row is one line: its kind, then its fields, separated by tabs: `row NAME PASSED FAILED NOT_RUN`,
 `say TEXT`, `time STAGE SECONDS CPU_SECONDS`, and `end` once at the end of a lane.
 """
 
@@ -24,14 +24,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 PASSED, FAILED, NOT_RUN = "passed", "failed", "not run"
-# What a test case of a JUnit report holds if it did not pass. pytest writes an expected failure as
-# skipped; CTest has `disabled` too.
+# Child elements of a JUnit test case that did not pass. pytest writes an expected failure as
+# skipped; CTest also writes `disabled`.
 _OUTCOMES = {"failure": FAILED, "error": FAILED, "skipped": NOT_RUN, "disabled": NOT_RUN}
 
 
 @dataclass(frozen=True)
 class Case:
-    """One test: its dotted module and class, its name, its outcome, and why it was not run."""
+    """One test: its dotted module and class, its name, its outcome, and the reason if not run."""
 
     module: str
     name: str
@@ -55,7 +55,7 @@ def read(report: Path) -> list[Case]:
         report: the XML file of pytest (--junitxml) or CTest (--output-junit).
 
     Returns:
-        A case for each test; none where the file is missing or cut off, as after a crash.
+        A case for each test; none if the file is missing or truncated, for example after a crash.
     """
     try:
         tree = ElementTree.parse(report)
@@ -71,19 +71,19 @@ def read(report: Path) -> list[Case]:
 
 
 def _uncollected(cases: list[Case], files: list[Path]) -> list[Path]:
-    # pytest lets no two files of one run have the same name, so the name is enough.
+    # The name is enough, because pytest forbids two files with the same name in one run.
     seen = {part for case in cases for part in case.module.split(".")}
     return [file for file in files if file.stem not in seen]
 
 
 def rows(name: str, report: Path, code: int, files: list[Path] | None = None) -> list[str]:
-    """The rows of one program of tests.
+    """The rows of one test program.
 
     Args:
         name: the row's name in the table.
-        report: its JUnit report.
-        code: its exit code; other than 0 is a failure, whatever the report says.
-        files: test files of which at least one test must be in the report each.
+        report: the program's JUnit report.
+        code: the program's exit code; any other than 0 is a failure even if all tests passed.
+        files: test files; the report must contain at least one test of each.
 
     Returns:
         Lines for the lane's file, without line ends.
@@ -110,14 +110,14 @@ def _lane(path: Path) -> list[list[str]]:
 
 
 def table(folder: Path, lanes: list[str]) -> tuple[list[str], int]:
-    """The closing table.
+    """The table at the end of test.sh.
 
     Args:
-        folder: where the lanes wrote their rows.
-        lanes: the lanes that must have come to their end.
+        folder: folder of the lanes' files.
+        lanes: names of the lanes; a lane without the row `end` counts as failed.
 
     Returns:
-        Its lines, and how many tests, tools and lanes failed.
+        The lines of the table, and the number of failed tests, tools and lanes.
     """
     lines, said, times = [], [], []
     passed = failed = 0

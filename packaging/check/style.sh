@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# style.sh: the checks that read files and run nothing of the project: style, format, types, and which
-# folder may use which. test.sh, the hooks of .pre-commit-config.yaml and the workflows call this script.
-# The tools are those of .venv, in the versions of requirements.txt.
+# style.sh: runs the static checks: style, format, types, and the rules on imports between folders. test.sh,
+# the hooks of .pre-commit-config.yaml and the workflows call this script. It uses the tools of .venv, in the
+# versions of requirements.txt.
 #
-#   style.sh            all checks; exit code 1 if one of them failed
-#   style.sh CHECK...   these checks alone
-#   style.sh --list     the names of the checks, one a line
+#   style.sh            runs all checks; exit code 1 if one fails
+#   style.sh CHECK...   runs these checks only
+#   style.sh --list     prints the names of the checks, one per line
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 cd "$project" || exit 1
@@ -22,7 +22,7 @@ check() { # check NAME
     clang-format)
       find native tests \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs -0 "$bin/clang-format" --dry-run -Werror
       ;;
-    # The package as it lies here, not the wheel that is installed.
+    # MYPYPATH makes mypy check the package in the tree instead of the installed wheel.
     mypy-package) MYPYPATH="$project/native/python" "$bin/mypy" --no-error-summary -p risorius -p risorius_people ;;
     mypy-logic)
       "$bin/mypy" --no-error-summary --explicit-package-bases --follow-imports=silent addon/risorius/logic

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# tidy.sh [FILE...]: clang-tidy (exact version in quality_requirements.txt, checks in .clang-tidy) over
-# native/, or over these files. Exit code 0 only if it found nothing. No part of test.sh.
+# tidy.sh [FILE...]: runs clang-tidy (version in quality_requirements.txt, checks in .clang-tidy) on native/ or
+# on the given files. Exit code 0 only if it reports nothing. Not part of test.sh.
 set -euo pipefail
 source "$(dirname "$0")/../setup.sh"
 cd "$project"

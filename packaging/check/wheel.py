@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Tries a released wheel on this system, as its users have it: installs it and runs its tests.
+"""Tests a released wheel on this system: installs it and runs its tests.
 
     wheel.py WHEELS [--report FILE] [-- PYTEST ARGUMENTS]
 
 WHEELS is the folder that wheels.sh fills. The running Python (3.11 or newer) makes a venv in
-build/, and pip takes the wheel that fits. Then the wheel's own checks run, and the Python tests
-that ship/cross/tests_of_the_system.txt names. Works on Linux, Windows and macOS. Exit code 0 only
-if all passed.
+build/, and pip installs the wheel for this Python and system. Then the wheel's self-test and the
+Python tests of ship/cross/tests_of_the_system.txt run. Works on Linux, Windows and macOS. Exit code
+0 only if all passed.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parents[2]
 PACKAGING = PROJECT / "packaging"
 WITH_TESTS = ["pytest", "python-osc", "threadpoolctl", "xxhash", "matplotlib", "colorama"]
-# Blender's own: 1.26 up to Blender 5.0. Windows on ARM has wheels from 2.3 on.
+# Python version -> NumPy's version. Blender up to 5.0 has NumPy 1.26. NumPy has wheels for Windows
+# on ARM since 2.3.
 NUMPY = {(3, 11): "1.26.4"}
 NEWER_NUMPY = "2.3.5"
 
 
 def constraints() -> list[str]:
-    """The versions of requirements.txt, but for NumPy's, which depends on the Python."""
+    """Pinned versions of requirements.txt, with NumPy's version for this Python and system."""
     pinned = (PACKAGING / "requirements.txt").read_text(encoding="utf-8").splitlines()
     on_arm = os.environ.get("PROCESSOR_ARCHITECTURE") == "ARM64"
     numpy = NEWER_NUMPY if on_arm else NUMPY.get(sys.version_info[:2], NEWER_NUMPY)
@@ -36,14 +37,14 @@ def constraints() -> list[str]:
 
 
 def make_python(wheels: Path, folder: Path) -> Path:
-    """Make a venv with the wheel that fits the running Python, and with what the tests need.
+    """Make a venv with the wheel for this Python and the packages that the tests need.
 
     Args:
-        wheels: folder of released wheels.
-        folder: of the venv; what was there goes.
+        wheels: folder of the wheels.
+        folder: folder of the venv; an existing one is deleted.
 
     Returns:
-        The program of the venv.
+        Path of the venv's Python.
     """
     shutil.rmtree(folder, ignore_errors=True)
     venv.create(folder, with_pip=True)
@@ -59,12 +60,12 @@ def make_python(wheels: Path, folder: Path) -> Path:
 
 
 def tests(python: Path, report: Path, arguments: list[str]) -> int:
-    """Run pytest with the wheel of a venv; the exit code is pytest's.
+    """Run pytest in a venv. Returns pytest's exit code.
 
     Args:
-        python: the program of the venv.
-        report: where the JUnit report goes.
-        arguments: of pytest; without one, the tests of what a system may do otherwise.
+        python: path of the venv's Python.
+        report: path of the JUnit report.
+        arguments: arguments of pytest; if empty, the tests of tests_of_the_system.txt run.
     """
     named = (
         (PACKAGING / "ship" / "cross" / "tests_of_the_system.txt")
@@ -82,7 +83,7 @@ def tests(python: Path, report: Path, arguments: list[str]) -> int:
 
 
 def main() -> int:
-    """Install, check, test."""
+    """Install the wheel, run its self-test, and run the tests."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("wheels", type=Path, metavar="WHEELS")
     parser.add_argument("--report", type=Path, metavar="FILE")

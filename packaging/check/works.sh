@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-# Sourced after setup.sh by scripts whose every step is one row, `row<TAB>name<TAB>passed<TAB>failed`:
-# $logs is where the steps' output lies, and failed is 1 once a step did not work.
+# Sourced after setup.sh by scripts that print a row `row<TAB>name<TAB>passed<TAB>failed` for each step. $logs
+# is the folder of the steps' output. `failed` becomes 1 if a step fails.
 failed=0
 
-works() { # works NAME LOG COMMAND...: one row
+works() { # works NAME LOG COMMAND...: runs a command with its output in $logs/LOG.log, and prints a row
   local name=$1 log="$logs/$2.log" good=1
   shift 2
   "$@" > "$log" 2>&1 || good=0

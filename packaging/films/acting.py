@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The performance of the demo: what each control does when. Data, no Blender.
+"""The acting of the demo as data: keyframes of controls and bones. Does not need Blender.
 
-A track is control: [(frame, value), ...]; a name that ends in * stands for both sides or all four
-lip quarters. Frames are at 24 a second.
+A track is control: [(frame, value), ...]. A name that ends in * stands for both sides or all four
+lip quarters. The frame rate is 24 frames per second.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ LAST_FRAME = 96
 BLINKS = [9, 25, 64]
 
 TRACKS = {
-    # Looks to one side, the eyes lead and the head follows; then back to us.
+    # Looks to one side and back. The eyes lead and the head follows.
     "eyeLookLeft*": [(12, 0), (15, 0.75), (24, 0.35), (29, 0.3), (32, 0), (96, 0)],
     "eyeLookUp*": [(12, 0), (16, 0.25), (24, 0.15), (31, 0), (96, 0)],
     "browRaiseIn*": [(30, 0), (35, 0.55), (42, 0.25), (50, 0.1), (58, 0.35), (64, 0), (96, 0)],
@@ -127,7 +127,7 @@ TRACKS = {
     "noseNostrilDilate*": [(64, 0), (70, 0.4), (76, 0.8), (96, 0.6)],
 }
 
-# Rotations in degrees (x nods, y tilts to a shoulder, z turns) of the bones that animators turn.
+# Bone -> (frame, rotation in degrees); x nods, y tilts to a shoulder, z turns.
 BONES = {
     "head": [
         (1, (0, 0, 0)),
@@ -154,7 +154,7 @@ BONES = {
     ],
 }
 
-# Moments for the contact sheet: frame, what it shows.
+# (frame, caption) of the pictures of the contact sheet.
 SHEET = [
     (1, "neutral"),
     (11, "blink"),
@@ -168,7 +168,13 @@ SHEET = [
 
 
 def expand(name: str, available: set[str], prefix: str) -> list[str]:
-    """The character's controls that a track's name stands for; empty when it has none."""
+    """The names of the character's controls that a track moves; empty if the character lacks them.
+
+    Args:
+        name: name of a track; with * at the end it stands for all sides and quarters.
+        available: full names of the character's controls.
+        prefix: prefix of these names.
+    """
     if not name.endswith("*"):
         return [prefix + name] if prefix + name in available else []
     stem = prefix + name[:-1]
@@ -179,7 +185,7 @@ def expand(name: str, available: set[str], prefix: str) -> list[str]:
 def tracks(
     available: set[str], prefix: str = "CTRL_expressions."
 ) -> tuple[dict[str, list[tuple[float, float]]], list[str]]:
-    """Keys by control name, and the names of tracks that this character lacks."""
+    """Control name -> keyframes, and the names of the tracks without a control of the character."""
     out: dict[str, list[tuple[float, float]]] = {}
     missing = []
     blinks = [(1.0, 0.0)]

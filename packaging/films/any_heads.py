@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Heads without expressions, of people that no rig was made of: what docs/anyhead.md begins with.
+"""Makes the input heads of docs/anyhead.md: heads without expressions and without a rig.
 
 any_heads.py FOLDER    writes scan.obj, stylised.obj and avatar.glb, and voice.wav with its sounds
                        said.tsv; needs bpy and the data of the sample people
 
-scan.obj has noise and holes, as a scanner leaves them; stylised.obj large eyes, a small jaw and few
-polygons; avatar.glb a head, two eyes and teeth as meshes of their own. All were remeshed: no vertex
-of these heads is one of a sample person.
+scan.obj has noise and holes like a scan. stylised.obj has large eyes, a small jaw and few polygons.
+avatar.glb has separate meshes for head, eyes and teeth. The head meshes are remeshed, so they share
+no topology with a sample person.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ WORN = replace(
 
 
 def meshes_of(person: Person, source: Source) -> dict[str, tuple[Doubles, Faces]]:
-    """The meshes of a person at rest, in centimetres with y up: points and polygons by name.
+    """The meshes of a person in the neutral pose: mesh name -> (positions in cm, polygons).
 
     Args:
-        person: of PEOPLE, or another.
-        source: the data.
+        person: a person of PEOPLE or a changed copy.
+        source: the data of the sample people. The axes have y up.
     """
     dna, _parts, _body = assemble(source, lambda _share: None, person)
     out = {}
@@ -65,11 +65,12 @@ def meshes_of(person: Person, source: Source) -> dict[str, tuple[Doubles, Faces]
 def remeshed(
     points: Doubles, faces: Faces, *modifiers: tuple[str, dict[str, object]]
 ) -> tuple[Doubles, Faces]:
-    """What modifiers of Blender make of a mesh.
+    """Apply Blender modifiers to a mesh. Returns its positions and polygons.
 
     Args:
-        points, faces: the mesh.
-        modifiers: kind and settings of each.
+        points: vertex positions, float64[V, 3].
+        faces: vertex indices of each polygon.
+        modifiers: (type of modifier, its settings), applied in this order.
     """
     mesh = bpy.data.meshes.new("head")
     mesh.from_pydata(points.tolist(), [], faces)
@@ -88,7 +89,13 @@ def remeshed(
 
 
 def scan(points: Doubles, faces: Faces, seed: int = 4) -> tuple[Doubles, Faces]:
-    """Triangles with noise of 0.1 mm and five holes, none between eyes and mouth."""
+    """A mesh like a scan: noise of 0.1 mm, and five holes in the rear 60 % of its polygons.
+
+    Args:
+        points: vertex positions, float64[V, 3], cm.
+        faces: vertex indices of each polygon.
+        seed: seed of noise and holes.
+    """
     points, faces = remeshed(
         points, faces, ("SUBSURF", {"levels": 1, "subdivision_type": "SIMPLE"}),
         ("DECIMATE", {"ratio": 0.25}),
@@ -104,7 +111,7 @@ def scan(points: Doubles, faces: Faces, seed: int = 4) -> tuple[Doubles, Faces]:
 
 
 def _used(points: Doubles, faces: Faces) -> tuple[Doubles, Faces]:
-    """A mesh without the vertices that no polygon has."""
+    """The mesh without unused vertices."""
     used = np.unique(np.concatenate([np.array(face) for face in faces]))
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
@@ -129,7 +136,7 @@ def drawn(meshes: dict[str, tuple[Doubles, Faces]]) -> tuple[Doubles, Faces]:
 
 
 def avatar(meshes: dict[str, tuple[Doubles, Faces]]) -> list[dict[str, object]]:
-    """A head of triangles, eyes and teeth, named as avatars have them."""
+    """Meshes of triangles for head, eyes and teeth, with the usual names of game avatars."""
     head = remeshed(*meshes[HEAD], ("SUBSURF", {"levels": 1}), ("DECIMATE", {"ratio": 0.12}))
     named = {"Wolf3D_Head": head, "EyeLeft": meshes["eyeLeft_lod0_mesh"]}
     named |= {"EyeRight": meshes["eyeRight_lod0_mesh"], "Wolf3D_Teeth": meshes["teeth_lod0_mesh"]}
@@ -144,14 +151,20 @@ def _triangles(faces: Faces) -> list[list[int]]:
 
 
 def write_obj(path: Path, points: Doubles, faces: Faces) -> None:
-    """A mesh as an OBJ file. Args: path; points, faces  of the mesh."""
+    """Write a mesh as an OBJ file.
+
+    Args:
+        path: the file.
+        points: vertex positions, float64[V, 3].
+        faces: vertex indices of each polygon, from 0.
+    """
     lines = ["v {:.5f} {:.5f} {:.5f}".format(*point) for point in points]
     lines += ["f " + " ".join(str(vertex + 1) for vertex in face) for face in faces]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def write_voice(folder: Path) -> None:
-    """A hum of a second and a half, and the sounds of the word that it stands for."""
+    """Write voice.wav, a hum of 1.5 s, and said.tsv, the times of ten phonemes."""
     sounds = ("sil", "HH", "AH", "L", "OW", "M", "AA", "M", "AA", "sil")
     rows = [f"{0.15 * n:.2f}\t{0.15 * (n + 1):.2f}\t{sound}\t1\t" for n, sound in enumerate(sounds)]
     text = "\n".join(["begin\tend\tphoneme\tconfidence\tword", *rows]) + "\n"
@@ -163,7 +176,7 @@ def write_voice(folder: Path) -> None:
 
 
 def write_all(folder: Path) -> None:
-    """All three heads. Args: folder  it is made if it is not there."""
+    """Write the three heads and the voice into a folder, which is made if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     write_voice(folder)
     source = Source(fetch(offline=True))

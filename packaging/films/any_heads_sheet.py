@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A face in five expressions and sixteen controls, as one sheet that somebody looks at.
+"""Draws a sheet of faces for visual inspection, in clay and without Blender. Needs Pillow.
 
-any_heads_sheet.py FACE.dna... [CLIP.rzc] OUT.png    needs Pillow; drawn without Blender, in clay
+any_heads_sheet.py FACE.dna... [CLIP.rzc] OUT.png
 
-Of several faces each has a row of the five expressions; with a clip, a row of seven of its moments.
+One face: five expressions and sixteen single controls. Several faces: one row of the five
+expressions for each face. With a clip: one row of seven frames of the clip for each face.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from risorius.solving.surface import Surface
 
 PREFIX = "CTRL_expressions."
 BOTH = ("L", "R")
-# Controls of both sides without L and R, then those of the whole face.
+# Expression -> prefix of raw controls -> value; raw_of() adds the endings such as L, R, UL and DR.
 EXPRESSIONS = {
     "neutral": {},
     "smile": {"mouthCornerPull": 1, "eyeCheekRaise": 0.6, "eyeSquintInner": 0.4},
@@ -36,16 +37,22 @@ CONTROLS = (
     *("browRaiseIn", "browDown", "eyeSquintInner", "eyeLookDown"),
 )
 _COLUMNS = 7
-_COLOURS = (  # by parts of the names of meshes: their colour beside clay
+_COLOURS = (  # (part of a mesh name, colour factor RGB); other meshes are clay
     ("teeth", (1.2, 1.15, 1.0)), ("tongue", (1.1, 0.6, 0.6)), ("gums", (1.1, 0.55, 0.55)),
     ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)),
 )  # fmt: skip
-# What is nothing without its picture: glass, wet edges, cards of lashes and hair.
+# Parts of the names of meshes that need a texture with alpha, so the sheet leaves them out.
 _CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva", "lash", "hair", "brows")
 
 
 def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
-    """float32[R], raw controls; a name stands for all that begin so and end with sides and lips."""
+    """float32[R]: values of the raw controls.
+
+    Args:
+        dna: the face.
+        row: name -> value. A name also sets the controls with up to two more letters, such as L,
+            R, UL or DR.
+    """
     names = [name.removeprefix(PREFIX) for name in dna.raw_control_names]
     out = np.zeros(len(names), np.float32)
     for wanted, value in row.items():
@@ -57,7 +64,7 @@ def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
 
 
 class Face:
-    """The meshes of LOD 0, ready to be drawn."""
+    """Draws the meshes of LOD 0 of a face."""
 
     def __init__(self, path: str) -> None:
         self.dna = risorius.load(path)
@@ -75,7 +82,11 @@ class Face:
         self._frame = self._face()
 
     def _face(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top of a picture: by the eyes, which stay where they are."""
+        """Left, right, bottom and top of a picture, cm.
+
+        The eye meshes determine the frame, because expressions do not move them. A face without
+        them uses the bounds of all points. Also sets self._depth.
+        """
         eyes = [
             np.asarray(self.dna.meshes[m].positions).mean(axis=0)
             for side in ("eyeleft", "eyeright")
@@ -86,7 +97,7 @@ class Face:
         else:
             points = self._points({})
             middle, apart = points.mean(axis=0), 0.3 * float(np.ptp(points[:, 0]))
-        self._depth = float(middle[2]) - 0.4 * apart  # about which the head is turned
+        self._depth = float(middle[2]) - 0.4 * apart  # z of the axis about which the head is turned
         across = 1.45 * apart
         return middle[0] - across, middle[0] + across, middle[1] - 2.2 * apart, middle[1] + apart
 
@@ -111,7 +122,13 @@ class Face:
         return np.concatenate([self._seen.positions(raw, m) for m in self._meshes]).astype(float)
 
     def picture(self, row: dict[str, float], size: int, turn: float = 0.3) -> Image.Image:
-        """The face seen a little from its left. Args: row  of controls; size, turn  radians."""
+        """Draw the face from the side.
+
+        Args:
+            row: name -> value of controls, as for raw_of().
+            size: size of the picture, pixels.
+            turn: turn about the vertical axis, radians.
+        """
         points, triangles = self._points(row), np.concatenate(self._triangles)
         c, s = np.cos(turn), np.sin(turn)
         middle = np.array([(self._frame[0] + self._frame[1]) / 2, 0.0, self._depth])
@@ -126,7 +143,12 @@ class Face:
 
 
 def put(rows: list[list[tuple[str, Image.Image]]], out: str) -> None:
-    """Pictures in rows, with what each shows. Args: rows; out  path of the sheet."""
+    """Write a sheet of pictures with captions.
+
+    Args:
+        rows: (caption, picture) of each cell, by rows.
+        out: path of the sheet.
+    """
     first = rows[0][0][1]
     wide, high = first.width, first.height + 22
     whole = Image.new("RGB", (wide * max(map(len, rows)), high * len(rows)), (38, 41, 46))
@@ -141,7 +163,13 @@ def put(rows: list[list[tuple[str, Image.Image]]], out: str) -> None:
 
 
 def sheet(path: str, out: str, size: int = 260) -> None:
-    """All pictures of a face. Args: path  of its file; out  of the sheet; size  of a picture."""
+    """Write a sheet of one face in all expressions and controls.
+
+    Args:
+        path: the DNA file.
+        out: path of the sheet.
+        size: size of a picture, pixels.
+    """
     face = Face(path)
     shown = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
     pictures = [(name, face.picture(row, size)) for name, row in shown.items()]
@@ -149,7 +177,13 @@ def sheet(path: str, out: str, size: int = 260) -> None:
 
 
 def beside(paths: list[str], out: str, size: int = 260) -> None:
-    """A row of expressions for each of several faces. Args: paths, out, size  as for sheet."""
+    """Write a sheet with a row of expressions for each face.
+
+    Args:
+        paths: the DNA files.
+        out: path of the sheet.
+        size: size of a picture, pixels.
+    """
     rows = []
     for path in paths:
         face, stem = Face(path), Path(path).stem
@@ -158,13 +192,13 @@ def beside(paths: list[str], out: str, size: int = 260) -> None:
 
 
 def speaking(paths: list[str], clip: str, out: str, size: int = 200) -> None:
-    """A row of moments of a clip for each face.
+    """Write a sheet with a row of seven frames of a clip for each face.
 
     Args:
-        paths: of DNA files.
-        clip: path of the animation.
-        out: of the sheet.
-        size: of a picture.
+        paths: the DNA files.
+        clip: path of the clip.
+        out: path of the sheet.
+        size: size of a picture, pixels.
     """
     take, rows = risorius.Clip.load(clip), []
     for path in paths:

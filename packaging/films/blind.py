@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Old and new pictures on one sheet in random order, for eyes that shall not know which is which.
+"""Puts old and new pictures on one sheet in random order, for a blind comparison.
 
     blind.py SHEET.jpg KEY.json --old FOLDER --new FOLDER [--size 512] [--columns 4] [--seed N]
 
-Pictures are paired by their file names. The sheet bears numbers only; what each is stands in the
-key, which whoever judges does not open.
+Only file names that both folders contain are used. The sheet labels pictures with numbers. KEY.json
+maps each number to "old" or "new" and to the file name; the judge must not open it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ LABEL = 28
 
 
 def pairs(old: Path, new: Path) -> list[tuple[str, Path]]:
-    """("old" or "new", picture) of every name that both folders have.
+    """("old" or "new", path) for both pictures of every file name that both folders contain.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the folders share no file name.
     """
     names = sorted({p.name for p in old.iterdir()} & {p.name for p in new.iterdir()})
     names = [name for name in names if name.lower().endswith((".png", ".jpg"))]
@@ -36,7 +36,7 @@ def pairs(old: Path, new: Path) -> list[tuple[str, Path]]:
 
 
 def sheet(pictures: Sequence[Path], size: int, columns: int) -> Image.Image:
-    """The pictures, each as large as all others, under their numbers from 1."""
+    """Returns one image with all pictures, each `size` pixels wide and high, numbered from 1."""
     rows = -(-len(pictures) // columns)
     out = Image.new("RGB", (columns * size, rows * (size + LABEL)), (24, 26, 30))
     draw, font = ImageDraw.Draw(out), ImageFont.load_default(size=18)

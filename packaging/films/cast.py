@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One action on six people, each at three levels of detail, in one scene.
+"""Renders one action on several faces, each at several levels of detail, in one scene.
 
 cast.py -- --extension ZIP --out FOLDER --face FILE ... [--lods 0 2 5] [--only FRAME ...]
 """
@@ -21,14 +21,14 @@ import scene as stage  # noqa: E402
 from mathutils import Vector  # noqa: E402
 from performance import must  # noqa: E402
 
-# Metres from face to face, to the right and down. Shirts are wider and longer: who stands lower
-# stands nearer, and every second one of a row farther away, which a camera without perspective
-# does not show.
+# Distance between faces in metres, to the right and down. Shirts are wider and longer than a cell,
+# so faces would intersect. Lower rows therefore stand nearer to the camera, and every second face
+# of a row stands farther away. The orthographic camera does not show these depths.
 CELL = Vector((0.38, 0.0, 0.36))
 NEARER, FARTHER = 0.7, 0.35
-RAISED = 0.035  # of the picture's middle: room for hair
-RESOLUTION = 168, 160  # pixels of a cell; a film has even sides
-STEP = 2  # frames of the acting between two of the film
+RAISED = 0.035  # metres by which the camera is raised, to leave room for hair
+RESOLUTION = 168, 160  # pixels of a cell; both even, because H.264 needs even sides
+STEP = 2  # frames of the acting per frame of the film
 
 
 def parse():
@@ -42,11 +42,11 @@ def parse():
 
 
 def import_face(path, lod):
-    """The control armature of a face with one level of detail, its materials those of games.
+    """Import a face with one level of detail and simple materials. Returns its control armature.
 
     Args:
-        path: of the DNA file.
-        lod: the level.
+        path: the DNA file.
+        lod: index of the level of detail.
     """
     levels = [i == lod for i in range(8)]
     must(
@@ -58,12 +58,12 @@ def import_face(path, lod):
 
 
 def place(controls, column, row):
-    """Moves a face so that its middle is that of a cell.
+    """Moves a face so that the middle of its bounds is in the middle of a cell.
 
     Args:
-        controls: its control armature.
-        column: from the left.
-        row: from the top.
+        controls: the face's control armature.
+        column: column of the cell, 0 at the left.
+        row: row of the cell, 0 at the top.
     """
     low, high = stage.bounds(controls.users_collection[0])
     cell = Vector((column * CELL.x, column % 2 * FARTHER - row * NEARER, -row * CELL.z))
@@ -72,11 +72,11 @@ def place(controls, column, row):
 
 
 def share_action(controls, first):
-    """Gives a face the action of another, as it is.
+    """Assigns the action of one face to another face, unchanged.
 
     Args:
-        controls: its control armature.
-        first: that of the other.
+        controls: control armature of the face that gets the action.
+        first: control armature of the face that has the action.
     """
     data = controls.animation_data_create()
     data.action = first.animation_data.action
@@ -87,11 +87,11 @@ def share_action(controls, first):
 
 
 def build_stage(columns, rows):
-    """A camera without perspective, and suns, which light all faces alike.
+    """Add an orthographic camera and sun lights, because both treat all faces alike.
 
     Args:
-        columns: of faces.
-        rows: of faces.
+        columns: number of columns of faces.
+        rows: number of rows of faces.
     """
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -123,7 +123,7 @@ def render(args):
             demo.still(args.out / f"still_{frame:04d}.png", frame)
         return
     frames = range(1, acting.LAST_FRAME + 1, STEP)
-    # At this size more samples look alike.
+    # At this resolution, more samples make no visible difference.
     stage.render_frames(stage.empty_folder(args.out / "frames"), frames, samples=4)
 
 

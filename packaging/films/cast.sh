@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# The six sample people, each at three levels of detail, by one action: builds them, keys the demo's
-# acting on the first, and gives all others that very action. Leaves a film in build/cast.
+# Renders the six sample people, each at three levels of detail, with one action. Builds the people, keys
+# the demo's acting on the first face, and assigns the same action to the others. Leaves a film in
+# build/cast.
 set -euo pipefail
 source "$(dirname "$0")/film.sh"
 

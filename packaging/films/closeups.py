@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Close-ups of faces in both engines: eye, mouth, brow, ear, hairline, the face. One picture each.
+"""Renders close-ups of faces in Cycles and EEVEE: eye, mouth, brow, ear, hairline, whole face.
 
 closeups.py -- --extension ZIP --out FOLDER FILE.dna [...] [--engine cycles eevee]
     [--view eye mouth ...] [--size PIXELS] [--samples N] [--cards]
 
-Leaves FOLDER/<file>_<view>_<engine>.png, and a sheet of each engine: a row for each face.
+Writes FOLDER/<file>_<view>_<engine>.png, and FOLDER/<engine>.jpg with one row for each face.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ import scene as stage  # noqa: E402
 from compare import sheet  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-GROWN = 0.063  # metres between the eyes of the head that the numbers are made for
-# Where the camera looks and where it stands, in mm from between the eyes, or from between the lips;
-# the lens in mm.
+GROWN = 0.063  # metres between the eyes of an adult head, to which VIEWS refers
+# View -> (origin, target of the camera, place of the camera, focal length in mm). Target and place
+# are in mm from the point between the eyes; with "teeth" the origin has the height of the teeth.
 VIEWS = {
     "eye": ("eyes", (32, -5, 0), (32, -180, 4), 60),
     "mouth": ("teeth", (0, 0, 0), (0, -200, 8), 70),
@@ -53,7 +53,7 @@ def parse():
 
 
 def middle(collection, part):
-    """The middle of the meshes with that in their names, in world space."""
+    """World space mean of the bounding box corners of the meshes with `part` in their names."""
     meshes = [o for o in collection.all_objects if o.type == "MESH" and part in o.name]
     corners = [o.matrix_world @ Vector(corner) for o in meshes for corner in o.bound_box]
     return sum(corners, Vector()) / len(corners)
@@ -63,8 +63,8 @@ def look(collection, view):
     """Put the scene's camera in front of a part of a face.
 
     Args:
-        collection: the face's.
-        view: one of VIEWS.
+        collection: collection with the face's meshes.
+        view: key of VIEWS.
     """
     eyes = [middle(collection, name) for name in ("eyeLeft", "eyeRight")]
     scale = (eyes[0] - eyes[1]).length / GROWN / 1000
@@ -80,18 +80,23 @@ def look(collection, view):
 
 
 def use_engine(name):
-    """Render with one of ENGINES, of which each Blender knows one name."""
+    """Choose the render engine.
+
+    Args:
+        name: key of ENGINES. Blender versions differ in the identifiers of engines, so the first
+            identifier that this Blender has is taken.
+    """
     scene = bpy.context.scene
     known = [item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items]
     scene.render.engine = next((e for e in ENGINES[name] if e in known), ENGINES[name][0])
 
 
 def pictures(path, args):
-    """The files of a face, by engine and by view.
+    """Render all views of a face. Returns engine -> view -> path of the picture.
 
     Args:
         path: the DNA file.
-        args: of parse.
+        args: parsed command line arguments, from parse().
     """
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
@@ -102,7 +107,7 @@ def pictures(path, args):
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
-        # In EEVEE a strand is a pixel wide at least, which makes brows too heavy.
+        # EEVEE draws strands at least one pixel wide, so brows would look too heavy.
         bpy.ops.risorius.set_strands(enable=engine == "cycles" and not args.cards)
         for view in args.view:
             begin = time.monotonic()

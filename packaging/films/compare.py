@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Faces side by side in the same expressions: what joints do beside what shapes did.
+"""Renders a sheet of several faces in the same expressions, for example joints beside blend shapes.
 
 compare.py -- --extension ZIP --out SHEET.jpg --face NAME=FILE.dna [...] [--size PIXELS]
     [--combined | --only EXPRESSION [...]] [--close]
 
-One row for each face, one column for each expression, or (--combined) for combinations that go
-wrong without correctives, or for some of both; needs Pillow beside bpy.
+The sheet has one row for each face and one column for each expression. --combined shows
+combinations that look wrong without correctives; --only chooses single columns. Needs Pillow
+beside bpy.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ import scene as stage  # noqa: E402
 from PIL import Image, ImageDraw, ImageFont  # noqa: E402
 
 LEFT_RIGHT = ("L", "R")
-EXPRESSIONS = {  # controls of both sides without L and R; of the whole face
+# Name -> (controls of both sides, without L and R; controls without a side), each with its value.
+EXPRESSIONS = {
     "neutral": ({}, {}),
     "smile": ({"mouthCornerPull": 1, "eyeCheekRaise": 0.6, "eyeSquintInner": 0.4}, {}),
     "blink": ({"eyeBlink": 1}, {}),
@@ -52,7 +54,7 @@ FOLDS = {
     "grin": ({"mouthCornerPull": 1, "eyeCheekRaise": 1, "eyeSquintInner": 0.6}, {}),
     "chin": ({"jawChinRaiseD": 1, "jawChinRaiseU": 0.5}, {}),
 }
-# Where the camera looks: a share of the height above the lowest point, and how near.
+# (height of the target as a fraction of the face's bounds, focal length as a factor of 100 mm)
 MOUTH, EYES, FACE = (0.54, 2.4), (0.69, 2.8), (0.65, 1.8)
 LOOKS = dict(zip(COMBINED, [(0.57, 1.6), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
 TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
@@ -71,12 +73,12 @@ def parse():
 
 
 def set_expression(controls, name, expressions):
-    """Put a face into one of the expressions.
+    """Pose a face in one of the expressions.
 
     Args:
-        controls: its control armature.
-        name: of the expression.
-        expressions: what each is.
+        controls: the face's control armature.
+        name: key of `expressions`.
+        expressions: controls and values of each expression, as EXPRESSIONS.
     """
     both, whole = expressions[name]
     values = {f"{control}{side}": v for control, v in both.items() for side in LEFT_RIGHT} | whole
@@ -93,9 +95,9 @@ def look_at(collection, share, near):
     """Turn the camera to a part of a face.
 
     Args:
-        collection: the face's.
-        share: of its height above the lowest point, where the part is.
-        near: how many times as large as in a portrait it is seen.
+        collection: collection with the face's meshes.
+        share: height of the target as a fraction of the meshes' bounds, 0 at the lowest point.
+        near: magnification relative to a focal length of 100 mm.
     """
     low, high = stage.bounds(collection)
     camera = bpy.context.scene.camera
@@ -106,14 +108,14 @@ def look_at(collection, share, near):
 
 
 def render_row(path, folder, size, expressions, close):
-    """Pictures of a face in all expressions, as files by expression.
+    """Render a face in all expressions. Returns expression -> path of the picture.
 
     Args:
-        path: of the DNA file.
-        folder: where the pictures go.
-        size: of a picture, pixels.
-        expressions: what each is.
-        close: show the face alone in those that have no part of it to look at.
+        path: the DNA file.
+        folder: folder of the pictures.
+        size: width and height of a picture, pixels.
+        expressions: controls and values of each expression, as EXPRESSIONS.
+        close: magnify the face (FACE) in expressions that LOOKS does not list.
     """
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
@@ -132,11 +134,11 @@ def render_row(path, folder, size, expressions, close):
 
 
 def sheet(rows, size):
-    """The pictures as one, with what each row and column is.
+    """Returns one image with all pictures and with labels for rows and columns.
 
     Args:
-        rows: by face the pictures by expression.
-        size: of a picture, pixels.
+        rows: face -> expression -> path of the picture.
+        size: width and height of a picture on the sheet, pixels.
     """
     label = max(22, size // 12)
     font = ImageFont.load_default(size=label * 0.62)

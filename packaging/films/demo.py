@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The demo inside Blender: install the extension, import the face, key the acting, save, render.
+"""The demo inside Blender: installs the extension, imports the face, keys the acting, renders.
 
 demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
@@ -21,8 +21,8 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 from progress import Progress  # noqa: E402
 
-# Pixels of a side of the film's frames, and frames of the acting between two of them: all from
-# nothing within ten minutes on two cores, of which the compiler takes three.
+# Width and height of the film in pixels, and frames of the acting per frame of the film. Chosen so
+# that demo.sh takes ten minutes on two cores, three of them for the compiler.
 FILM, STEP = 288, 2
 
 
@@ -43,7 +43,7 @@ def timed(title, action):
 
 
 def import_face(path):
-    """The control armature of the imported character."""
+    """Import a DNA file. Returns the control armature of the character."""
     before = set(bpy.data.objects)
     result = bpy.ops.risorius.import_dna(filepath=str(path))
     if result != {"FINISHED"}:
@@ -64,7 +64,7 @@ def turn(bone, degrees):
 
     Args:
         bone: the pose bone.
-        degrees: about x, y and z.
+        degrees: angles about x, y and z in degrees.
     """
     bone.rotation_mode = "XYZ"
     to_bone = bone.bone.matrix_local.to_3x3().inverted()
@@ -99,7 +99,13 @@ def act(controls):
 
 
 def still(path, frame, size=None):
-    """A picture of a frame. Args: size  of its sides, pixels; None: as the scene says."""
+    """Render one frame to a file.
+
+    Args:
+        path: the picture.
+        frame: frame of the scene.
+        size: width and height in pixels; None keeps the scene's resolution.
+    """
     scene = bpy.context.scene
     scene.frame_set(frame)
     if size is not None:
@@ -111,7 +117,7 @@ def still(path, frame, size=None):
 def film(folder, frames):
     scene = bpy.context.scene
     scene.render.resolution_x = scene.render.resolution_y = FILM
-    # Measured at 480 px: 3.6 CPU-seconds a frame; 10 samples take 5 and look alike.
+    # 6 samples take 3.6 CPU seconds per frame at 480 px. 10 samples take 5 s and look alike.
     stage.render_frames(folder, frames, samples=6)
 
 

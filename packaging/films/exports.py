@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What leaves Blender, beside the original: the sample person exported four ways, read back by a
-fresh Blender each and rendered on one sheet.
+"""Renders a sheet that compares the face in Blender with its exports to glTF, FBX, USD and Alembic.
+
+Each export is imported and rendered by a fresh Blender process.
 
 exports.py -- --extension ZIP --dna FILE --out FOLDER [--size PIXELS]
 """
@@ -21,8 +22,8 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
-STUDIO = "studio.blend"  # the original's, in which the others stand too
-FRAMES = (37, 51)  # a smile; an open mouth with the teeth in it
+STUDIO = "studio.blend"  # the studio of the original, reused to render the imported files
+FRAMES = (37, 51)  # a smile; an open mouth that shows the teeth
 
 
 def parse():
@@ -81,7 +82,13 @@ def read(args):
 
 
 def clothe(folder):
-    """Alembic holds no materials but the names of their faces; their images lie beside it."""
+    """Give the materials of an Alembic import the exported images.
+
+    Alembic files contain only material names, so the images are read from a folder beside the file.
+
+    Args:
+        folder: images named <material>_color and <material>_roughness.
+    """
     for material in bpy.data.materials:
         material.use_nodes = True
         tree = material.node_tree

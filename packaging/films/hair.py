@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""Hair on a band of cloth, by geometry nodes: what is simulated is the band."""
+"""Hair by geometry nodes along a band of cloth. Blender simulates the band, not the hairs."""
 
 from __future__ import annotations
 
 import bpy
 
 MM = 0.001
-EACH = 44  # hairs along one edge of the band
-REACH = (2.6 * MM, 2.2 * MM, 2.0 * MM)  # how far a hair may lie beside its edge
-SPREAD = ((0.0, 0.85), (0.3, 1.0), (0.75, 0.8), (1.0, 0.45))  # of that, from root to tip
-ROOTS, TIPS = (0.0, 0.07), (0.72, 1.0)  # where a hair begins and ends, as shares of its edge
+EACH = 44  # number of hairs per edge of the band
+REACH = (2.6 * MM, 2.2 * MM, 2.0 * MM)  # largest offset of a hair from its edge in x, y, z, metres
+SPREAD = ((0.0, 0.85), (0.3, 1.0), (0.75, 0.8), (1.0, 0.45))  # (fraction from root to tip, x REACH)
+ROOTS, TIPS = (0.0, 0.07), (0.72, 1.0)  # ranges of a hair's start and end, fractions of its edge
 RADIUS = 0.09 * MM
 
 
 def add(tree, kind, inputs=(), **settings):
-    """A node of a tree. Args: inputs  (name or number, value) of its sockets."""
+    """Add a node to a node tree and return it.
+
+    Args:
+        tree: the node tree.
+        kind: the node's type, for example "NodeGroupInput".
+        inputs: (name or index of an input socket, default value) pairs.
+        settings: attributes of the node.
+    """
     node = tree.nodes.new(kind)
     for key, value in settings.items():
         setattr(node, key, value)
@@ -24,13 +31,13 @@ def add(tree, kind, inputs=(), **settings):
 
 
 def chance(tree, low, high, seed):
-    """A socket with a random number of each hair."""
+    """Returns an output socket: a random number per hair between `low` and `high`."""
     node = add(tree, "FunctionNodeRandomValue", [(2, low), (3, high), ("Seed", seed)])
     return node.outputs[1]
 
 
 def offset(tree):
-    """A socket with how far each point lies beside its edge: wide in the middle of a hair."""
+    """Returns an output socket: each point's offset from its edge, REACH scaled by SPREAD."""
     place = add(tree, "FunctionNodeRandomValue", data_type="FLOAT_VECTOR")
     place.inputs["Min"].default_value = [-r for r in REACH]
     place.inputs["Max"].default_value = REACH
@@ -55,7 +62,7 @@ def grow(band, material):
 
     Args:
         band: an object whose mesh has the attribute `along` at the edges that hairs follow.
-        material: of the hairs.
+        material: the material of the hairs.
     """
     tree = bpy.data.node_groups.new("Hair", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Twenty seconds of one person who reads a letter: emotions, speech, gaze, blinks, idle life.
+"""Renders a film of twenty seconds in which one person reads a letter.
 
-All acting comes from operators of the extension, and from a bone and an Empty that an animator
-turns and moves. What happens when stands in monologue_acting.py.
+The acting has emotions, speech, gaze, blinks and idle life. The extension's operators make all of
+the acting except the head bone's turns and the looked-at Empty, which have keyframes.
+monologue_acting.py contains the times.
 
 monologue.py -- --extension ZIP --dna FILE --voices WAV ... --out FOLDER [--size N]
-                [--only [FRAME ...]]      stills of these frames, or of those of the sheet
+                [--only [FRAME ...]]      stills of these frames, by default of SHEET
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def go_to(seconds):
 
 
 def add_moods(controls):
-    """Expressions, each keyed where it has come and where it begins to go."""
+    """Key each mood's expression at the begin and the end of its time."""
     for begin, end, name, strength, flip in acting.MOODS:
         for seconds in (begin, end):
             go_to(seconds)
@@ -53,7 +54,7 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """One corner of the mouth is drawn up by its skin, by one slider, before both smile."""
+    """Drag one corner of the mouth up by its vertex, with a single control, and key the result."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex, way = corner_of_mouth(path)
@@ -62,8 +63,14 @@ def add_smirk(path):
 
 
 def corner_of_mouth(path):
-    """Mesh and vertex that the character's left smile moves most, and where to, in metres of the
-    scene (DNA: centimetres, y up), by the extension's package."""
+    """The vertex that mouthCornerPullL moves most.
+
+    Args:
+        path: the DNA file.
+
+    Returns: mesh index, vertex index, and the displacement in metres with z up; the DNA file has
+        centimetres and y up.
+    """
     import risorius
 
     dna = risorius.load(path)
@@ -79,7 +86,7 @@ def corner_of_mouth(path):
 
 
 def add_speech(controls, voices):
-    """Each line a layer over the moods: lips go with the words and the mood stays seen."""
+    """Add a layer for each spoken line. The blend mode ADD keeps the mood below visible."""
     for (seconds, _speed, text), voice in zip(acting.LINES, voices, strict=True):
         start = float(frame_at(seconds))
         must(
@@ -98,7 +105,7 @@ def add_speech(controls, voices):
 
 
 def add_life(controls):
-    """Blinks where they belong, and what a face does all the time."""
+    """Add the blinks, a layer of idle life, a startle and a swallow."""
     for seconds in acting.BLINKS:
         go_to(seconds)
         must(bpy.ops.risorius.blink(kind="LAYER", close=2.0, hold=1.0, open=4.0))
@@ -112,7 +119,7 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """Between the eyes, and how high such a head is: four times as far as they are apart."""
+    """The point between the eyes, and the head's height: four times the eyes' distance. Metres."""
     rig = next(
         thing
         for thing in controls.users_collection[0].objects
@@ -123,7 +130,7 @@ def eyes_of(controls):
 
 
 def come_nearer(controls):
-    """The face fills the frame, as one films somebody who reads a letter."""
+    """Move the camera nearer, so that the face fills the frame."""
     eyes, height = eyes_of(controls)
     middle = eyes + Vector((0, 0, -0.12 * height))
     camera = bpy.context.scene.camera
@@ -132,7 +139,7 @@ def come_nearer(controls):
 
 
 def add_gaze(controls):
-    """The eyes follow an Empty, which goes from the letter to whoever listens."""
+    """Let the eyes follow an Empty that is keyed between the letter and a listener."""
     eyes, height = eyes_of(controls)
     letter = bpy.data.objects.new("Looked At", None)
     letter.empty_display_size = 0.04 * height
@@ -146,7 +153,7 @@ def add_gaze(controls):
 
 
 def turn_head(controls):
-    """The head bone, keyed as animators do; the neck takes its share by itself."""
+    """Key the head bone. The rig turns the neck by a part of the head's turn."""
     head = controls.pose.bones["head"]
     for seconds, degrees in acting.TURNS:
         demo.turn(head, degrees)

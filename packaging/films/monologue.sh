@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Twenty seconds of one person who reads a letter, made by the extension's operators alone:
-# expressions, three lines of speech by espeak-ng, a gaze that follows something, blinks, a dragged
-# smirk, idle life. Leaves a film with sound and the .blend in build/monologue.
+# Renders a film of twenty seconds in which one person reads a letter. The acting uses the extension's
+# operators: expressions, three lines of speech by espeak-ng, a gaze that follows an Empty, blinks, a
+# dragged smirk, idle life. Leaves a film with sound and the .blend in build/monologue.
 #
 #   ./packaging/films/monologue.sh [--size PIXELS] [--only [FRAME...]]      --only: stills, no film
 set -euo pipefail

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The acting of the monologue: what is said, felt and looked at when. Data, no Blender.
+"""The acting of the monologue as data: speech, moods, gaze and turns. Does not need Blender.
 
-python monologue_acting.py      prints the lines: milliseconds, words a minute, text, by tabs
+python monologue_acting.py      prints a line of milliseconds, words per minute and text, separated
+                                by tabs, for each line of speech
 """
 
 from __future__ import annotations
@@ -9,16 +10,16 @@ from __future__ import annotations
 FRAME_RATE = 24
 LAST_FRAME = 480  # twenty seconds
 
-# What is said from which second on, and how many words a minute.
+# Spoken lines: (start in seconds, words per minute, text).
 LINES = [
     (2.3, 140, "There it is. I almost do not dare to look."),
     (8.0, 165, "They said yes. They really said yes!"),
     (13.6, 125, "I only wish he could have heard it."),
 ]
 
-INTENSITY = 0.75  # of the speech, which lies on a mouth that a mood has moved already
+INTENSITY = 0.75  # of the speech; below 1, because a mood has already moved the mouth
 
-# Seconds from which a mood has come, and until which it stays: expression, strength, mirrored.
+# Moods: (first and last second at full strength, expression, strength, mirrored).
 MOODS = [
     (0.0, 0.6, "relief", 0.15, False),
     (1.4, 4.6, "doubt", 0.7, False),
@@ -28,17 +29,17 @@ MOODS = [
     (13.4, 16.6, "sadness", 0.8, False),
     (18.2, 20.0, "smile_closed", 0.45, False),
 ]
-SMIRK = 0.45  # of the way that the corner of the mouth goes in a full smile
-NEARER = 0.62  # of the studio's distance, at which the camera stands
+SMIRK = 0.45  # fraction of the displacement of the mouth's corner in a full smile
+NEARER = 0.62  # the camera's distance as a fraction of the studio's
 BLINKS = [0.9, 4.9, 6.8, 12.8, 15.2, 17.2]
 
-# Where the eyes look: seconds, place beside, in front of and above them, in heights of the head.
+# Targets of the gaze: (second, (beside, in front of, above the eyes)) in heights of the head.
 LOOKS = [
     (0.0, (1.6, 2.6, 0.1)),
     (1.1, (1.6, 2.6, 0.1)),
     (1.3, (0.3, 2.0, -0.8)),  # the letter
     (3.6, (0.3, 2.0, -0.8)),
-    (3.8, (-0.3, 3.0, 0.15)),  # whoever listens
+    (3.8, (-0.3, 3.0, 0.15)),  # the listener
     (4.8, (-0.3, 3.0, 0.15)),
     (5.0, (0.2, 2.0, -0.8)),
     (5.6, (0.5, 2.0, -0.82)),
@@ -52,7 +53,7 @@ LOOKS = [
     (17.3, (-0.1, 3.0, 0.05)),
     (20.0, (-0.1, 3.0, 0.05)),
 ]
-# Degrees that the head nods, tilts to a shoulder, and turns.
+# (second, rotation of the head in degrees): nod, tilt to a shoulder, turn.
 TURNS = [
     (0.0, (-2, 0, 10)),
     (1.2, (-1, 0, 9)),

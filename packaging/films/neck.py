@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A head at its limits without and with neck poses, one picture.
+"""Renders one picture of a head at the limits of its turns, without and with neck poses.
 
 neck.py -- --extension ZIP --out FOLDER FILE.dna [--size PIXELS] [--samples N]
 
-Leaves FOLDER/neck.jpg: a row of the file as it is and a row of the file with the poses that
-neck_poses.py gives it, and FOLDER/poses.dna.
+Writes FOLDER/neck.jpg and FOLDER/poses.dna. The first row shows the given file. The second row
+shows poses.dna, the same face with the poses of neck_poses.py.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def turn(controls, bone, angles):
 
 
 def pictures(path, args):
-    """The files of a face, by what its head does."""
+    """Render a face in the poses of SHOWN. Returns pose -> path of the picture."""
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
     controls = demo.import_face(path)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Neck poses for a head that has none: what its neck does at the limits of its turns.
+"""Adds RBF neck poses to a head without them: corrective shapes at the limits of the neck's turns.
 
-The head gets the twelve raw controls of its joints, an RBF solver of them as a MetaHuman's is,
-and a channel for each pose. The shapes are made by rule: the skinned neck is smoothed where joints
-share it, and the muscles from the skull to the breastbone stand out, which stretch or shorten.
+The head gets twelve raw controls, the quaternions of neck_01, neck_02 and head. It also gets an
+RBF solver that reads these controls, like the solvers of a MetaHuman, and a blend shape channel for
+each pose. The shapes follow rules: the skin that several joints share is smoothed, and the muscles
+from the skull to the breastbone are raised as ridges.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from risorius.rigs.joint_controls import (
     turned_joints,
 )
 
-# Yaw to the left, pitch up and roll to the left of neck and head, radians.
+# Pose -> (yaw to the left, pitch up, roll to the left) of neck and head, radians.
 LIMITS = {
     "left": {"neck": (0.6, 0.0, 0.0), "head": (0.6, 0.0, 0.0)},
     "right": {"neck": (-0.6, 0.0, 0.0), "head": (-0.6, 0.0, 0.0)},
@@ -32,7 +33,7 @@ LIMITS = {
     "tilt left": {"neck": (0.0, 0.0, 0.3), "head": (0.0, 0.0, 0.35)},
     "tilt right": {"neck": (0.0, 0.0, -0.3), "head": (0.0, 0.0, -0.35)},
 }
-# How far the muscles of the left and the right side stand out in each pose, and the throat, cm.
+# Pose -> height of the ridges of the left muscle, the right muscle and the throat, cm.
 MUSCLES = {
     "left": (-0.2, 1.3, 0.2),
     "right": (1.3, -0.2, 0.2),
@@ -41,17 +42,17 @@ MUSCLES = {
     "tilt left": (-0.3, 1.2, 0.2),
     "tilt right": (1.2, -0.3, 0.2),
 }
-ROUNDS = 24  # of smoothing
-WIDTH = 1.3  # of a muscle, cm
+ROUNDS = 24  # number of smoothing passes
+WIDTH = 1.3  # width of a muscle, cm
 
 
 def add(source: Path, target: Path) -> None:
     """Write a file with neck poses.
 
     Args:
-        source: of a face with joints neck_01, neck_02 and head, its x to the left, its y up, as
-            the sample people's.
-        target: is written, with the finest level of detail alone.
+        source: DNA file of a face with joints neck_01, neck_02 and head, x to the left and y up,
+            for example a sample person.
+        target: path of the written file. The file contains only LOD 0.
     """
     dna = risorius.load(source, lods=(0, 0))
     turns = turned_joints(dna.joint_names)
@@ -78,7 +79,16 @@ def add(source: Path, target: Path) -> None:
 
 
 def _add_controls(dna: risorius.Dna, names: list[str], poses: int) -> None:
-    """Raw controls come before the correctives, which move up; outputs of poses after these."""
+    """Append raw controls and renumber all inputs.
+
+    Corrective outputs come after the raw controls, so their indices grow by the number of new
+    controls. The outputs of RBF poses come after the correctives.
+
+    Args:
+        dna: the face to change.
+        names: names of the new raw controls.
+        poses: number of RBF pose outputs.
+    """
     count = len(dna.raw_control_names)
     dna.raw_control_names = [*dna.raw_control_names, *names]
 
@@ -98,7 +108,12 @@ def _add_controls(dna: risorius.Dna, names: list[str], poses: int) -> None:
 
 
 def _turns_of(name: str, joint_turns: dict[int, tuple[str, float]]) -> dict[int, np.ndarray]:
-    """Joint -> its turn about the face's axes, x, y, z, w."""
+    """Joint -> its quaternion x, y, z, w about the face's axes in a pose.
+
+    Args:
+        name: key of LIMITS; any other name gives the rest pose.
+        joint_turns: joint -> (control bone, fraction of the bone's turn), from turned_joints().
+    """
     angles = LIMITS.get(name, dict.fromkeys(ANGLES, (0.0, 0.0, 0.0)))
     return {
         joint: shared(head_turns(np.array([angles[bone]])), share)[0]
@@ -147,7 +162,7 @@ def _add_channels(dna: risorius.Dna, first: int) -> None:
 
 
 class _Neck:
-    """The skin of the head's mesh, and how the chain of the neck moves it."""
+    """The head's mesh with its skin weights, and the joints of the neck that move it."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.dna, mesh = dna, dna.meshes[0]
@@ -160,7 +175,7 @@ class _Neck:
         self.mask = self._shared()
 
     def _shared(self) -> np.ndarray:
-        """float64[V]: 1 where joints of the chain share the skin, 0 where one has it."""
+        """float64[V]: 1 if several joints of the chain share the vertex, 0 if one joint owns it."""
         parents, chain = self.dna.joint_parents, [0, *self.turns]
         column = []
         for joint in range(len(parents)):
@@ -194,18 +209,18 @@ class _Neck:
         return out / np.linalg.norm(out, axis=1, keepdims=True).clip(1e-12)
 
     def _matrices(self, name: str) -> np.ndarray:
-        """float64[V, 3, 4]: what takes each vertex along in a pose."""
+        """float64[V, 3, 4]: the skinning matrix of each vertex in a pose."""
         turned = _turns_of(name, self.turns)
         rest, posed = (_world(self.dna, turns) for turns in ({}, turned))
         moves = np.array([p @ np.linalg.inv(r) for p, r in zip(posed, rest, strict=True)])
         return np.einsum("vj,jrc->vrc", self.weights, moves[:, :3])
 
     def pose(self, name: str) -> np.ndarray:
-        """float64[V, 3]: the shape of a pose, before the joints move it."""
+        """float64[V, 3]: the blend shape deltas of a pose in cm, which apply before skinning."""
         moves = self._matrices(name)
         ends = np.concatenate([self.rest, np.ones((len(self.rest), 1))], axis=1)
         skinned = np.einsum("vrc,vc->vr", moves, ends)
-        # What smoothing takes from the resting skin is its detail; it turns along.
+        # Smoothing removes detail. The detail of the neutral skin is added, turned by the joints.
         detail = self.rest - self._smoothed(self.rest, ROUNDS)
         turned = np.einsum("vrc,vc->vr", moves[:, :, :3], detail)
         smooth = self._smoothed(skinned, ROUNDS) + turned - skinned
@@ -239,7 +254,14 @@ class _Neck:
         end: np.ndarray,
         height: float,
     ) -> np.ndarray:
-        """A ridge along a line, with a hollow on both sides."""
+        """float64[V, 3]: a displacement along the normals that makes a ridge with hollow sides.
+
+        Args:
+            points: posed vertices [V, 3], cm.
+            normals: their unit normals [V, 3].
+            start, end: both ends of the ridge, cm.
+            height: height of the ridge, cm; negative for a groove.
+        """
         along = end - start
         share = (points - start) @ along / (along @ along)
         apart = points - start - share[:, None] * along
@@ -253,7 +275,7 @@ class _Neck:
 
 
 def _edges(mesh: risorius.Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Both ends of each edge, once."""
+    """Vertex indices of both ends of the mesh's edges. Each edge occurs once."""
     corners = mesh.layout_positions[mesh.face_layouts].astype(np.int64)
     following = np.arange(len(corners)) + 1
     following[mesh.face_offsets[1:] - 1] = mesh.face_offsets[:-1]
@@ -262,10 +284,11 @@ def _edges(mesh: risorius.Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _world(dna: risorius.Dna, turns: dict[int, np.ndarray]) -> list[np.ndarray]:
-    """Matrices of the joints, of which none is turned at rest and some are turned now.
+    """World matrices [4, 4] of all joints. Joints without an entry in `turns` keep the identity.
 
     Args:
-        turns: joint -> x, y, z, w about the face's axes.
+        dna: the face; its neutral joint translations are used, its neutral rotations are not.
+        turns: joint -> quaternion x, y, z, w about the face's axes.
     """
     found: list[np.ndarray] = []
     for joint, parent in enumerate(dna.joint_parents):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""One performance on two people inside Blender: a voice becomes a clip, the clip plays on both, a
-smile is layered over it, a flash of light makes them react.
+"""Renders one performance on two people inside Blender.
+
+A voice becomes a clip, and the clip plays on both faces. A layer adds a smile. A flash of light
+makes both react.
 
 performance.py -- --extension ZIP --man DNA --woman DNA --voice WAV --text TEXT --out FOLDER
                   [--only FRAME ...]
@@ -23,9 +25,9 @@ from mathutils import Vector  # noqa: E402
 from progress import Progress  # noqa: E402
 
 FRAME_RATE = 24
-APART = 0.25  # metres between the two
-SMILE = 1.9  # seconds: when it begins to grow
-FLASH = 4.75  # seconds
+APART = 0.25  # metres between the two faces
+SMILE = 1.9  # time in seconds at which the smile begins
+FLASH = 4.75  # time of the flash in seconds
 
 
 def parse():
@@ -42,7 +44,7 @@ def frame_at(seconds):
 
 
 def choose(controls):
-    """Make a character the active one, as a click does."""
+    """Select a character and make it active."""
     for thing in bpy.context.selected_objects:
         thing.select_set(False)
     controls.select_set(True)
@@ -50,7 +52,12 @@ def choose(controls):
 
 
 def import_face(path, lod):
-    """The control armature of a face with this one level of detail."""
+    """Import one level of detail of a face. Returns its control armature.
+
+    Args:
+        path: the DNA file.
+        lod: index of the level of detail.
+    """
     must(bpy.ops.risorius.import_dna(filepath=str(path), lods=[i == lod for i in range(8)]))
     return bpy.context.view_layer.objects.active
 
@@ -61,7 +68,7 @@ def must(result):
 
 
 def add_acting(controls, seed):
-    """Idle eyes, a smile that grows while they speak, and the flash."""
+    """Add layers with idle life and a smile, and the reaction to the flash."""
     choose(controls)
     must(bpy.ops.risorius.layer_add(kind="IDLE"))
     layers = controls.risorius_layers
@@ -88,7 +95,12 @@ def add_acting(controls, seed):
 
 
 def add_flash(target, unit):
-    """The light that they react to: up in one frame, gone in half a second."""
+    """Add the light of the flash: full within one frame, out after half a second.
+
+    Args:
+        target: point between the faces.
+        unit: height of the face's bounds, metres.
+    """
     stage.add_light("Flash", target + Vector((0.1, -2.6, 0.9)) * unit, target, 0.0, unit, (1, 1, 1))
     data = bpy.data.lights["Flash"]
     peak = 1.3 * unit * unit * 100
@@ -98,7 +110,7 @@ def add_flash(target, unit):
 
 
 def stand_side_by_side(man, woman):
-    """Move their controls, and the faces go along; she stands on something, eye to eye."""
+    """Move the control armatures beside each other, and raise the woman to the man's height."""
     man.location.x, woman.location.x = -APART / 2, APART / 2
     tops = [stage.bounds(c.users_collection[0])[1].z for c in (man, woman)]
     woman.location.z += tops[0] - tops[1] - 0.01
@@ -106,7 +118,7 @@ def stand_side_by_side(man, woman):
 
 
 def build_stage(man, woman):
-    """The man's studio, moved to the middle between the two, from farther away."""
+    """Add the man's studio, move it to the middle between both people, and move the camera back."""
     collection = man.users_collection[0]
     choose(woman)
     must(bpy.ops.risorius.set_strands())
@@ -118,14 +130,14 @@ def build_stage(man, woman):
     camera = bpy.context.scene.camera
     middle = (low + high) / 2
     middle.x = (man.location.x + woman.location.x) / 2
-    middle.z = low.z + 0.615 * unit  # from above the hair down to where the shirts still are
+    middle.z = low.z + 0.615 * unit  # so that the picture shows the hair above and the shirts below
     camera.location = middle + Vector((0.0, -3.45, 0.06)) * unit
     stage.aim(camera, middle)
     add_flash(middle, unit)
 
 
 def perform(args, man, woman):
-    """Speech on the man; the same clip, as a file, on the woman."""
+    """Make speech on the man, export it as a clip, and import the clip on the woman."""
     clip = args.out / "performance.rzc"
     choose(man)
     must(bpy.ops.risorius.speak(filepath=str(args.voice), transcript=args.text))

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# One performance on two people: a voice made by espeak-ng becomes a clip, which plays on a man and,
-# as a file, on a woman at a coarser level of detail; idle life, a smile and a flash of light lie over
-# it. Leaves a film with sound, the clip and the .blend in build/performance.
+# Renders one performance on two people. A voice made by espeak-ng becomes a clip on the man; the clip is
+# saved and loaded on the woman, who has a coarser level of detail. Layers add idle life, a smile and the
+# reaction to a flash. Leaves a film with sound, the clip and the .blend in build/performance.
 set -euo pipefail
 source "$(dirname "$0")/film.sh"
 text="Good morning! One voice moves both of us, and we smile while we speak. Oh! That was bright."

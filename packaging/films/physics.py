@@ -3,8 +3,8 @@
 
 physics.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 
-The cloth of both collides with the moving face, the lock's root follows the skin of the forehead
-by a Surface Deform, and *Bake Physics* of the add-on bakes them.
+Scarf and lock are cloth that collides with the moving face. The lock's root follows the skin of the
+forehead by a Surface Deform modifier. The add-on's *Bake Physics* bakes both.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ import numpy as np  # noqa: E402
 import performance  # noqa: E402
 import scene as stage  # noqa: E402
 
-SETTLE = 30  # frames in which cloth comes to lie; the acting begins so much later
+SETTLE = 30  # frames in which the cloth settles; the acting begins after them
 MM = 0.001
-ROOT = (0.020, -0.2, 1.708)  # a ray from here backwards meets the forehead where the lock grows
+ROOT = (0.020, -0.2, 1.708)  # metres; a ray from here along +y hits the forehead at the lock's root
 LOCK_ROWS, LOCK_COLUMNS = 26, 6
 LOCK_LENGTH, LOCK_WIDTH = 0.160, 0.018
 
@@ -41,13 +41,13 @@ def parse():
 
 
 def add_mesh(name, vertices, faces, material):
-    """An object of a mesh in the scene.
+    """Add a mesh object to the scene and return it.
 
     Args:
-        name: of both.
-        vertices: [V, 3], metres.
-        faces: vertex indices of each.
-        material: its only one, or None.
+        name: name of the mesh and of the object.
+        vertices: positions [V, 3], metres.
+        faces: vertex indices of each polygon.
+        material: the material, or None.
     """
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([tuple(v) for v in vertices], [], faces)
@@ -70,7 +70,7 @@ def add_material(name, colour, roughness, sheen=0.0):
 
 
 def ring_faces(rows, columns):
-    """Quads of rows of vertices that close to rings."""
+    """Quads between neighbouring rows of vertices; each row is a closed ring of `columns`."""
     at = np.arange(rows * columns).reshape(rows, columns)
     right = np.roll(at, -1, axis=1)
     quads = np.stack([at[:-1], right[:-1], right[1:], at[1:]], axis=-1)
@@ -78,7 +78,13 @@ def ring_faces(rows, columns):
 
 
 def rings(profile, columns, centre):
-    """Vertices of ellipses one above another: profile has z and both half axes of each."""
+    """Vertices of stacked ellipses, metres.
+
+    Args:
+        profile: (z, half axis in x, half axis in y) of each ellipse.
+        columns: number of vertices per ellipse.
+        centre: x and y of the centres.
+    """
     angle = np.linspace(0, 2 * np.pi, columns, endpoint=False)
     return np.concatenate(
         [
@@ -96,7 +102,7 @@ def rings(profile, columns, centre):
 
 
 def add_bust():
-    """What the scarf lies on: shoulders of a tailor's dummy."""
+    """Add shoulders like a tailor's dummy, on which the scarf rests."""
     profile = [
         (1.300, 0.235, 0.110),
         (1.345, 0.232, 0.108),
@@ -119,14 +125,26 @@ def add_bust():
 
 
 def collide(thing, thickness):
-    """What cloth does not go through; of friction like wool's."""
+    """Make cloth collide with an object, with a friction like wool.
+
+    Args:
+        thing: the object.
+        thickness: outer distance that cloth keeps, metres.
+    """
     thing.modifiers.new("Collision", "COLLISION")
     thing.collision.thickness_outer = thickness
     thing.collision.cloth_friction = 20
 
 
 def simulate(thing, mass, bending, first, last):
-    """Cloth that collides; its settings."""
+    """Add a cloth modifier that collides, and return it.
+
+    Args:
+        thing: the object.
+        mass: mass of each vertex, kg.
+        bending: bending stiffness.
+        first, last: frames of the simulation.
+    """
     cloth = thing.modifiers.new("Cloth", "CLOTH")
     cloth.point_cache.frame_start, cloth.point_cache.frame_end = first, last
     settings = cloth.settings
@@ -179,7 +197,7 @@ def add_lock(head, first, last):
     across = np.array([1.0, 0.0, 0.0]) - normal * normal[0]
     across /= np.linalg.norm(across)
     way = np.linspace(0, 1, LOCK_ROWS)[:, None]
-    # It leaves the skin upwards and forward and falls over to the side: an arc, then straight down.
+    # The lock rises from the skin in an arc, then hangs straight down and drifts to the side.
     arc = np.minimum(way / 0.35, 1) * 2.5
     out = 0.028 * np.sin(arc / 2) ** 2
     up = 0.014 * np.sin(arc)
@@ -208,7 +226,7 @@ def add_lock(head, first, last):
 
 
 def follow_skin(thing, head):
-    """Bind an object to the skin as it is now, and see that it took."""
+    """Bind an object to the posed skin by a Surface Deform modifier. Raises if Blender does not."""
     bound = thing.modifiers.new("Skin", "SURFACE_DEFORM")
     bound.target = head
     with bpy.context.temp_override(object=thing, active_object=thing):

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# The demo's acting with a scarf and a lock of hair that Blender simulates on the face: shows that
-# simulations see the face of their own frame. Leaves a film and the .blend in build/physics.
+# Renders the demo's acting with a scarf and a lock of hair that Blender simulates. The film shows that a
+# simulation gets the face of the simulated frame. Leaves a film and the .blend in build/physics.
 set -euo pipefail
 source "$(dirname "$0")/film.sh"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far a long rendering is: "frame 12 of 240, about 1 min 20 s left", now and then."""
+"""Prints the progress of a long rendering, such as "frame 12 of 240, about 1 min 20 s left"."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ EVERY = 5.0  # seconds between two lines
 
 
 class Progress:
-    """Says a line after the first picture, after the last, and every EVERY seconds between.
+    """Prints a line after the first picture, after the last, and every EVERY seconds in between.
 
     Args:
-        total: pictures.
-        what: one of them, e.g. "frame".
-        clock: seconds.
-        say: gets each line.
+        total: number of pictures.
+        what: noun for one picture, for example "frame".
+        clock: function that returns the time in seconds.
+        say: function that prints a line.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class Progress:
         self._began = self._said = clock()
 
     def step(self) -> None:
-        """One picture more is there."""
+        """Count one finished picture, and print a line if one is due."""
         self._done += 1
         now = self._clock()
         if 1 < self._done < self._total and now - self._said < EVERY:
@@ -43,7 +43,7 @@ class Progress:
 
 
 def duration(seconds: float) -> str:
-    """E.g. "45 s", "1 min 20 s", "1 h 05 min"."""
+    """The duration as text, for example "45 s", "1 min 20 s" or "1 h 05 min"."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

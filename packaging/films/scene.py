@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The stage of the demo: the add-on's studio in a dark room, and how it is rendered."""
+"""The stage of the films: the add-on's studio in a dark room, and the render settings."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from progress import Progress
 
 
 def end_with(main):
-    """Run `main` and end the process: exit code 0, or 1 after a traceback.
+    """Run `main` and end the process with exit code 0, or with 1 after a traceback.
 
-    Whatever is raised, Blender must end, and the bpy module sometimes hangs when it exits.
+    os._exit ends the process after every exception, because the bpy module sometimes hangs when
+    Python exits normally.
     """
     code = 1
     try:
@@ -29,7 +30,7 @@ def end_with(main):
 
 
 def empty_folder(folder):
-    """A folder without pictures of an earlier run; itself."""
+    """Make the folder if it is missing, delete its PNG files, and return it."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.png"):
         old.unlink()
@@ -37,7 +38,7 @@ def empty_folder(folder):
 
 
 def render_animation(progress):
-    """Render the scene's frames; progress.step() is called after each."""
+    """Render the scene's frames, and call progress.step() after each."""
 
     def written(*_):
         progress.step()
@@ -50,12 +51,12 @@ def render_animation(progress):
 
 
 def render_frames(folder, frames, samples):
-    """Pictures frame_0001.png and on, of frames that need not follow each other.
+    """Render frames as frame_0001.png, frame_0002.png and so on.
 
     Args:
-        folder: where they go.
-        frames: of the scene.
-        samples: of Cycles, where noise is taken away.
+        folder: folder of the pictures.
+        frames: frames of the scene; they may have gaps.
+        samples: samples of Cycles per pixel, used only if the denoiser is available.
     """
     scene = bpy.context.scene
     if scene.cycles.use_denoising:
@@ -96,11 +97,11 @@ def bounds(collection):
 
 
 def build(collection, strands=True):
-    """The add-on's studio around a collection's face, its camera the scene's; the studio.
+    """Add the add-on's studio around a face and use its camera. Returns the studio's collection.
 
     Args:
-        collection: of the face.
-        strands: renders show its hair as strands, where it has cards.
+        collection: collection of the face.
+        strands: render the hair as strands instead of cards.
     """
     scene = bpy.context.scene
     bpy.context.view_layer.objects.active = next(
@@ -117,13 +118,13 @@ def build(collection, strands=True):
 
 
 def meet_eyes():
-    """Let the active face look into the camera, as one who is photographed does."""
+    """Let the eyes of the active face follow the camera."""
     if bpy.ops.risorius.gaze_target(mode="OBJECT") != {"FINISHED"}:
         raise RuntimeError("the eyes did not follow the camera")
 
 
 def darken(scene):
-    """A room whose walls give back hardly any light."""
+    """Give the scene a dark world, which lights the face hardly at all."""
     world = bpy.data.worlds.new("Stage")
     scene.world = world
     world.use_nodes = True
@@ -131,7 +132,7 @@ def darken(scene):
 
 
 def background(scene):
-    """A soft vertical gradient, seen by the camera only as far as it lights gently."""
+    """Give the scene a world with a dark vertical gradient in window coordinates."""
     world = bpy.data.worlds.new("Stage")
     scene.world = world
     world.use_nodes = True
@@ -147,7 +148,7 @@ def background(scene):
 
 
 def render_settings(scene):
-    """Cycles on a CPU: few samples, denoised, no noise that a person would see."""
+    """Set up Cycles on the CPU with few samples and a denoiser."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device = "CPU"
@@ -158,7 +159,7 @@ def render_settings(scene):
     cycles.max_bounces = 3
     cycles.diffuse_bounces = 2
     cycles.glossy_bounces = 2
-    cycles.transparent_max_bounces = 24  # cards of hair lie over each other
+    cycles.transparent_max_bounces = 24  # because many cards of hair overlap
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.use_fast_gi = False
     scene.render.use_persistent_data = True
@@ -175,20 +176,28 @@ def _denoise(cycles):
         cycles.use_denoising = False
         cycles.samples, cycles.adaptive_threshold = 64, 0.02
         return
-    # FAST leaves noise of hair, which light passes through, as black and white points; no quicker.
+    # FAST leaves black and white points in transparent hair, and is not faster.
     cycles.denoising_prefilter = "ACCURATE"
     if hasattr(cycles, "denoising_quality"):
         cycles.denoising_quality = "BALANCED"
 
 
 def _develop(view):
-    """The contrast of a print; Blenders with a small colour configuration know some of it only."""
+    """Choose a view transform with higher contrast; small colour configurations lack some."""
     _choose(view, "view_transform", ("AgX", "Filmic", "Standard"))
     _choose(view, "look", ("AgX - Medium High Contrast", "Medium High Contrast", "None"))
 
 
 def _choose(owner, name, wanted):
-    """The first of the choices that there is; the list of such a property is not in its type."""
+    """Set a property to the first valid choice.
+
+    Each choice is tried, because the type of a dynamic enum does not list its items.
+
+    Args:
+        owner: the object with the property.
+        name: name of the property.
+        wanted: values, best first.
+    """
     for choice in wanted:
         try:
             setattr(owner, name, choice)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Puts the demo's eight pictures on one sheet, with what each shows: sheet.py FOLDER OUT."""
+"""Puts the demo's eight pictures on one sheet with captions: sheet.py FOLDER OUT."""
 
 import sys
 from pathlib import Path

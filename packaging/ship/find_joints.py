@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Finds the joints that all sample people share and writes them where the package has them: to be
-run again where the man, his controls or the fit change (tests/python/sample sees it). Two
-minutes on two cores, in the environment of packaging/setup.sh; the wheel is built anew after it.
+"""Finds the joints that all sample people share, and writes them into the package.
 
     python packaging/ship/find_joints.py
+
+Run it again if the man, his controls or the fit change (a test of tests/python/sample fails then),
+and build the wheel after it. It takes two minutes on two cores and needs the venv of
+packaging/setup.sh.
 """
 
 from pathlib import Path
@@ -22,7 +24,8 @@ def main() -> None:
     man, _, _ = assemble(Source(fetch(offline=False)), print)
     reference = find_reference(man, RIG)
     for name, rows in reference.weights.items():
-        # As fine as a sample face keeps them; the largest takes what is over.
+        # Round to the step in which a sample face stores weights. The largest weight of a vertex
+        # takes the remainder, so that the sum is 1.
         even = np.round(rows * WEIGHTS)
         even[np.arange(len(even)), even.argmax(axis=1)] += WEIGHTS - even.sum(axis=1)
         reference.weights[name] = even / WEIGHTS

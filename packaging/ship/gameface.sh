@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# gameface.sh [TAKE.csv [VOICE.wav]]: what `risorius export` makes of the sample person, in three.js,
-# three-vrm and TalkingHead (npm) in Debian's chromium, under Khronos' gltf-validator (npm) and in Blender's
-# reader of VRM (bpy-vrm-format of PyPI): see gameface/check*.py. Without a take of Live Link Face and a
-# voice with its transcript, or ../shared/data/real, their parts say NOT RUN. Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code
-# 0 only if nothing failed.
+# gameface.sh [TAKE.csv [VOICE.wav]]: exports the sample person with `risorius export`, and tests the files
+# in three.js, three-vrm and TalkingHead (npm) in Debian's chromium, with Khronos' gltf-validator (npm) and
+# with a VRM reader for Blender (bpy-vrm-format, PyPI): see gameface/check*.py. TAKE.csv is a take of Live
+# Link Face; VOICE.wav needs a transcript VOICE.txt. By default both come from ../shared/data/real; if a
+# file is missing, its part prints NOT RUN. Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0
+# only if nothing failed.
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 source "$project/packaging/check/works.sh"

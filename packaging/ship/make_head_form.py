@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Makes the model of the form of heads that the package finds faces with: to be run again where
-names.toml of the landmarks or this file changes. A minute, in the environment of
-packaging/setup.sh; the wheel is built anew after it.
+"""Makes heads.npz, the statistical shape model with which the package finds the parts of a face.
 
     python packaging/ship/make_head_form.py
 
-The heads are drawn at random from the CC0 data of the sample people: age, gender, origin, build
-and some three hundred features, some of them far beyond what people have, as drawings have it.
+Run it again if landmarks/names.toml or this file changes, and build the wheel after it. It takes
+about a minute and needs the venv of packaging/setup.sh.
+
+The model is a principal component analysis of random heads from the CC0 data of the sample people.
+Age, gender, origin, build and about three hundred features vary. A quarter of the heads has
+features stronger than those of real people, like stylised drawings.
 """
 
 from __future__ import annotations
@@ -26,8 +28,9 @@ Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 HEADS, COMPONENTS, SEED = 1600, 40, 56
-STYLISED = 0.25  # share of heads whose features go beyond people's
-CUT, WIDE = 5.75, 0.95  # of the base mesh, decimetres: below is no neck, beyond are shoulders
+STYLISED = 0.25  # fraction of heads with features stronger than those of people
+# Decimetres of the base mesh. Triangles below CUT in y or beyond WIDE in |x| are left out.
+CUT, WIDE = 5.75, 0.95
 FEATURES = (
     "eyes", "asym", "ears", "mouth", "nose", "head", "neck", "cheek", "chin", "forehead",
     "eyebrows",
@@ -43,8 +46,8 @@ EXPRESSIONS = {
     "pucker": ("mouthPucker",),
     "wide": ("eyeWideLeft", "eyeWideRight"),
 }
-DIRECTIONS = 40  # from which a head is looked at, for what is seen of it
-PIXELS = 220  # a decimetre
+DIRECTIONS = 40  # number of directions from which visible triangles are found
+PIXELS = 220  # pixels per decimetre of the pictures that find visible triangles
 PACKAGE = Path(__file__).parents[2] / "native" / "python" / "risorius" / "anyhead"
 
 
@@ -57,7 +60,7 @@ def triangles_of(quads: Ints) -> Ints:
 
 
 def seen(points: Doubles, triangles: Ints) -> NDArray[np.bool_]:
-    """Which triangles [T] are seen from one of many directions around."""
+    """bool[T]: whether a triangle is visible from at least one of DIRECTIONS around the head."""
     out = np.zeros(len(triangles), bool)
     k = np.arange(DIRECTIONS) + 0.5
     height, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
@@ -73,7 +76,7 @@ def seen(points: Doubles, triangles: Ints) -> NDArray[np.bool_]:
 
 
 def nearest_triangles(points: Doubles, triangles: Ints) -> Ints:
-    """The triangles that a picture along -z shows: those that face it, drawn from behind."""
+    """Indices of the triangles that a depth buffer along -z shows. Back faces only hide others."""
     corners = points[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     low = corners[:, :, :2].reshape(-1, 2).min(axis=0)
@@ -97,7 +100,7 @@ def nearest_triangles(points: Doubles, triangles: Ints) -> Ints:
 
 
 class Heads:
-    """Draws heads from the data."""
+    """Draws random heads from the data of the sample people."""
 
     def __init__(self) -> None:
         self.source = Source(fetch(offline=False))
@@ -109,13 +112,17 @@ class Heads:
         self.axes = self._axes()
 
     def shape(self, name: str) -> Doubles:
-        """float64[kept, 3] of a target."""
+        """float64[kept, 3]: the displacements of a target, decimetres. Results are cached."""
         if name not in self._read:
             self._read[name] = self.source.target(name, self.count)[self.kept].astype(np.float32)
         return self._read[name]
 
     def _axes(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-        """Each feature's two ends, with the names of both sides where it has two."""
+        """(targets of the low end, targets of the high end) of each feature.
+
+        An end has two targets, left and right, if the feature has a target for each side. The low
+        end is empty if the feature has only one direction.
+        """
         names = {
             n.removeprefix(TARGETS).removesuffix(".target.gz")
             for n in self.source._names
@@ -145,7 +152,7 @@ class Heads:
         return (name, f"{folder}/r-{last[2:]}") if last.startswith("l-") else (name,)
 
     def draw(self, dice: np.random.Generator) -> Doubles:
-        """float64[kept, 3] of a random head, decimetres."""
+        """float64[kept, 3]: positions of a random head, decimetres."""
         out = self.base.positions[self.kept].copy()
         shares = dice.dirichlet(np.full(len(ORIGINS), 0.6))
         person = Person(
@@ -167,12 +174,20 @@ class Heads:
         return out
 
     def expression(self, names: tuple[str, ...]) -> Doubles:
-        """float64[kept, 3] of units of the face together."""
+        """float64[kept, 3]: the sum of the displacements of face units, decimetres."""
         return np.sum([self.shape(f"{FACE_UNITS}{name}.target") for name in names], axis=0)
 
 
 def aligned(points: Doubles, like: Doubles, weight: Doubles) -> tuple[Doubles, Doubles, float]:
-    """The similarity that brings points onto others: points, rotation [3, 3], scale."""
+    """Fit points to others by a similarity, in the weighted least squares sense.
+
+    Args:
+        points: points [V, 3] to move.
+        like: their targets [V, 3].
+        weight: weight [V] of each point.
+
+    Returns: the moved points, the rotation [3, 3] for row vectors, and the scale.
+    """
     share = (weight / weight.sum())[:, None]
     middle, goal = (share * points).sum(axis=0), (share * like).sum(axis=0)
     u, s, vt = np.linalg.svd((share * (points - middle)).T @ (like - goal))
@@ -183,7 +198,12 @@ def aligned(points: Doubles, like: Doubles, weight: Doubles) -> tuple[Doubles, D
 
 
 def with_eyes(points: Doubles, eyes: list[Ints]) -> Doubles:
-    """Points and, behind them, the middle and the foremost place of each eye."""
+    """The points, followed by the middle and the foremost point of each eye.
+
+    Args:
+        points: positions [V, 3].
+        eyes: vertex indices of each eye.
+    """
     more = []
     for eye in eyes:
         middle = (points[eye].min(axis=0) + points[eye].max(axis=0)) / 2
@@ -193,18 +213,25 @@ def with_eyes(points: Doubles, eyes: list[Ints]) -> Doubles:
 
 
 def packed(values: Doubles, kind: type) -> tuple[NDArray[np.generic], Doubles]:
-    """Whole numbers and what each row is multiplied with."""
+    """The values as integers, and the scale of each row: values = integers * scale.
+
+    Args:
+        values: float64[rows, ...].
+        kind: integer type; each row uses its full range.
+    """
     flat = values.reshape(len(values), -1)
     scale = np.abs(flat).max(axis=1) / np.iinfo(kind).max
     return np.round(flat / scale[:, None]).astype(kind).reshape(values.shape), scale
 
 
 def region_weights(points: Doubles, ears: NDArray[np.bool_]) -> Doubles:
-    """How much each vertex says of where a face is: the middle of the face 1, neck and ears little.
+    """float64[V]: weight of each vertex in the fit.
+
+    The weight is 1 in the middle of the face, and 0.06 to 0.15 at neck and ears.
 
     Args:
-        points: float64[V, 3] in cm, 0 between the eyes.
-        ears: bool[V].
+        points: positions [V, 3] in cm, with the origin between the eyes.
+        ears: bool[V], whether a vertex belongs to an ear.
     """
     x, y, z = points.T
     away = np.sqrt((x / 6.5) ** 2 + ((y + 3.0) / 8.0) ** 2)
@@ -276,7 +303,7 @@ def weights_face(weights: Doubles) -> NDArray[np.bool_]:
 
 
 def ear_vertices(heads: Heads) -> Ints:
-    """Vertices of the base mesh that the size of an ear moves."""
+    """Indices of the base mesh's vertices that the targets of the ears' size move."""
     moved = np.zeros(heads.count)
     for side in "lr":
         way = heads.source.target(f"{TARGETS}ears/{side}-ear-scale-incr.target.gz", heads.count)
@@ -285,7 +312,7 @@ def ear_vertices(heads: Heads) -> Ints:
 
 
 def mirror_of(points: Doubles) -> Ints:
-    """The vertex at each one's mirror image."""
+    """int64[V]: index of the vertex nearest to the mirror image of each vertex."""
     out = np.empty(len(points), np.int64)
     for k, point in enumerate(points * [-1.0, 1.0, 1.0]):
         out[k] = ((points - point) ** 2).sum(axis=1).argmin()
@@ -293,7 +320,12 @@ def mirror_of(points: Doubles) -> Ints:
 
 
 def symmetric(mean: Doubles, mirror: Ints) -> Doubles:
-    """The mean of a form and its mirror image; the last four rows are those of the eyes."""
+    """The average of a shape and its mirror image.
+
+    Args:
+        mean: positions [V + 4, 3]; the last four rows are middle and front of each eye.
+        mirror: int64[V], index of each vertex's mirror image.
+    """
     count = len(mirror)
     other = np.concatenate([mirror, count + np.array([2, 3, 0, 1])])
     return np.asarray((mean + mean[other] * [-1.0, 1.0, 1.0]) / 2)
@@ -303,9 +335,19 @@ def expression(
     heads: Heads, units: tuple[str, ...], eyes: list[Ints], root: Doubles, mean: Doubles,
     weights: Doubles, rows: Ints,
 ) -> Doubles:  # fmt: skip
-    """float64[V, 3]: what an expression adds to the mean form, in its place and size."""
+    """float64[V, 3]: displacements of an expression in the orientation and scale of the mean shape.
+
+    Args:
+        heads: the data.
+        units: names of the face units.
+        eyes: vertex indices of each eye.
+        root: the point between the eyes, decimetres.
+        mean: the mean shape, cm.
+        weights: weight of each point in the fit.
+        rows: rows of the kept points, with the eyes' points at the end.
+    """
     rest = heads.base.positions[heads.kept]
-    # The units are made for the grown-up face of the data, which the base mesh is not.
+    # The face units are made for the adult face of the data, but the base mesh is not an adult.
     person = Person("", "male", 25, {"caucasian": 1.0}, *[(0, 0, 0)] * 6, 0, ((0, 0, 0), (0, 0, 0)))
     for name, weight in person.shape().items():
         rest = rest + weight * heads.shape(f"{TARGETS}{name}.target.gz")
@@ -317,7 +359,7 @@ def expression(
 
 
 def rows_of(rows: Ints, count: int) -> Ints:
-    """The rows of skin, then the four of the eyes that follow all others."""
+    """The rows of the skin, followed by the rows `count` to `count + 3` of the eyes."""
     return np.concatenate([rows[:-4], count + np.arange(4)])
 
 

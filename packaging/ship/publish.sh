@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# publish.sh: what release.sh made of a tag becomes a draft release of the forge, with the notes as its text:
-# wheels, sdist, extensions, the repository of extensions as one archive, SBOM, sums. A person looks at the
-# draft and publishes it. Needs `gh` and its GH_TOKEN.
+# publish.sh: makes a draft release on GitHub from the output of release.sh, with the notes as its text:
+# wheels, sdist, extensions, the repository of extensions as one archive, SBOM and checksums. A person must
+# check and publish the draft. Needs `gh` and its GH_TOKEN.
 #
-#   publish.sh TAG [--dry-run]    TAG: v1.2.3; --dry-run checks the files and says what would be run
+#   publish.sh TAG [--dry-run]    TAG: v1.2.3; --dry-run checks the files and prints the command
 set -euo pipefail
 tag=${1:-}
 project=$(cd "$(dirname "$0")/../.." && pwd)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Does the installed package work on this machine? Prints a report to send back.
+"""Checks whether the installed package works on this machine. Prints a report to send back.
 
     python selftest.py [FACE.dna]
 
-The checks are those of the wheel, `python -m risorius.selftest`; this file only says in one
-sentence what to do where the wheel cannot even be imported. Exit code 0 only if all is well.
+Runs the checks of the wheel, `python -m risorius.selftest`. If the wheel cannot be imported, this
+file prints one sentence with the cause and the remedy. Exit code 0 only if all checks pass.
 """
 
 import sys

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# site.sh: the documentation as a site in build/site/html, by mkdocs-material: what is written in docs/
-# and the READMEs, a page for each panel and operator from the registered classes, the commands from
-# --help, Python from docstrings, C++ from headers. A warning is an error; every link of the finished
-# pages is followed. Needs the extension's zip in build/dist, which --build makes from nothing.
+# site.sh: builds the documentation as a site in build/site/html with mkdocs-material. The pages come from
+# docs/ and the READMEs, from the registered classes (panels and operators), from --help (commands), from
+# docstrings (Python) and from headers (C++). A warning is an error, and every link of the finished pages
+# is checked. Needs the extension's zip in build/dist; --build makes it.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
 #   site.sh [--build]

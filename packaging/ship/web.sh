@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# web.sh: the empty page of `risorius web`, build/web/page.html. native/ becomes WebAssembly with SIMD
-# (zig of PyPI), native/web and three.js (npm, by package-lock.json) one script, and both one file. The
-# next wheel that is built has it. --check also opens it in Debian's chromium: see web/check.py.
+# web.sh: builds the empty page of `risorius web`, build/web/page.html. zig (PyPI) compiles native/ to
+# WebAssembly with SIMD. esbuild bundles native/web and three.js (npm, package-lock.json) into one script.
+# assemble.py puts both into one file, which the next wheel contains. --check also tests the page in
+# Debian's chromium: see web/check.py.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
@@ -11,7 +12,7 @@ source "$project/packaging/check/works.sh"
 out="$project/build/web"
 logs="$project/build/logs/web"
 venv_zig="$project/build/cross/venv"
-most=700000 # bytes of the page; packed in the wheel it is about a third
+most=700000 # largest size of the page in bytes; the wheel compresses it to about a third
 case "${1:-}" in
   "" | --check) ;;
   *) echo "web.sh: $1 is not --check" >&2 && exit 2 ;;
@@ -28,10 +29,10 @@ get_tools() {
   mkdir -p "$out/npm" && cp "$project"/native/web/package*.json "$out/npm/" &&
     (cd "$out/npm" && npm ci --silent --no-audit --no-fund) && touch "$stamp"
 }
-# What the functions of risorius.h need, and of it what no system is asked for. A browser has no files and
-# no threads, and nothing is caught there: without memory the library ends, and the page says so. What is of
-# one folder is compiled at once.
-sources() { # sources FOLDER
+# sources FOLDER: prints the source files that the functions of risorius.h need. Code for files and threads
+# is left out, because a browser has neither. The library is compiled without exceptions: it ends if memory
+# runs out, and the page reports that. The files of one folder are compiled as one unit.
+sources() {
   find "$project/native/$1" -name '*.cpp' -not -name 'json_*.cpp' -not -name write.cpp -not -name rig_file.cpp \
     -not -name 'file_*.cpp' -not -name read_at.cpp -not -name change_of_basis.cpp \
     -not -name coordinates.cpp -not -path '*/mixer/*' -not -name '*encode*.cpp' | LC_ALL=C sort
@@ -43,14 +44,15 @@ compile_library() {
     grep -v open_file)
   for folder in api bytes clip compile core dna rig; do
     sources $folder | sed 's/.*/#include "&"/' > "$out/$folder.cpp"
-    # Sizes are 32 bits wide here. Those of a block were held against its bytes, as 64 bits, before.
+    # size_t has 32 bits in WebAssembly. Narrowing the sizes of a block is safe, because the reader has
+    # already compared them as 64 bits with the block's bytes.
     [ $folder != rig ] || sed -i '1i #pragma clang diagnostic ignored "-Wc++11-narrowing"' "$out/rig.cpp"
     files+=("$out/$folder.cpp")
   done
   for name in cpu dispatch kernels_scalar kernels_sse4 kernels_avx2 kernels_avx512 kernels_neon; do
     files+=("$project/native/simd/$name.cpp")
   done
-  # A browser's only thread has no end to register for.
+  # The browser's only thread never ends, so its destructors need no registration.
   echo 'extern "C" int __cxa_thread_atexit(void (*f)(void*), void* p, void* d) { (void)f; (void)p; (void)d; return 0; }' \
     > "$out/thread.cpp"
   files+=("$out/thread.cpp" "$project/native/web/page.cpp")

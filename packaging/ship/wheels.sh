@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# wheels.sh: the wheels that are released, of every system, from this machine: zig compiles and links
-# them with the CMake project and toolchain of cross.sh, pip and scikit-build-core pack them. Each is
-# inspected by other people's tools (cross/inspect_wheel.py), and imported where that can be done here.
-# They lie in build/wheels; what is known of each is in build/wheels/facts.tsv (cross/facts.py).
+# wheels.sh: builds the released wheels for all systems on this machine, in build/wheels. zig compiles and
+# links them with CMake and the toolchain of cross.sh; pip and scikit-build-core pack them. Independent
+# tools inspect each wheel (cross/inspect_wheel.py). Linux wheels are also imported.
+# build/wheels/facts.tsv records the results (cross/facts.py).
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
 #   wheels.sh [--twice] [--tests] [PLATFORM[=PYTHON]...]
-#       of linux-x64, windows-x64, windows-arm64, macos-arm64, macos-x64 and sdist; without one all.
-#       linux-x64=3.13 is that Python's alone. --twice: each once more, from nothing and elsewhere; the
-#       bytes must be the same. --tests: the Python tests of files, locks, threads and commands, by the Linux
-#       wheels (windows_wheels.sh runs them by those of Windows)
+#       PLATFORM: linux-x64, windows-x64, windows-arm64, macos-arm64, macos-x64 or sdist; default: all.
+#       linux-x64=3.13 builds for this Python only. --twice: builds each wheel again in another folder
+#       without a cache; the bytes must be equal. --tests: runs the Python tests of files, locks, threads and
+#       commands with the Linux wheels (windows_wheels.sh does this with the Windows wheels)
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 source "$project/packaging/ship/cross/zig.sh"
@@ -44,10 +44,10 @@ for word; do
 done
 [ ${#platforms[@]} -gt 0 ] || platforms=("${all[@]}" sdist)
 failed=0
-# What a file in a wheel says of its time is that of the commit, so that two builds are the same bytes.
+# Files in a wheel get the time of the commit, so that two builds give the same bytes.
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$project" log -1 --format=%ct)}
 
-row() { # row NAME COMMAND...: one row; the command's output is in a log
+row() { # row NAME COMMAND...: runs the command, writes its output to a log and prints a row
   local name=$1 log="$logs/${1//[^a-zA-Z0-9.]/-}.log"
   shift
   if "$@" > "$log" 2>&1; then
@@ -59,16 +59,16 @@ row() { # row NAME COMMAND...: one row; the command's output is in a log
     return 1
   fi
 }
-fact() { # fact PLATFORM PYTHON COLUMN WHAT: for the table; the newest counts
+fact() { # fact PLATFORM PYTHON COLUMN TEXT: appends a line to facts.tsv; the last line of a cell counts
   printf '%s\t%s\t%s\t%s\n' "$@" >> "$facts"
 }
 
-forget() { # forget PLATFORM PYTHON: what is known of a wheel that was there before
+forget() { # forget PLATFORM PYTHON: removes the lines of an older wheel from facts.tsv
   grep -vP "^$1\t$2\t" "$facts" > "$facts.new"
   mv "$facts.new" "$facts"
 }
 
-# options PLATFORM PYTHON: CMake's, one a line
+# options PLATFORM PYTHON: prints CMake's options, one per line
 options() {
   local include library=
   case $1 in
@@ -89,11 +89,11 @@ options() {
     "Python_INCLUDE_DIR=$include" "pybind11_DIR=$pybind11" CMAKE_CXX_COMPILER_LAUNCHER=ccache
   [ -z "$library" ] || echo "Python_LIBRARY=$library"
 }
-build() { # build PLATFORM PYTHON OUT: a wheel of $source
+build() { # build PLATFORM PYTHON OUT: builds a wheel from the folder $source into the folder OUT
   local tag="cp${2/./}" defines
   defines=$(options "$1" "$2" | paste -sd ';') || return 1
   mkdir -p "$3"
-  # A cache of CMake's would keep the flags of before; ccache keeps the objects.
+  # CMake's cache would keep old flags. ccache makes the new build fast.
   rm -rf "$3/build-$1-$2" "$3/risorius-"*"-$tag-$tag-${label_of[$1]}.whl"
   SETUPTOOLS_EXT_SUFFIX=$("$inspect" suffix "$tag" "${label_of[$1]}") \
     SKBUILD_CMAKE_TOOLCHAIN_FILE="$project/packaging/ship/cross/toolchain.cmake" SKBUILD_CMAKE_PYTHON_HINTS=false \
@@ -103,7 +103,7 @@ build() { # build PLATFORM PYTHON OUT: a wheel of $source
 }
 wheel_of() { echo "${3:-$wheels}"/risorius-*-"cp${2/./}-cp${2/./}-${label_of[$1]}.whl"; }
 
-# a_python VERSION: a program of it, with the names that a module may ask for
+# a_python VERSION: prints the path of a Python program; its symbols are those that a module may import
 a_python() {
   if [ -z "${suite_of[$1]:-}" ]; then
     echo "/usr/bin/python$1"
@@ -119,22 +119,22 @@ inspected() { # inspected PLATFORM PYTHON
   echo "$said"
   fact "$1" "$2" "tags and contents" "$(echo "$said" | paste -sd ';' | sed 's/;/; /g')"
 }
-faults_found() { # faults_found PLATFORM PYTHON: what would be wrong is seen
+faults_found() { # faults_found PLATFORM PYTHON: checks that inspect_wheel.py detects planted faults
   "$build_python" "$project/packaging/ship/cross/plant_faults.py" "$(wheel_of "$1" "$2")" \
     --python "$(realpath "$(a_python "$2")")" --zig "$zig_lib"
 }
-scalar_bits= # of the first that was imported
-imported() { # imported PYTHON: the Linux wheel, by Debian's Python of that version
+scalar_bits= # hash of the scalar path's outputs with the first imported wheel
+imported() { # imported PYTHON: imports the Linux wheel in Debian's Python of this version and tests it
   local said
   said=$(linux_run "$1" "$project/packaging/ship/cross/trial.py") || return 1
   echo "$said"
   [[ "$said" == *"; $(cpu_sets); "* ]] || { echo "the processor has $(cpu_sets)" && return 1; }
-  # Whatever its Python, it computes the same bits.
+  # All Python versions must compute the same bits.
   [ "${said##*scalar }" = "${scalar_bits:=${said##*scalar }}" ] ||
     { echo "scalar bits of another Python: $scalar_bits" && return 1; }
   fact linux-x64 "$1" imported "$said"
 }
-same() { # same PLATFORM PYTHON: built elsewhere from nothing (a cache of these builds' own: all Pythons share objects)
+same() { # same PLATFORM PYTHON: builds again in another folder, with a new ccache that all Pythons share
   source=$elsewhere CCACHE_DIR="${elsewhere%/*}/ccache" CCACHE_BASEDIR=$elsewhere build "$1" "$2" "$again" &&
     cmp "$(wheel_of "$1" "$2")" "$(wheel_of "$1" "$2" "$again")" &&
     fact "$1" "$2" "built twice" "same bytes"
@@ -142,7 +142,7 @@ same() { # same PLATFORM PYTHON: built elsewhere from nothing (a cache of these 
 copy_elsewhere() {
   elsewhere=$(mktemp -d)/risorius again="$wheels/again"
   rm -rf "$again"
-  # What git knows of, as it lies here, and the page of web.sh.
+  # Copies the files that git tracks, with uncommitted changes, and the page of web.sh.
   (cd "$project" && { git ls-files -z && find build/web -maxdepth 1 -name page.html -print0; } 2> /dev/null |
     xargs -0 cp --parents -t "$(mkdir -p "$elsewhere" && echo "$elsewhere")")
 }
@@ -167,10 +167,11 @@ make_platform() { # make_platform PLATFORM[=PYTHON]
 }
 make_sdist() {
   rm -f "$wheels"/risorius-*.tar.gz
-  # In the project it would look at every file of build/, for a quarter of an hour where Windows was run.
+  # In the project folder, scikit-build-core would look at every file of build/. With wine's files that
+  # takes a quarter of an hour.
   (cd "$elsewhere" && "$build_python" -c "from scikit_build_core.build import build_sdist; build_sdist('$wheels')")
 }
-sdist_builds() { # the wheel of what is in it is the one of the project, byte for byte
+sdist_builds() { # checks that the wheel built from the sdist equals the project's wheel byte for byte
   local work
   work=$(mktemp -d)
   tar -xzf "$wheels"/risorius-*.tar.gz -C "$work" && source=$(echo "$work"/risorius-*) &&
@@ -180,14 +181,14 @@ sdist_builds() { # the wheel of what is in it is the one of the project, byte fo
   return $code
 }
 
-# linux_pip VERSION PACKAGE...: into the folder of that Python, as pip takes it for glibc 2.28
+# linux_pip VERSION PACKAGE...: installs wheels for glibc 2.28 or older into the folder of this Python
 linux_pip() {
   local version=$1
   shift
   "$build_python" -m pip install -q --target "$cross/try-$version" --only-binary :all: --implementation cp \
     --python-version "$version" --platform manylinux_2_28_x86_64 --platform manylinux_2_17_x86_64 "$@"
 }
-# linux_run VERSION ARGUMENT...: Debian's Python of that version with NumPy and our wheel
+# linux_run VERSION ARGUMENT...: runs Debian's Python of this version with NumPy and the Linux wheel
 linux_run() {
   local version=$1 root folder="$cross/try-$1" program=("/usr/bin/python$1") wheel
   wheel=$(wheel_of linux-x64 "$version")
@@ -204,13 +205,13 @@ linux_run() {
       "$root/usr/lib/x86_64-linux-gnu" "$root/usr/bin/python$version")
     export PYTHONHOME="$root/usr"
   fi
-  # What starts a Python of its own starts this one, whose loader is not the system's.
+  # Tests that start a Python process must start this one with its own loader, so sys.executable is set.
   printf '#!/bin/sh\nexec %s "$@"\n' "${program[*]}" > "$folder/python" && chmod +x "$folder/python"
   printf 'import sys\n\nsys.executable = "%s"\n' "$folder/python" > "$folder/sitecustomize.py"
   PYTHONPATH=$folder "$folder/python" "$@"
 }
 declare -A numpy_of=([3.11]=1.26.4 [3.13]=2.3.5 [3.14]=2.3.5)
-tested() { # tested PYTHON: what of the tests has to do with the system
+tested() { # tested PYTHON: runs the tests of cross/tests_of_the_system.txt
   local log="$logs/pytest-$1.log" said
   linux_pip "$1" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
     "numpy==${numpy_of[$1]}" pytest python-osc threadpoolctl xxhash matplotlib || return 1

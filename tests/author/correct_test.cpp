@@ -119,8 +119,8 @@ TEST(Correct, StretchIsAreaAndAFoldIsACosine) {
   const SkinChecker check = checker(scene);
   auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (x_of(v) > 10.0) positions[v][0] += 2.0;   // the faces between become three times as wide
-    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // the faces here lie on their neighbours
+    if (x_of(v) > 10.0) positions[v][0] += 2.0;   // faces at x = 10 become three times as wide
+    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // faces at x = -10 fold onto their neighbours
   }
   const auto rest = look(check, scene.pose(scene.skin.neutral));
   const auto found = look(check, scene.pose(positions));
@@ -160,7 +160,7 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
     for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
   }
   EXPECT_GT(most, 0.4);
-  EXPECT_LT(most, 0.9);  // of 1.7 together: most of both parts remains
+  EXPECT_LT(most, 0.9);  // mm undone of 1.7 mm, so that most of both parts remains
   EXPECT_LE(std::ranges::max(look(check, scene.pose(mended)).depth), SkinChecker::kDepth + 1e-3f);
 }
 
@@ -217,7 +217,7 @@ TEST(Correct, WhatCannotBeUndoneIsPushedOutOfTheBall) {
 TEST(Correct, AStretchThatCannotBeUndoneIsEased) {
   const Scene scene;
   auto positions = scene.skin.neutral;
-  for (std::uint32_t v = 0; v < positions.size(); ++v) {  // pulled from the middle to one side
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {  // stretch the faces at the middle
     const double d = (x_of(v) * x_of(v) + y_of(v) * y_of(v)) / 81.0;
     if (x_of(v) > 0.5 && d < 1.0) positions[v][0] += 1.9 * (1.0 - d) * (1.0 - d);
   }
@@ -241,7 +241,7 @@ TEST(Correct, VerticesWithoutAFaultKeepNineTenthsOfTheirWays) {
   positions[kMiddle][2] += 2.8;
   const Repair repair = pushed_out(scene, positions);
   EXPECT_LT(repair.after.stretched, repair.before.stretched);
-  EXPECT_GT(repair.after.stretched, 0u);  // holds even if faults are left
+  EXPECT_GT(repair.after.stretched, 0u);  // faults are left; the checks below hold nevertheless
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     const bool near = std::max(std::abs(x_of(v)), std::abs(y_of(v))) < 2.5;
     if (near || positions[v][2] > -0.01) continue;

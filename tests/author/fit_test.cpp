@@ -40,7 +40,7 @@ double bump(const Vector3& p, double x, double y) {
   return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
 }
 
-/// Each side rises in an expression of its own; in a third the left side turns about y.
+/// Three expressions: the left side rises, the right side rises, the left side turns about y.
 Shapes two_sides() {
   Shapes out = sheet(3);
   const double angle = 0.3;
@@ -178,7 +178,7 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
-/// The largest displacement by a joint alone in an expression.
+/// The largest displacement of a vertex by one joint in an expression.
 double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
   Fit alone = fit;
   for (std::size_t other = 0; other < fit.joints.size(); ++other) {
@@ -271,7 +271,7 @@ TEST(Fit, AGivenJointKeepsItsMotionAndGetsWhatItMoves) {
   ASSERT_TRUE(fit) << fit.error().describe();
   EXPECT_EQ(fit->joints[1], riser.position);
   EXPECT_NEAR(fit->motions[3 * 1 + 2].rotation[1], 0.3, 1e-12);
-  const std::size_t top = 10 * kSide + 15;  // at (0.5, 0)
+  const std::size_t top = 10 * kSide + 15;  // the vertex at (0.5, 0)
   float share = 0.0f;
   for (std::size_t i = 0; i < fit->influences; ++i) {
     const std::size_t a = top * fit->influences + i;
@@ -413,7 +413,7 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   auto own = fit_joints(other, options);  // joints and weights fitted to this sheet
   ASSERT_TRUE(own);
   EXPECT_LT(largest_error(other, *there), 3.0 * largest_error(other, *own));
-  for (std::size_t j = 1; j < 9; ++j) {  // in the mean of the vertices, weighted by squared motion
+  for (std::size_t j = 1; j < 9; ++j) {  // at the mean of its vertices, weighted by squared motion
     Vector3 sum{};
     double total = 0.0;
     for (std::size_t v = 0; v < other.vertex_count(); ++v) {
@@ -459,7 +459,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
   EXPECT_EQ(refused.error().where, "at[2]");
-  at.pop_back();  // one joint too few
+  at.pop_back();  // `at` has one joint too few
   at[2] = kInTheMiddle;
   refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);

@@ -32,10 +32,10 @@ TEST(Mirror, KnowsTheVertexOfTheOtherSide) {
 
 TEST(Mirror, OutwardOnOneSideIsOutwardOnTheOther) {
   Shapes shapes = kite(4);
-  move(shapes, 1, 0, {0.2, 0.1, 0});   // the left one outward and up
-  move(shapes, 3, 1, {0.2, 0.1, 0});   // the right one inward and up: without a counterpart
-  move(shapes, 3, 2, {-0.2, 0.1, 0});  // the right one outward and up
-  move(shapes, 0, 3, {0, 0.3, 0.1});   // in the middle
+  move(shapes, 1, 0, {0.2, 0.1, 0});   // the left vertex outward and up
+  move(shapes, 3, 1, {0.2, 0.1, 0});   // the right vertex inward and up: without a counterpart
+  move(shapes, 3, 2, {-0.2, 0.1, 0});  // the right vertex outward and up
+  move(shapes, 0, 3, {0, 0.3, 0.1});   // a middle vertex
   EXPECT_EQ(find_mirror(shapes).expressions, (std::vector<std::uint32_t>{2, kNone, 0, 3}));
 }
 

@@ -68,7 +68,7 @@ TEST(Simplify, WhatAnAttributeShowsIsKept) {
     };
     hill += std::all_of(t.begin(), t.end(), low) ? 1 : 0;
   }
-  EXPECT_GT(2 * hill, some->triangles.size());  // on a quarter of the area
+  EXPECT_GT(2 * hill, some->triangles.size());  // over half the triangles on 1/4 of the area
 }
 
 TEST(Simplify, EnoughTrianglesChangeNothing) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file of its own, because every commit recompiles it.
+// The build's facts for benchmarks, in a separate file because every commit recompiles it.
 #include "bench/machine.h"
 
 namespace risorius::bench {

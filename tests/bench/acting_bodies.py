@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What skin must not go through: eyeballs, teeth; and hair, through which skin must not come.
+"""Measures the depth of skin inside eyeballs and teeth, and of hair inside skin.
 
-Eyes and teeth are rigid. Each is kept as a table of its outer radius around a middle or an axis,
-made of the face at rest; samples of skin are brought back by the body's motion and looked up, so a
-frame costs a few small products. Lengths are in the file's units, places float64[n, 3] with x to
+Eyes and teeth are rigid. Each has a table of its outer radius around a middle or an axis, made from
+the neutral face. Samples of the skin are transformed back by the body's motion and looked up in the
+table, so a frame costs little. Lengths are in the file's unit. Places are float64[n, 3] with x to
 the side, y up and z to the front.
 """
 
@@ -37,7 +37,7 @@ class Skin:
     """Samples of the skin: vertices, middles of edges and of faces.
 
     Attributes:
-        corners: int64[n, 4], the vertices whose mean a sample is; one may stand there twice.
+        corners: int64[n, 4], vertices whose mean is the sample; a vertex may occur twice.
         normals: float64[n, 3] of the samples at rest.
         places: float64[n, 3] at rest.
     """
@@ -47,7 +47,7 @@ class Skin:
     places: Floats
 
     def kept(self, mask: npt.NDArray[np.bool_]) -> Skin:
-        """Those where mask [n] is true."""
+        """The samples for which mask [n] is true."""
         return Skin(self.corners[mask], self.normals[mask], self.places[mask])
 
 
@@ -82,7 +82,7 @@ class Ball:
     ROWS, COLUMNS = 90, 180
 
     def __init__(self, places: Floats) -> None:
-        """Args: places  [V, 3] of all its vertices at rest; layers within it are passed over."""
+        """Make the table. Args: places  [V, 3] neutral vertices; inner layers have no effect."""
         low, high = places.min(axis=0), places.max(axis=0)
         around = places - (low + high) / 2
         ones = np.column_stack([2 * around, np.ones(len(around))])
@@ -111,7 +111,7 @@ class Ball:
         return table
 
     def depth(self, places: Floats) -> Floats:
-        """How deep places [n, 3] of its rest lie in it; negative: so far outside."""
+        """Depth of places [n, 3], in the ball's neutral frame, inside it; negative outside."""
         rays = places - self.middle
         far = np.linalg.norm(rays, axis=1).clip(1e-9)
         up = np.arccos((rays[:, 1] / far).clip(-1.0, 1.0)) / np.pi * self.ROWS
@@ -122,7 +122,7 @@ class Ball:
 
 
 class Arch:
-    """A row of teeth: its outer and inner radius by angle and height around an upright axis."""
+    """A row of teeth: outer and inner radius around a vertical axis, by angle and height."""
 
     DEGREES, STEP = 1.0, 0.05
     _FINE = 14  # samples along the edge of a triangle
@@ -155,11 +155,12 @@ class Arch:
         return row, column, np.hypot(x, z), there
 
     def depth(self, places: Floats, may_be_behind: npt.NDArray[np.bool_]) -> Floats:
-        """How deep places [n, 3] of its rest lie in the row or behind its front; 0 outside.
+        """Depth of places inside the row or behind its front; 0 outside.
 
         Args:
-            places: in the place of the row at rest.
-            may_be_behind: [n], lips that can lie behind this row: only what is within it counts.
+            places: [n, 3], in the row's neutral frame.
+            may_be_behind: [n], whether a place may be behind this row (lips of the other row); then
+                only the depth inside the row counts.
         """
         row, column, radius, there = self._cells(places)
         row, column = np.where(there, row, 0), np.where(there, column, 0)
@@ -177,9 +178,9 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 
 
 class Cards:
-    """Vertices of hair, each over the triangle of skin that it is nearest to at rest."""
+    """Vertices of hair, each assigned to the nearest skin triangle in the neutral pose."""
 
-    # Triangles of skin of which one may come to be the nearest: mostly, and where skin folds far.
+    # Numbers of nearby skin triangles that may become the nearest: usually, and in deep folds.
     NEAR, AROUND = 48, 400
 
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:
@@ -208,7 +209,7 @@ class Cards:
 
     @staticmethod
     def height(hairs: Floats, corners: Floats) -> Floats:
-        """How far hairs [n, 3] lie above the planes of triangles [n, 3, 3]."""
+        """Signed distance of hairs [n, 3] above the planes of triangles [n, 3, 3]."""
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12)
@@ -216,10 +217,10 @@ class Cards:
 
     @staticmethod
     def height_over_nearest(hairs: Floats, corners: Floats) -> Floats:
-        """How far hairs [n, 3] lie over the nearest of triangles [n, k, 3, 3]; below 0: inside.
+        """Signed distance of hairs [n, 3] from the nearest of triangles [n, k, 3, 3]; inside < 0.
 
-        Where several meet in the nearest place, the one counts that looks at the hair most
-        directly: its side is the skin's there.
+        If several triangles share the nearest point, the one whose normal points most directly at
+        the hair determines the sign.
         """
         a, u, v = corners[:, :, 0], corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2]
         v = v - a
@@ -235,13 +236,12 @@ class Cards:
 
 
 def _away(points: Floats, others: Floats) -> Floats:
-    """[n, m] squares of distances."""
+    """Squared distances [n, m] between points and others."""
     return (points**2).sum(axis=1)[:, None] - 2 * points @ others.T + (others**2).sum(axis=1)
 
 
 def _nearest_in(u: Floats, v: Floats, way: Floats) -> Floats:
-    """The place in triangles (0, u, v), each [..., 3], that is nearest to `way`: inside, or on the
-    nearest of the three edges."""
+    """The point of the triangles (0, u, v), each [..., 3], that is nearest to `way`."""
 
     def dot(p: Floats, q: Floats) -> Floats:
         return np.einsum("...d,...d->...", p, q)[..., None]

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Random acting on a sample person: lids through eyes, teeth through lips, skin through hair.
+"""Checks random acting of a sample person: lids in eyes, lips in teeth, hair in skin.
 
     python tests/bench/acting_check.py SAMPLE.dna [--seed 1] [--frames 10000] [--clip SPEECH.rzc]
         [--worst 6] [--json FILE] [--render SHEET.jpg]
 
-What is acted: acting_random.py; what is measured: acting_bodies.py. Exit code 1 where anything goes
-deeper than LIMITS say. Run by a Python with `risorius`; --render needs `bpy` and Pillow.
+acting_random.py makes the frames; acting_bodies.py measures depths. Exit code 1 if a depth exceeds
+LIMITS. Needs a Python with `risorius`; --render needs `bpy` and Pillow.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from acting_random import PREFIX, Acting, random_acting
 
 LIMITS = {"lid in eye": 0.5, "lip in teeth": 0.5, "hair in skin": 0.5, "root in skin": 2.0}  # mm
 _HAIR = ("hair", "brow", "beard")
-_LONG = 15.0  # mm: hair that is farther from the skin hangs, and no triangle is its own
-_ROOT = 0.5  # mm: what is nearer to the skin at rest is a root
+_LONG = 15.0  # mm; hair farther from the skin hangs freely and is not checked
+_ROOT = 0.5  # mm; hair vertices nearer to the skin in the neutral pose are roots
 
 
 class Points:
-    """Vertices that are asked each frame: those of several users, each of them once."""
+    """The vertices that several users need in each frame; each vertex is computed once."""
 
     def __init__(self, surface: Any) -> None:
         self._surface, self._rows, self._where = surface, [], {}
 
     def add(self, mesh: int, vertices: Ints) -> Ints:
-        """Where in `at` the vertices of a mesh will stand. Args: vertices  any shape."""
+        """Register vertices of a mesh. Returns their rows in at(). Args: vertices  any shape."""
         unique, inverse = np.unique(vertices, return_inverse=True)
         place = []
         for vertex in unique:
@@ -51,16 +51,16 @@ class Points:
         return np.array(place, np.int64)[inverse].reshape(np.shape(vertices))
 
     def ready(self) -> None:
-        """After the last add."""
+        """Finish registration; call this after the last add()."""
         self._probe = self._surface.probe(np.array(self._rows, np.int64))
 
     def at(self, raw: npt.NDArray[np.float32]) -> Floats:
-        """[points, 3] of a pose."""
+        """The registered vertices [points, 3] in a pose."""
         self._raw = raw
         return self._probe.positions(raw)
 
     def whole(self, mesh: int) -> Floats:
-        """[V, 3] of a mesh in the pose that was asked last."""
+        """All vertices [V, 3] of a mesh in the pose of the last at()."""
         return np.asarray(self._surface.positions(self._raw, mesh), np.float64)
 
 
@@ -75,7 +75,7 @@ class Eye:
         ray = skin.places - self.ball.middle
         ray /= np.linalg.norm(ray, axis=1, keepdims=True).clip(1e-9)
         deep = self.ball.depth(skin.places) * face.mm
-        near = (deep > -6.0) & (deep < 0.1)  # what is deeper at rest lines the socket, unseen
+        near = (deep > -6.0) & (deep < 0.1)  # deeper skin is the invisible lining of the socket
         outward = np.einsum("nd,nd->n", ray, skin.normals) > 0.0
         self.lids = skin.kept(near & outward & (ray[:, 2] > 0.2))
         some = np.linspace(0, len(ball) - 1, 60).astype(np.int64)
@@ -84,7 +84,7 @@ class Eye:
         self._corners = face.points.add(face.head, self.lids.corners)
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """The check, how deep each sample is, and where the samples are."""
+        """The name of the check, the depth of each sample, and the samples' places."""
         turn, shift = bodies.rigid_motion(self._rest, now[self._some])
         places = now[self._corners].mean(axis=1)
         return "lid in eye", self.ball.depth((places - shift) @ turn), places
@@ -111,7 +111,7 @@ class Mouth:
 
     @staticmethod
     def _lips(skin: bodies.Skin, teeth: Floats, back: float, wide: float) -> bodies.Skin:
-        """Skin that is seen in front of the teeth, at rest."""
+        """The skin samples in front of the teeth that face outwards, in the neutral pose."""
         ray = skin.places * [1.0, 0.0, 1.0] - [0.0, 0.0, back]
         radius = np.linalg.norm(ray, axis=1).clip(1e-9)
         outward = np.einsum("nd,nd->n", ray / radius[:, None], skin.normals) > 0.0
@@ -132,7 +132,7 @@ class Mouth:
 
 
 class Hair:
-    """Cards over the skin: their roots, or the rest."""
+    """Hair cards over the skin: their roots, or their other vertices."""
 
     def __init__(self, face: Face, name: str, roots: bool, most: int = 4000) -> None:
         mesh = face.mesh(name)
@@ -149,9 +149,12 @@ class Hair:
         self._limit = LIMITS[self.check] / face.mm
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips): what lies
-        below one is measured again, over the skin that is nearest now; and what is too deep then
-        over that of many more triangles, since a few end where skin folds."""
+        """The name of the check, the depth of each hair vertex, and their places.
+
+        A plane continues beyond its triangle, which gives wrong depths if skin rolls in (lips). So
+        doubtful vertices are measured again from the nearest triangles of the pose, and too deep
+        ones from many more triangles, because folds bring distant triangles near.
+        """
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
         doubted = np.flatnonzero(deep > self._limit / 2)
@@ -165,7 +168,7 @@ class Hair:
 
 
 class Face:
-    """A person at rest, and all that is looked at."""
+    """A person in the neutral pose, with all checked parts."""
 
     def __init__(self, path: Path) -> None:
         self.dna = risorius.load(str(path))
@@ -191,11 +194,11 @@ class Face:
         self.points.ready()
 
     def mesh(self, name: str) -> int:
-        """The index of the mesh whose name begins so."""
+        """The index of the mesh whose name begins with `name`."""
         return next(m for n, m in self._meshes.items() if n.startswith(name))
 
     def corneas(self, side: float) -> list[Floats]:
-        """The vertices of the cornea on a side, where it is a mesh of its own."""
+        """The vertices of the cornea on a side, if the cornea is a separate mesh."""
         found = [self.rest[m] for n, m in self._meshes.items() if n.startswith("cornea")]
         return [places[places[:, 0] * side > 0] for places in found]
 
@@ -212,14 +215,14 @@ class Face:
         return np.array(list(fans), np.int64)
 
     def moved_by_jaw(self, mesh: int) -> npt.NDArray[np.bool_]:
-        """[V] which vertices an open jaw takes along for half of its way or more."""
+        """bool[V]: whether an open jaw moves a vertex by at least half of the teeth's motion."""
         way = np.linalg.norm(self._open[mesh] - self.rest[mesh], axis=1)
         teeth = self.mesh("teeth")
         return way > 0.5 * np.linalg.norm(self._open[teeth] - self.rest[teeth], axis=1).max()
 
 
 def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
-    """By check the greatest depth of each frame, in mm, and where: float64[frames, 4]."""
+    """Check -> float64[frames, 4]: largest depth of each frame in mm, and its place."""
     checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
     for frame, raw in enumerate(acting.raw):
         now = face.points.at(raw)
@@ -234,7 +237,7 @@ def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
 def report(
     face: Face, acting: Acting, checks: dict[str, npt.NDArray[np.float64]], worst: int
 ) -> list[dict[str, Any]]:
-    """The checks as rows, with the worst frames of each."""
+    """The results of the checks as rows, with the worst frames of each."""
     rest = measure(face, Acting(np.array([face.rig.initial_raw_controls], np.float32), ["rest"]))
     rows = []
     for check, found in checks.items():
@@ -262,7 +265,7 @@ def report(
 
 
 def show(rows: list[dict[str, Any]]) -> None:
-    """The rows as a table."""
+    """Print the rows as a table."""
     for row in rows:
         print(
             f"{row['check']:14} limit {row['limit_mm']} mm, at rest {row['rest_mm']:.2f} mm, "
@@ -274,7 +277,7 @@ def show(rows: list[dict[str, Any]]) -> None:
 
 
 def render(args: argparse.Namespace, acting: Acting, names: list[str], rows: list[Any]) -> None:
-    """The worst frames of each check on a sheet."""
+    """Render the worst frames of each check on a sheet."""
     import draw_expressions
 
     shots = []

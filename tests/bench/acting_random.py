@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Frames of random acting, by a seed: what no artist would think of, and what everybody does.
+"""Makes frames of random acting by a seed, both usual and unusual ones.
 
-A third are one or two expressions, a third speech (of a clip, else visemes that flow into each
-other) under an expression, a third two controls at random; gaze and blinks over all of them.
-Controls that exclude each other yield as the rules of risorius.Mixer say, so any pair that is left
-is allowed.
+A third of the frames are one or two expressions. A third are speech (of a clip, or blended visemes)
+under an expression. A third are two random controls. Gaze and blinks are added to all. The rules of
+risorius.Mixer resolve controls that exclude each other, so all remaining combinations are allowed.
 """
 
 from __future__ import annotations
@@ -27,19 +26,19 @@ _LOOKS = (("eyeLookLeft", "eyeLookRight"), ("eyeLookUp", "eyeLookDown"))
 
 @dataclass(frozen=True)
 class Acting:
-    """Frames of random acting: float32[frames, controls], and in words what each does."""
+    """Frames of random acting: float32[frames, controls], and a description of each frame."""
 
     raw: Pose
     words: list[str]
 
 
 def random_acting(names: Sequence[str], seed: int, frames: int, clip: Any = None) -> Acting:
-    """Frames by a seed.
+    """Make random frames.
 
     Args:
         names: Rig.raw_control_names.
-        seed: the same gives the same frames.
-        frames: how many.
+        seed: seed of the random numbers.
+        frames: number of frames.
         clip: a risorius Clip of speech, or None.
     """
     actor = _Actor(names, seed, clip)
@@ -71,7 +70,7 @@ class _Actor:
         return out
 
     def frame(self) -> tuple[Pose, str]:
-        """A pose, and what it is."""
+        """A random pose and its description."""
         kind = KINDS[int(self._random.integers(len(KINDS)))]
         pose, text = getattr(self, f"_{kind}")()
         return self._looks(pose, text)
@@ -104,7 +103,7 @@ class _Actor:
         return np.float32(weight) * self._poses[name], f"{name} {weight:.2f}"
 
     def _looks(self, pose: Pose, text: str) -> tuple[Pose, str]:
-        """Gaze to half of the frames, a blink to a third."""
+        """Add a gaze to half of the frames, and a blink to a third."""
         if self._random.random() < 0.5:
             for pair in _LOOKS:
                 look, value = str(self._random.choice(pair)), self._random.uniform(0.0, 0.9)

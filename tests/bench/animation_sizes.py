@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bytes of one animation as controls, and as the joints and shapes that a face makes of it.
+"""Compares the size of an animation stored as controls and stored as joints and blend shapes.
 
     python tests/bench/animation_sizes.py FACE.dna [FACE.dna ...]
 
@@ -27,11 +27,11 @@ NOISE = 0.004
 
 
 def controls_clip(names, rate):
-    """The acting on a face's raw controls.
+    """The demo's acting as a clip.
 
     Args:
-        names: of its raw controls.
-        rate: frames a second.
+        names: names of the face's raw controls.
+        rate: frames per second.
     """
     tracks, _ = acting.tracks(set(names))
     times = np.arange(round(acting.LAST_FRAME / acting.FRAME_RATE * rate)) / rate
@@ -47,12 +47,12 @@ def controls_clip(names, rate):
 
 
 def captured(clip, names, noise):
-    """The clip as a camera would have seen it: every control, each with noise, in thousandths.
+    """The clip like a capture: all controls, with noise, rounded to thousandths.
 
     Args:
-        clip: of raw controls.
-        names: of all raw controls.
-        noise: standard deviation.
+        clip: clip of raw controls.
+        names: names of all raw controls.
+        noise: standard deviation of the noise.
     """
     random = np.random.default_rng(7)
     curves = random.normal(0, noise, (len(names), clip.frame_count)).astype(np.float32)
@@ -63,11 +63,11 @@ def captured(clip, names, noise):
 
 
 def baked_clips(rig, clip):
-    """Clips of the joints' and the shapes' curves that change.
+    """Clips of the changing curves of joints and of blend shapes.
 
     Args:
         rig: a risorius.Rig.
-        clip: of raw controls.
+        clip: clip of raw controls.
     """
     raw, _ = clip.raw_controls(rig.raw_control_names)
     poses = [rig.evaluate(row) for row in np.ascontiguousarray(raw)]

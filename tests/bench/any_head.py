@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How exactly a template is laid onto heads of which the true places are known.
+"""Measures the accuracy of registering a template to heads with known correspondences.
 
     python tests/bench/any_head.py [--heads 6] [--first 100] [--marks 2.5] [--kind plain]
 
@@ -36,7 +36,7 @@ COLUMNS = ("along", "95 %", "face", "away", "trusted", "marks", "seconds")
 
 
 def noisy(skin: Surface, random: np.random.Generator) -> Surface:
-    """The surface as a scanner sees it."""
+    """The surface with noise and holes like a scan."""
     points = skin.points + random.normal(0, 0.012, skin.points.shape)
     middles = points[skin.triangles].mean(axis=1)
     back = middles[middles[:, 2] < np.median(middles[:, 2])]
@@ -61,7 +61,7 @@ def dressed(skin: Surface, true: np.ndarray) -> Surface:
 
 
 def target_of(kind: str, true: Surface, seed: int) -> Surface:
-    """The head of one kind, without a vertex of the template."""
+    """A remeshed head of a kind, which shares no vertex with the template."""
     skin = any_heads.remeshed(true, 4.0 if kind == "fine" else 0.5, seed)
     if kind == "noise":
         return noisy(skin, np.random.default_rng(seed))
@@ -69,7 +69,7 @@ def target_of(kind: str, true: Surface, seed: int) -> Surface:
 
 
 def marks_of(skin: Surface) -> list[int]:
-    """Vertices of the man's skin that anybody finds on a face."""
+    """Vertices of the man's skin at eleven places that are easy to mark on a face."""
     points = skin.points
     tip = points[points[:, 2].argmax()]
     places = [(0, 0, 0), (0, -7, -1.5), (0, 14, -10), (0, -2.5, -1), (0, -1.5, -0.5)]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How well a face that takes another head's form acts as that head's own face does.
+"""Compares the expressions of a face conformed to another head with the head's own expressions.
 
-For each head the face is given where its skin lies there, and each expression is compared with the
-head's own one, over the vertices that move by 0.1 mm at least: mean, 95 % and largest in mm. Beside
-it stands the plain copy of displacements.
+The places of the face's skin on each head are given. The errors of each expression are measured
+over the vertices that move by at least 0.1 mm: mean, 95 % quantile and largest in mm. The errors of
+plainly copied displacements are printed beside them.
 
 python tests/bench/any_head_conform.py FACE.dna HEAD.npz ... [--worst N] [--remeshed KIND]
 
@@ -41,7 +41,7 @@ class Posed:
         self.rest = self.at("")
 
     def at(self, expression):
-        """float64[V, 3] at an expression, names with + between them."""
+        """float64[V, 3]: posed skin. Args: expression  names of raw controls, joined by +."""
         raw = np.array(self.rig.initial_raw_controls, np.float32)
         for name in filter(None, expression.split("+")):
             raw[self.names.index(name)] = 1
@@ -52,7 +52,7 @@ class Posed:
 
 
 def errors(found, true):
-    """Mean, 95 % and largest of moving vertices in mm; None: none moves."""
+    """Mean, 95 % quantile and largest error of moving vertices in mm; None if none moves."""
     moving = np.linalg.norm(true, axis=1) > _MOVING
     if not moving.any():
         return None

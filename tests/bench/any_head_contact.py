@@ -43,7 +43,7 @@ HEADS = ("head", "gap mm", "seen mm2", "cut mm", "lips mm", "lips in mm", "teeth
 
 
 def seen_of_eyes(skin, triangles, eyes):
-    """mm2 of eyes that are seen from in front, of the viewer who sees most."""
+    """The visible area of the eyes in mm2, from the view of VIEWS with the largest area."""
     worst = 0.0
     for aside, up in VIEWS:
         a, u = np.radians(aside), np.radians(up)
@@ -70,7 +70,7 @@ def blinks(ways):
 
 
 def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
-    """The worst of each kind."""
+    """The worst value of each kind of fault."""
     poses = {(name,): way for name, way in singles.items()} | pairs
     faults = {pose: work.faults(pose, way) for pose, way in poses.items()}
     closing = set(closing_pose(singles, pairs))

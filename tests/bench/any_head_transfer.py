@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How near expressions that are carried to a head come to those that the head truly has.
+"""Compares transferred expressions with the true expressions of generated heads.
 
     python tests/bench/any_head_transfer.py [--heads 4] [--first 300] [--known] [--threads 0]
 
@@ -43,12 +43,12 @@ SHARES = (1.0, 0.4, 4.0)  # of the template's vertices, in turn
 
 
 def skin_of(person, source) -> TemplateFace:
-    """The skin of a person and what each control and corrective does to it."""
+    """The skin of a person with the displacements of each control and corrective."""
     return read_template(assemble(source, lambda _: None, person)[0])
 
 
 def truth_on(face: TemplateFace, target: Surface) -> tuple[np.ndarray, dict]:
-    """bool[V], whether a vertex lies on the true skin; and the true ways of its vertices."""
+    """bool[V], whether a target vertex is on the true skin; and the true displacements by pose."""
     own = face.surface
     near = ClosestPoints(own.points, own.triangles)
     triangle, shares, _ = near.nearest(target.points, target.normals(), 0.5, 0.1)
@@ -59,7 +59,7 @@ def truth_on(face: TemplateFace, target: Surface) -> tuple[np.ndarray, dict]:
 
 
 def by_vertex(face: TemplateFace, target: Surface, laid: Laid) -> dict:
-    """The template's ways as they are, each vertex from the nearest place of the template."""
+    """The template's displacements, copied from the nearest place of the laid template."""
     near = ClosestPoints(laid.points, face.surface.triangles)
     triangle, shares, _ = near.nearest(target.points, target.normals(), 0.4, 1.5)
     corners = face.surface.triangles[np.maximum(triangle, 0)]
@@ -68,7 +68,7 @@ def by_vertex(face: TemplateFace, target: Surface, laid: Laid) -> dict:
 
 
 def errors(got: dict, true: dict, on: np.ndarray) -> dict:
-    """Mean and 95 % in mm by pose, over the vertices that move."""
+    """Pose -> mean and 95 % quantile of the errors in mm, over the vertices that move."""
     out = {}
     for pose, way in true.items():
         moves = on & (np.linalg.norm(way, axis=1) * MM > MOVES)
@@ -79,7 +79,7 @@ def errors(got: dict, true: dict, on: np.ndarray) -> dict:
 
 
 def torn(got: dict, true: dict, target: Surface, on: np.ndarray) -> int:
-    """Edges that open most by jawOpen, against the truth."""
+    """The number of edges that jawOpen stretches by more than TORN mm beyond the truth."""
     edges = target.edges()
     edges = edges[on[edges].all(axis=1)]
 

@@ -40,7 +40,7 @@ TORN = 2.5
 
 
 def corners_of(mesh):
-    """The vertices of each polygon, as one row of both."""
+    """The vertices of all corners, and the polygon of each corner."""
     layouts = np.asarray(mesh.layout_positions, np.int64)
     corners = layouts[np.asarray(mesh.face_layouts, np.int64)]
     faces = np.repeat(np.arange(len(mesh.face_offsets) - 1), np.diff(mesh.face_offsets))
@@ -79,10 +79,10 @@ def undone(search, on, mesh):
 
 
 def worse(search, on):
-    """Whether anything is worse than without the corrective.
+    """Whether a pair's faults are worse with its corrective.
 
     Args:
-        search: has repaired the pair.
+        search: the search, which has repaired the pair.
         on: the pair.
     """
     solids = search.poser.pose(on)[1:]
@@ -91,11 +91,11 @@ def worse(search, on):
 
 
 def grew(a, b):
-    """Whether the deepest place or the widest face of b is beyond that of a.
+    """Whether the deepest place or the most stretched face of b is worse than that of a.
 
     Args:
-        a: faults.
-        b: of the same skin.
+        a: faults of a skin.
+        b: other faults of the same skin.
     """
     deeper = np.asarray(b.depth).max() > np.asarray(a.depth).max() + 0.1
     larger = np.asarray(b.stretch).max() > max(TORN, 1.01 * np.asarray(a.stretch).max())

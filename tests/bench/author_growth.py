@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How the fit's time and memory grow with vertices, expressions and joints.
+"""Measures how the fit's time and memory grow with vertices, expressions and joints.
 
     python tests/bench/author_growth.py [--largest] [--picture GROWTH.png]
 
@@ -28,7 +28,7 @@ ROWS = {
 
 
 def ball(vertices):
-    """Positions [V, 3] and edges of a ball of rings."""
+    """Positions [V, 3] and edges of a sphere of rings."""
     rings = max(4, round(np.sqrt(vertices / 2)))
     across = vertices // rings
     down, round_ = np.meshgrid(
@@ -50,7 +50,7 @@ def ball(vertices):
 
 
 def one(vertices, expressions, joints):
-    """CPU seconds and MB of one fit; MB is beside what the input takes."""
+    """CPU seconds of a fit, and its memory in MB without the input."""
     from risorius.author import FitOptions, fit_joints
 
     positions, edges = ball(vertices)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample man's head with other polygons, made into a rig as any head is.
+"""Remeshes the sample man's head, and makes a rig from it by the steps for any head.
 
     python tests/bench/author_remeshed.py --out remeshed.dna [--voxel 4.0] [--joints 120]
 
@@ -40,12 +40,12 @@ def old_head(source):
 
 
 def remeshed(positions, faces, voxel):
-    """Positions and polygons of Blender's voxel remesh, the same on both sides.
+    """Positions and polygons of Blender's voxel remesh, made symmetric.
 
     Args:
         positions: float64[V, 3], cm.
-        faces: polygons.
-        voxel: mm.
+        faces: vertex indices of each polygon.
+        voxel: size of a voxel, mm.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("head")
@@ -53,7 +53,7 @@ def remeshed(positions, faces, voxel):
     item = bpy.data.objects.new("head", mesh)
     bpy.context.scene.collection.objects.link(item)
     bpy.context.view_layer.objects.active = item
-    solid = item.modifiers.new("solid", "SOLIDIFY")  # voxels want a volume
+    solid = item.modifiers.new("solid", "SOLIDIFY")  # the voxel remesh needs a volume
     solid.thickness = voxel / 10
     remesh = item.modifiers.new("remesh", "REMESH")
     remesh.mode, remesh.voxel_size = "VOXEL", voxel / 10
@@ -64,7 +64,7 @@ def remeshed(positions, faces, voxel):
 
 
 def carried(points, positions, faces, units):
-    """Where each point lies on the old surface, and the units' displacements there."""
+    """The nearest point on the old surface of each point, and the units' displacements there."""
     triangles = np.array([[f[0], f[i], f[i + 1]] for f in faces for i in range(1, len(f) - 1)])
     tree = BVHTree.FromPolygons(positions.tolist(), triangles.tolist())
     corners, shares, apart = [], [], []

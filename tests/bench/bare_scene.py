@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of faces, written by a loop that knows nothing of faces: they take Blender's own time."""
+"""Writes frames of faces by a plain loop, to measure the time that Blender itself takes."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 class Bare:
-    """What the add-on wrote: finished positions, or bones and live keys where they are posed."""
+    """Stored poses of the add-on: finished positions, or bones and live keys."""
 
     def __init__(self, rigs):
-        # Names: an undo makes all objects anew.
+        # Names instead of objects, because an undo replaces all objects.
         self.rigs, self.poses, self.turn = [rig.name for rig in rigs], [], 0
 
     def remember(self):
-        """Keep what stands in the scene now as one of the poses that are written in turn."""
+        """Store the scene's present pose; write() writes the stored poses in turn."""
         pose = []
         for rig in map(bpy.data.objects.get, self.rigs):
             meshes = [item for item in rig.children_recursive if item.type == "MESH"]
@@ -38,7 +38,7 @@ class Bare:
         self.poses.append(pose)
 
     def begin(self):
-        """Disable the modifiers of what gets finished positions: the add-on enabled them."""
+        """Disable the modifiers of meshes with finished positions, as the add-on does."""
         self._switch(False)
 
     def end(self):

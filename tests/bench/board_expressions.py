@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How near the primary board comes to each expression of the library.
+"""Measures how closely the primary board reproduces each expression of the library.
 
     python tests/bench/board_expressions.py man.dna
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Measures clips in .rzc files: clip_bench FILE.rzc ... [--dna FILE.dna] [options of the library]
 //   encode, decode     GB/s of curve data, one core, from memory to memory
-//   one frame          any frame of all controls; its block is read and decoded for it alone
+//   one frame          a frame of all controls far from the last one: its block is read and decoded
 //   play               frame by frame; each block is read and decoded when it is reached; per frame
 //   play, decoded      the same within a decoded block
 //   evaluate           the rig of --dna on these frames, per frame, for comparison with play
@@ -64,7 +64,7 @@ void decode(benchmark::State& state, const File& file) {
 
 void one_frame(benchmark::State& state, const File& file) {
   clip::Player player(open(file));
-  // Far from the frame before, so that it lies in another block unless the clip has only one.
+  // Far from the last frame, so that the frame is in another block if the clip has several.
   std::size_t at = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(player.frame(at));

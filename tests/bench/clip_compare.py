@@ -42,7 +42,7 @@ def pcodec(level: int) -> tuple[Pack, Unpack]:
 
 
 def zstd(shuffled: bool) -> tuple[Pack, Unpack]:
-    """Level 19; shuffled: differences of the bits between frames, byte by byte."""
+    """zstd at level 19. With `shuffled`, bit differences between frames are packed by bytes."""
     package = importlib.import_module("zstandard")
     compressor, decompressor = package.ZstdCompressor(level=19), package.ZstdDecompressor()
 
@@ -103,7 +103,7 @@ def fastest(run: Callable[[], object]) -> float:
 
 
 def measure(name: str, curves: Curves) -> tuple[int, float, float] | None:
-    """Bytes, and GB/s of packing and unpacking."""
+    """The packed size in bytes, and the speeds of packing and unpacking in GB/s."""
     make, option = PACKERS[name]
     try:
         pack, unpack = make(option)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The rival of the evaluator: a whole evaluation in the shortest scalar code, with joints as a
-// plain compressed sparse row matrix.
+// The baseline of the evaluator's benchmarks: an evaluation in the shortest scalar code, with the
+// joint groups as one compressed sparse row matrix.
 #pragma once
 
 #include <cstdint>

@@ -19,7 +19,7 @@ import risorius
 
 
 def worlds(dna: risorius.Dna) -> np.ndarray:
-    """float64[J, 4, 4]: where the joints rest, turned about x, then y, then z."""
+    """float64[J, 4, 4]: neutral world matrices of the joints; rotations about x, then y, then z."""
     out = np.tile(np.eye(4), (len(dna.joint_names), 1, 1))
     for joint, parent in enumerate(dna.joint_parents):
         (cx, cy, cz), (sx, sy, sz) = (
@@ -35,7 +35,7 @@ def worlds(dna: risorius.Dna) -> np.ndarray:
 
 
 class Maker:
-    """What faces of one file share."""
+    """Makes faces of a file; they share the rig, the bone space and the meshes."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.rig = risorius.Rig(dna)
@@ -61,7 +61,7 @@ class Maker:
             self.meshes.append((risorius.Morph(dna, number), mesh.positions, skin))
 
     def face(self) -> tuple[risorius.DirectFace, dict[int, np.ndarray]]:
-        """A face and where its vertices go."""
+        """A face, and mesh -> array for its vertices."""
         face = risorius.DirectFace(self.rig, self.space, self.chain, self.rows, self.meshes)
         return face, {i: np.empty(m[1].shape, np.float32) for i, m in enumerate(self.meshes)}
 

@@ -35,7 +35,7 @@ def parse() -> argparse.Namespace:
 
 
 class Shot(NamedTuple):
-    """One picture: what stands under it, what the camera looks at, control -> value."""
+    """A picture: its caption, the camera's view (key of LOOKS), and control -> value."""
 
     label: str
     look: str
@@ -48,7 +48,7 @@ LOOKS = {"face": (-0.42, 3.3), "mouth": (-1.05, 1.9), "eyes": (0.0, 1.9)}
 
 
 def enable(user: Path) -> None:
-    """The add-on of this tree, in a throw-away user folder."""
+    """Install and enable this tree's add-on in a temporary user folder."""
     import addon_utils
     import bpy
 
@@ -86,7 +86,7 @@ class Face:
         self.middle, self.apart = (eyes[0] + eyes[1]) / 2, (eyes[0] - eyes[1]).length
 
     def look(self, at: str) -> None:
-        """The camera on a part of LOOKS."""
+        """Point the camera at a part. Args: at  key of LOOKS."""
         from mathutils import Vector
 
         camera = self.scene.camera

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Measures how much a processor can issue if memory is no limit.
+// Measures how fast a processor issues the skinning kernel's instructions if memory is no limit.
 #pragma once
 
 #include <cstddef>

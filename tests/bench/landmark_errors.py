@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far landmarks that are found without clicks lie from where they belong, a table.
+"""Prints a table of the errors of automatically found landmarks.
 
     python tests/bench/landmark_errors.py [--seeds 1 2 3] [--ict ../shared/data/real/ict/ict.npz]
 
@@ -73,7 +73,7 @@ def ict_heads(path: Path) -> tuple[NDArray[np.int64], list[Doubles]]:
 
 
 def subdivided(surface: Surface, dice: np.random.Generator) -> Surface:
-    """Four triangles for each, and noise."""
+    """The surface with each triangle divided into four, and with noise."""
     edges = np.sort(surface.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
     sides, back = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
     ab, bc, ca = (len(surface.points) + back.reshape(-1, 3)).T
@@ -87,7 +87,7 @@ def subdivided(surface: Surface, dice: np.random.Generator) -> Surface:
 def errors(
     template: Surface, first: Found, points: Doubles, mesh: Surface, name: str
 ) -> dict[str, float]:
-    """Millimetres by landmark; none where the head was refused."""
+    """Landmark -> error in mm; empty if no landmarks were found on the head."""
     names = list(first.landmarks.points)
     closest = _native.ClosestPoints(template.points, template.triangles)
     triangle, shares, _ = closest.nearest([first.landmarks.points[n] for n in names])

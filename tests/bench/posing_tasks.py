@@ -47,8 +47,9 @@ primary_table = importlib.import_module("risorius_addon_logic.character.primary_
 
 HEADING, ROW, WIDTH = 24, 22, 150.0  # pixels
 BOARD_HEIGHT, PIXELS_A_MM = 285.0, 1.25
-PRIMARY_UNIT, PRIMARY_AWAY = 41.0, 340.0  # from the face to the middle of the primary board
-AWAY = 420.0  # from the face to the sidebar
+# Pixels of a unit of the primary board, and pixels from the face to the board's middle.
+PRIMARY_UNIT, PRIMARY_AWAY = 41.0, 340.0
+AWAY = 420.0  # pixels from the face to the sidebar
 ENOUGH, WORTH, CANDIDATES = 0.1, 0.05, 10
 TASKS: dict[str, dict[str, float]] = {
     "left eye half closed": {"eyeBlinkL": 0.5},
@@ -86,8 +87,8 @@ TASKS: dict[str, dict[str, float]] = {
 
 @dataclass
 class Done:
-    """What a hand did: presses and releases of the button, those of them that opened a region,
-    those of keys, pixels, mm that are left."""
+    """The cost of a pose: events of the pointer's button, events that opened a region, events of
+    keys, travelled pixels, and the remaining error in mm."""
 
     events: int = 0
     keys: int = 0
@@ -111,7 +112,7 @@ class Done:
 
 
 class Face:
-    """The head, its controls, and how far a pose is from another."""
+    """The head, its controls, and its projection on the screen."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.dna = dna
@@ -139,16 +140,16 @@ class Face:
         return self.surface.positions(raw, self.mesh).astype(float)
 
     def pixel(self, place):
-        """Where a place is on the screen, from the middle of the face."""
+        """The place on the screen in pixels, relative to the middle of the face."""
         return tuple(self.screen @ (place - self.middle) * self.mm * PIXELS_A_MM)
 
     def pairs(self, raw):
-        """How many sliders are away from rest, left and right as one."""
+        """The number of sliders away from rest; left and right count as one."""
         away = np.flatnonzero(np.abs(raw) > 1e-3)
         return len({min(int(c), int(self.partners[c])) for c in away})
 
     def raw_of(self, task):
-        """float64[R] of a pose; a name without a side is both."""
+        """float64[R]: raw controls of a pose; a name without a side sets both sides."""
         out = np.zeros(len(self.names))
         for name, value in task.items():
             sides = [n for n in (name, name + "L", name + "R") if n in self.names]
@@ -159,13 +160,13 @@ class Face:
 
 
 def apart(face, places, wanted, moving):
-    """mm, root of the mean square."""
+    """Root mean square distance of moving vertices in mm."""
     off = np.linalg.norm(places - wanted, axis=1)[moving] * face.mm
     return float(np.sqrt((off**2).mean()))
 
 
 def by_sliders(face, goal):
-    """Each control at its slider, in regions that are opened."""
+    """Set each control by its slider, and open the regions that are needed."""
     done, raw, opened = Done(), np.zeros_like(goal), {}
     headings = list(regions.TITLES)
     rows = {r: [] for r in headings}
@@ -199,7 +200,7 @@ def by_sliders(face, goal):
 
 
 def by_complete(face, goal):
-    """The complete board."""
+    """Set the pose by the complete board."""
     table = face.table
     ways = board_layout.ways_of(table, list(face.dna.raw_control_names), {})
     handles = board_layout.handles_of(table, ways, regions.region_of)
@@ -208,21 +209,21 @@ def by_complete(face, goal):
 
 
 def by_primary(face, goal):
-    """The primary board."""
+    """Set the pose by the primary board."""
     table = primary_table.table_of(list(face.dna.raw_control_names))
     board = primary_layout.lay_out(table, primary_table.handles_of(table, {}))
     return by_board(table, board, PRIMARY_UNIT, PRIMARY_AWAY, goal)
 
 
 def by_board(table, board, unit, away, goal):
-    """Each handle that the pose needs, both ways of one in one drag.
+    """Set the pose by the handles of a board; a drag sets both axes of a handle.
 
     Args:
-        table: its GUI controls.
-        board: where its handles lie.
-        unit: pixels of one of its units.
-        away: pixels from the face to its middle.
-        goal: float64[R].
+        table: GUI controls of the board.
+        board: layout of its handles.
+        unit: pixels of a unit of the board.
+        away: pixels from the face to the board's middle.
+        goal: float64[R], raw controls of the pose.
     """
     gui = board_fit.fit(table, goal[None], np.zeros((1, len(table.names))))[0]
     done, used = Done(), np.zeros_like(gui)
@@ -240,7 +241,7 @@ def by_board(table, board, unit, away, goal):
 
 
 def by_drags(face, goal, moving, most):
-    """Drags of the skin, each the one that helps most."""
+    """Set the pose by drags of the skin; each is the drag that reduces the error most."""
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)
@@ -258,16 +259,16 @@ def by_drags(face, goal, moving, most):
 
 
 def is_mirrored(face, goal):
-    """Whether a pose is the same on both sides."""
+    """Whether a pose is symmetric."""
     return bool((goal == goal[face.partners]).all())
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(mm left, controls, from, to, keys) of the drag that leaves least; None if none helps."""
+    """(error in mm, controls, from, to, keys) of the best drag; None if no drag helps."""
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
     picked, order = [], np.argsort(-off)
-    for vertex in order:  # some that lie apart
+    for vertex in order:  # choose some vertices that are far apart
         near = [v for v in picked if np.linalg.norm(face.rest[v] - face.rest[vertex]) * face.mm < 6]
         if not near and off[vertex] > 0:
             picked.append(int(vertex))
@@ -283,7 +284,7 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(controls, events of keys) of what a drag of this vertex may do, as the add-on does it."""
+    """(controls, events of keys) of the possible results of dragging a vertex in the add-on."""
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(
         face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))
@@ -357,13 +358,13 @@ def main():
 
 
 def tell(table, openings, keys, ways):
-    """What drags take of what sliders take: medians.
+    """Print medians of the cost of drags relative to sliders.
 
     Args:
-        table: [pose, way of doing it, events and pixels and mm and sliders].
-        openings: events of each pose that opened regions.
-        keys: events of keys of each pose's drags.
-        ways: mm that each pose is away from rest.
+        table: array [pose, method, (events, pixels, mm, sliders)].
+        openings: number of each pose's events that opened regions.
+        keys: number of key events of each pose's drags.
+        ways: distance of each pose from rest in mm.
     """
     sliders, drags = table[:, 0], table[:, 3]
     near = drags[:, 2] <= 0.2 * ways

@@ -27,12 +27,12 @@ NAMES = {"active_20": "speech", "active_60": "acted", "active_260": "captured"}
 
 
 def clips_of(names, voice, text):
-    """The three clips, by the name of their frames.
+    """The three clips by the names of their frames.
 
     Args:
-        names: of the face's raw controls.
+        names: names of the face's raw controls.
         voice: a WAV file.
-        text: what is said in it.
+        text: transcript of the voice.
     """
     speech = animate(listen(voice, text), rate=RATE)
     last = (speech.frame_count - 1) / RATE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many sliders a drag moves, how far from the pointer it ends, how pointed the skin becomes.
+"""Measures drags: number of moved sliders, distance from the pointer, and spikes of the skin.
 
     python tests/bench/sparse_drags.py man.dna [--seed N]
 
@@ -61,7 +61,7 @@ class Skin(posing.Face):
         self.pixels = posing.PIXELS_A_MM * self.mm
 
     def needle(self, raw, vertex):
-        """How pointed the skin of a pose is at a vertex, beside how far it moves."""
+        """The spike of the posed skin around a vertex, relative to the vertex' displacement."""
         moved = self.at(raw) - self.rest
         smooth = moved
         for _ in range(ROUNDS):

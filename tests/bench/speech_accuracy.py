@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many frames of speech get the right viseme class, with a transcript and without.
+"""Measures the fraction of speech frames with the right viseme, with and without a transcript.
 
 The speech is espeak-ng's, whose phoneme times are known. Parameters were chosen on the first half
 of the sentences with the voices of that half; the figures that count are those of the second half,
@@ -102,7 +102,7 @@ def accuracy(table: np.ndarray) -> float:
 
 
 def commonest(table: np.ndarray) -> tuple[str, float]:
-    """What always guessing the commonest true class would reach."""
+    """The most common true class, and its fraction: the result of always guessing this class."""
     counts = table.sum(axis=1)
     return VISEMES[int(counts.argmax())], float(counts.max() / counts.sum())
 

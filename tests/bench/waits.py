@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The waits of a working day in Blender, each beside what Blender alone takes in the same scene.
+"""Measures waiting times in Blender, beside the time of Blender alone in the same scene.
 
     python tests/bench/waits.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--faces 1 2 4 8]
 
@@ -103,7 +103,7 @@ def measure_frames(path, package, counts, frames, mode):
 
 
 def slide(controls, value):
-    """A slider's step: its value, as the sidebar writes it, and the evaluated scene."""
+    """Set a slider's value as the sidebar does, and evaluate the scene."""
     face = controls.pose.bones["face"]
     name = next(n for n in list(face.keys()) if isinstance(face[n], float))
     face[name] = value
@@ -112,7 +112,7 @@ def slide(controls, value):
 
 
 class Slider:
-    """Steps of one slider, each another value."""
+    """Sets a slider to another value at each call."""
 
     def __init__(self, controls, after=lambda: None):
         self.controls, self.after, self.step = controls.name, after, 0
@@ -169,7 +169,7 @@ def measure_undo(drag, steps=8):
 
 
 def measure_switches(path, package, rounds, mode):
-    """Levels of detail, ways of keeping shapes and edit mode, back and forth."""
+    """Measure switching levels of detail, shape modes and edit mode, back and forth."""
     frame_time.empty_scene(package)
     (controls, rig), *_ = faces(path, 1, mode, lods=range(8))
     bpy.context.view_layer.objects.active = controls
@@ -194,7 +194,7 @@ def measure_switches(path, package, rounds, mode):
 
 
 def measure_files(path, package, rounds, mode, count=10):
-    """Import, and a .blend with several faces."""
+    """Measure the import, and saving and opening a .blend with several faces."""
     frame_time.empty_scene(package)
     seconds = []
     for _ in range(rounds):

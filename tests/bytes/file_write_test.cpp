@@ -179,7 +179,7 @@ TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
   std::vector<std::string> left = hidden_files(folder_);
   ASSERT_EQ(left.size(), 2u);
   std::erase(left, live->path().filename().string());
-  // Of a machine with another name, where that process may be alive.
+  // A leftover of another machine, on which its process may be alive.
   std::string foreign = left.at(0);
   foreign[std::string(".risorius-").size()] ^= 1;
   std::ofstream(folder_ / foreign) << "half";

@@ -100,7 +100,7 @@ TEST(ClipCurves, OfAnotherLengthAreRefused) {
   Clip smooth = make_clip(1, 64);
   std::copy_n(clip.curve(3).begin(), 64, smooth.curves.data());
   const Bytes bytes = encoded(smooth);
-  // The bits that pad the last byte cannot tell one frame more or less.
+  // A difference of one frame may go unnoticed because of the bits that pad the last byte.
   const std::uint32_t first = 0;
   for (const std::size_t frames : {1u, 32u, 64u, 200u}) {
     const auto curves = EncodedCurves::open(bytes, 1, frames);

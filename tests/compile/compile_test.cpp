@@ -183,7 +183,8 @@ TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
 }
 
 TEST(Compile, AGroupMayListItsControlsInAnyOrder) {
-  // By control, four of its columns lie three apart, but are not adjacent.
+  // Sorted by control, the first four columns are 0, 2, 1, 3: the last is three behind the first,
+  // as if they were adjacent.
   const std::vector<std::uint16_t> inputs = {0, 2, 1, 3, 5, 4, 6, 7};
   constexpr std::size_t kRows = 9;
   std::vector<std::uint16_t> outputs(kRows);

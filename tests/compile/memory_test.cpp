@@ -41,7 +41,8 @@ TEST_P(CompileMemory, GrowsWithTheFace) {
 INSTANTIATE_TEST_SUITE_P(Every, CompileMemory, testing::ValuesIn(kBombs),
                          [](const auto& about) { return std::string(about.param.name); });
 
-// Counts comparisons: searching a list of ranges would take four times as many for twice the rows.
+// Counts comparisons: a linear search in a list of ranges would need four times as many for twice
+// the rows.
 TEST(CompileSteps, OfAGuiTableGrowWithItsRows) {
   const auto steps = [](std::uint16_t rows) {
     core::Budget budget("this test", core::Budget::kUnlimited, core::Budget::kUnlimited);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Results, budgets and containers of numbers keep the promises that their users rely on.
+// Tests of results, budgets and containers of numbers.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -112,7 +112,7 @@ TEST(Buffer, HandsItsMemoryOverAndIsEmptyThen) {
   EXPECT_EQ(values.get()[1], -2.0f);
   EXPECT_EQ(buffer.size(), 0u);
   EXPECT_EQ(buffer.capacity(), 0u);
-  buffer.resize(1);  // it can be used again
+  buffer.resize(1);  // the buffer is usable again
   buffer[0] = 3.0f;
   EXPECT_EQ(values.get()[0], 1.5f);
   EXPECT_EQ(Buffer<float>().release(), nullptr);

@@ -338,7 +338,7 @@ TEST(DnaCoordinates, PlacesAndSignsComeBackExactly) {
     for (std::uint32_t sequence = 0; sequence < 6; ++sequence) {
       std::vector<Warning> warnings;
       const Dna there = converted(dna, target_of(axes, sequence, {1, -1, 1}), &warnings);
-      if (!warnings.empty()) continue;  // angles mix: the next test
+      if (!warnings.empty()) continue;  // the next test covers mixed angles
       const Dna back = converted(there, system_of(dna));
       EXPECT_EQ(back.definition, dna.definition);
       EXPECT_EQ(back.geometry, dna.geometry);

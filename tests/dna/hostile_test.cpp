@@ -37,8 +37,8 @@ Bytes golden(const std::string& name) {
   return bytes;
 }
 
-// There are too many variants of a golden file for all promises: each is tested in every third
-// turn.
+// All promises for each variant of a golden file would take too long: reading is tested, and in
+// every third turn one of the other promises instead.
 std::string one_promise(const Bytes& bytes, std::size_t turn) {
   const auto dna = promises::parse(bytes);
   if (!dna || turn % 3 != 0) return promises::reading(bytes, dna);
@@ -64,8 +64,8 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
   }
 }
 
-// Each of these bytes in turn becomes 0x00, 0xFF, and itself with one bit flipped. The turn that
-// check receives differs for the three.
+// Each of these bytes is replaced by 0x00, by 0xFF, and by itself with one bit flipped. The number
+// `turn` that check receives differs for the three.
 template <class Check>
 void expect_of_every_patch(const Bytes& bytes, const std::vector<std::size_t>& places,
                            Check check) {
@@ -261,7 +261,7 @@ TEST(HostileSource, ThatChangesBetweenTwoReadsIsNoHarm) {
   }
 }
 
-// ---- extras
+// ---- files of RISORIUS_SHARED, which a clone lacks
 
 TEST(HostileExtra, MalformedFilesAreUsableOrRefused) {
   const auto folder = testing_support::shared_folder("data/golden/malformed");

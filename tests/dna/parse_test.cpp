@@ -67,7 +67,8 @@ TEST(DnaWrite, PutsTheDescriptorWhereAHandWould) {
   core::Result<Dna> dna = parse_bytes(kDescriptorFile);
   ASSERT_TRUE(dna.has_value());
   const Bytes written = write_bytes(*dna, 2);
-  // Four layers now: the body lies after a table of 4 * 16 bytes and has lost the unknown byte.
+  // The written file has four layers: the body follows a table of 4 * 16 bytes, without the unknown
+  // byte.
   const std::size_t body = 7 + 4 + 4 * 16;
   ASSERT_GT(written.size(), body + 50);
   EXPECT_EQ(std::memcmp(written.data() + body, kDescriptorFile.data() + 27, 50), 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Both faces are timed if timing is requested.
+// The comparison times the evaluation of both faces only if timing is requested.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -16,7 +16,7 @@ TEST(Regroup, ThresholdsCountInTheFilesUnits) {
 }
 
 TEST(Regroup, KeepsQuaternionJointsWhole) {
-  // Columns out of order and one of them twice: the product of rotations depends on the order.
+  // Columns are out of order and one occurs twice: the product of rotations depends on the order.
   dna::Dna dna = make_face(3, 0, 3);
   dna.behavior.joint_groups =
       std::vector{make_group({4, 3}, {2, 0, 2, 1}, {12, 14, 13, 0},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small files that ask for much memory or time, made by code."""
+"""Makes small files that would need much memory or time without limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MiB = 1 << 20
 
 
 def fbx_arrays(path: Path) -> None:
-    """40 arrays of 256 MiB each in 10 MB, of objects that nothing asks for."""
+    """40 compressed arrays of 256 MiB in 10 MB, in objects that no reader needs."""
     raw = zlib.compress(bytes(256 * MiB), 9)
     packed = b"d" + struct.pack("<III", 32 * MiB, 1, len(raw)) + raw
     inner = b"".join(_raw_record(b"Vertices", packed) for _ in range(40))
@@ -30,13 +30,13 @@ _HEAD = struct.calcsize("<IIIB")
 
 
 def _raw_record(name: bytes, values: bytes) -> bytes:
-    """A record whose end is still counted from its own beginning."""
+    """A record whose end is relative to its own beginning; _placed() makes it absolute."""
     size = _HEAD + len(name) + len(values)
     return struct.pack("<IIIB", size, 1, len(values), len(name)) + name + values
 
 
 def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
-    """The head and one record around others, with the ends counted from the file's beginning."""
+    """The head and a record that contains others; the ends become absolute file positions."""
     start = len(head) + _HEAD + len(name)
     out, at = [], 0
     while at < len(inner):
@@ -49,14 +49,14 @@ def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
 
 
 def fbx_curve(path: Path) -> None:
-    """One curve that something moves, of eight million equal keys."""
+    """An animated curve of eight million equal keys."""
     curve = fbx_files.curve(1, np.zeros(8 * MiB), np.zeros(8 * MiB, "<f4"))
     tracks = [("Model/LimbNode", "jawOpen", "jawOpen", {"jawOpen": curve}, 0)]
     path.write_bytes(fbx_files.animation(tracks))
 
 
 def glb_channels(path: Path, channels: int = 1200, keys: int = 200_000) -> None:
-    """Many channels that share one accessor: each is a curve of its own when it is read."""
+    """Many channels that share one accessor; each becomes a separate curve when read."""
     views = [(0, 4 * keys), (4 * keys, keys)]
     document = {
         "asset": {"version": "2.0"},
@@ -87,33 +87,33 @@ def glb_channels(path: Path, channels: int = 1200, keys: int = 200_000) -> None:
 
 
 def gap(path: Path) -> None:
-    """Two rows, 30,000 years apart."""
+    """Two rows that are 30,000 years apart."""
     path.write_text("time,jawOpen\n0,0\n1e12,1\n")
 
 
 def gap_granted(path: Path) -> None:
-    """Two rows half a year apart: memory that a system may even give."""
+    """Two rows that are half a year apart; a system may grant the memory for all frames."""
     path.write_text("time,jawOpen,jawLeft\n0,0,0\n1.5e7,1,1\n")
 
 
 def slow_rate(path: Path) -> None:
-    """A frame in 10^300 seconds."""
+    """One frame per 10^300 seconds."""
     document = {"exportFps": 1e-300, "numPoses": 1, "numFrames": 2, "facsNames": ["jawOpen"]}
     path.write_text(json.dumps(document | {"weightMat": [[0], [1]]}))
 
 
 def deep_toml(path: Path) -> None:
-    """100,000 lists in each other."""
+    """100,000 nested lists in TOML."""
     path.write_text("x = " + "[" * 100_000 + "]" * 100_000)
 
 
 def deep_json(path: Path) -> None:
-    """As many in JSON."""
+    """100,000 nested lists in JSON."""
     path.write_text("[" * 100_000 + "]" * 100_000)
 
 
 def laughs(path: Path) -> None:
-    """Ten entities of ten each, behind what looks like a comment."""
+    """Nested XML entities that expand to 10^9 texts, hidden by a fake comment."""
     entities = ['<!ENTITY a0 "lol">']
     entities += [f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10)]
     path.write_text(
@@ -123,14 +123,14 @@ def laughs(path: Path) -> None:
 
 
 def rotation_order(path: Path) -> None:
-    """A DNA of a rotation order that there is not."""
+    """A DNA with an invalid rotation order."""
     facts = json.loads(risorius.load(GOLDEN / "core.dna").to_json())
     facts["dsce1.0"]["rotationSequence"] = 40
     risorius.Dna.from_json(json.dumps(facts)).save(path)
 
 
 def _solvers(count: int, poses: list[int], outputs: int) -> risorius.Dna:
-    """Core with RBF solvers, each of `poses`, and one pose that writes `outputs` controls."""
+    """core.dna with `count` RBF solvers of the poses; each pose writes `outputs` controls."""
     dna = risorius.load(GOLDEN / "core.dna")
     first = risorius.Rig(dna).control_count  # behind the correctives
     pose_count = max(poses) + 1
@@ -161,7 +161,7 @@ def _solvers(count: int, poses: list[int], outputs: int) -> risorius.Dna:
 
 
 def rbf_product(path: Path) -> None:
-    """A solver that names one pose 20,000 times, which writes 20,000 controls."""
+    """A solver that names a pose 20,000 times; the pose writes 20,000 controls."""
     _solvers(1, [0] * 20_000, 20_000).save(path)
 
 
@@ -171,7 +171,7 @@ def graph(path: Path) -> None:
 
 
 def gui_rows(path: Path) -> None:
-    """A million rows of the GUI table, each of an output of its own range."""
+    """A GUI table of a million rows, each with another range of values."""
     dna = risorius.load(GOLDEN / "core.dna")
     rows = 1_000_000
     begin = np.linspace(0, 0.5, rows, dtype=np.float32)
@@ -184,7 +184,7 @@ def gui_rows(path: Path) -> None:
 
 
 def counts(path: Path) -> None:
-    """Every fourth byte of a DNA's tail is a count beyond all bounds."""
+    """A DNA in whose second half every 4096th byte starts a huge count."""
     data = bytearray((GOLDEN / "core.dna").read_bytes())
     for at in range(len(data) // 2, len(data) - 4, 4096):
         data[at : at + 4] = b"\xff\xff\xff\xfe"
@@ -192,7 +192,7 @@ def counts(path: Path) -> None:
 
 
 def wav(path: Path) -> None:
-    """A sound that says it is 4 GiB long."""
+    """A WAV file whose header states a length of 4 GiB."""
     form = struct.pack("<HHIIHH", 1, 1, 16000, 32000, 2, 16)
     path.write_bytes(
         b"RIFF\xff\xff\xff\xffWAVEfmt " + struct.pack("<I", 16) + form + b"data\xff\xff\xff\xff"
@@ -200,7 +200,7 @@ def wav(path: Path) -> None:
 
 
 Bomb = tuple[str, Callable[[Path], None], list[str]]
-# Name of the file, who makes it, the arguments; FILE and OUT stand for paths.
+# (name of the file, function that makes it, arguments); FILE, OUT and CORE stand for paths.
 BOMBS: list[Bomb] = [
     ("zip40.fbx", fbx_arrays, ["clip", "info", "FILE"]),
     ("keys.fbx", fbx_curve, ["clip", "info", "FILE"]),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What is done to the command line, and what must hold then: packaging/check/faults.sh runs it.
+"""Tests the command line under faults. packaging/check/faults.sh runs this file.
 
-Bombs, flipped bits, kills, interrupts, full disks, folders that cannot be written, two processes at
-once, mutants of every command's inputs. Each trial is a row: its group, its name, how often it ran,
-what went wrong.
+The faults are bombs, flipped bits, kills, interrupts, full disks, read-only folders, parallel
+processes, and mutated inputs of all commands. Each trial prints a row with its group, its name, the
+number of runs and the failures.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ from room import (  # noqa: E402
     take,
 )  # fmt: skip
 
-START_MEMORY = 200 * MiB  # Python, NumPy and the package, and what any small file takes
+START_MEMORY = 200 * MiB  # memory of Python, NumPy and the package with a small file
 MEMORY_PER_BYTE = 40
 
 
 def bombs(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Peak memory within k times the file, within a minute of CPU, a result or a sentence."""
+    """Bombs: limited peak memory and CPU time, and a result or an error in one sentence."""
     for name, make, words in BOMBS:
         if names and name not in names:
             continue
@@ -113,7 +113,7 @@ print("done")
 
 
 def flips(rounds: int) -> Iterator[Row]:
-    """Bits turned in DNA files, clips and the cache of compiled faces: a sentence, or right."""
+    """Flipped bits in DNA files, clips and cached rigs give an error or the right result."""
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         clip = folder / "take.rzc"
@@ -132,7 +132,7 @@ def flips(rounds: int) -> Iterator[Row]:
 
 
 def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longest: float) -> None:
-    """Until a random moment, or until a hidden file shows that something is being written."""
+    """Wait for a random time, or until a hidden file shows that the command is writing."""
     end = time.monotonic() + draw.uniform(0.0, longest)
     if draw.random() < 0.5:
         end = time.monotonic() + 60.0
@@ -147,7 +147,7 @@ def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longe
 def _signalled(
     group: str, what: signal.Signals, rounds: int, names: Sequence[str]
 ) -> Iterator[Row]:
-    """A signal at random moments: the target is the old file or the new one."""
+    """Send a signal at random moments. The target must be the complete old or new file."""
     draw = random.Random(20)
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
@@ -180,26 +180,29 @@ def _signalled(
 
 
 def _interrupted(done: Done) -> list[str]:
-    """What is wrong with how an interrupted command ended. One that has said what it did and is
-    leaving may end by the signal itself: Python listens no longer."""
+    """Complaints about the end of an interrupted command.
+
+    A command that has already printed its result may end by the signal, because Python ignores its
+    handler while it exits.
+    """
     leaving = done.code == -signal.SIGINT and done.out and not done.err
     return [] if leaving else complaints(done, (0, 130))
 
 
 def kills(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """kill -9: no half file, and what is left goes with the next run."""
+    """kill -9 leaves no partial target, and the next run removes temporary files."""
     yield from _signalled("kill", signal.SIGKILL, rounds, names)
 
 
 def interrupts(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Ctrl-C: a sentence, exit code 130, the old file or the new one, nothing left."""
+    """Ctrl-C gives a sentence and exit code 130, and leaves only the old or the new file."""
     yield from _signalled("interrupt", signal.SIGINT, rounds, names)
     if not names:
         yield from _printing(rounds)
 
 
 def _printing(rounds: int) -> Iterator[Row]:
-    """Ctrl-C in commands that write no file."""
+    """Interrupt commands that write no file."""
     draw = random.Random(5)
     for words in (["bench", str(CORE)], ["info", str(CORE)], ["live", "--seconds", "5"]):
         row = Row("interrupt", words[0])
@@ -214,10 +217,10 @@ def _printing(rounds: int) -> Iterator[Row]:
 
 
 def _refused(row: Row, room: Room, target: Path, done: Done, named: str) -> None:
-    """The command has failed with a sentence that names the target, and has changed nothing."""
+    """Check that a command failed with a sentence that names the target, and changed no file."""
     row.runs += 1
     row.faults += complaints(done, (1,))
-    # Matplotlib says in a line of its own that its cache of fonts has no room either.
+    # Matplotlib prints an extra line if it cannot write its font cache.
     lines = [line for line in done.err.splitlines() if "font_manager" not in line]
     said = "\n".join(lines)[-150:]
     row.check(named in said, f"{named} is not named: {said}")
@@ -233,7 +236,7 @@ def _limited() -> None:
 
 @contextlib.contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[bool]:
-    """A disk of its own at a folder; whether that could be had."""
+    """Mount a small disk at a folder. Yields whether this succeeded."""
     command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     try:
         made = subprocess.run(command, capture_output=True, check=False).returncode == 0
@@ -258,15 +261,15 @@ def _forbid(disk: Path) -> bool:
 
 
 def _on_a_disk(kind: str, name: str, spoil: Callable[[Path], bool]) -> Row:
-    """A command whose output lies on a small disk of its own, after `spoil` made that refuse.
+    """Run a command that writes to a small separate disk which refuses writing.
 
     Args:
-        kind: of trial, as its row says.
-        name: the command, of COMMANDS.
-        spoil: is given the disk's folder; False where this machine does not let it.
+        kind: kind of the trial, for its row.
+        name: name of the command, key of COMMANDS.
+        spoil: makes the disk refuse writing; gets its folder; returns False if it cannot.
 
     Returns:
-        The trial's row, NOT RUN where no disk can be mounted.
+        The trial's row; NOT RUN if no disk can be mounted.
     """
     row = Row(kind, name)
     with tempfile.TemporaryDirectory() as text:
@@ -282,7 +285,7 @@ def _on_a_disk(kind: str, name: str, spoil: Callable[[Path], bool]) -> Row:
 
 
 def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """No room: a sentence that names the file, the old one whole, nothing left."""
+    """A full disk gives a sentence that names the file, and leaves only the complete old file."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
@@ -308,14 +311,14 @@ def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """A folder that is missing or cannot be written is said before the input is looked at."""
+    """A missing or read-only folder is reported before the input is read."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
             target, words = room.arguments(name)
             row = Row("missing folder", name)
             if name.startswith("eval"):
-                (room.outputs / "none").write_text("")  # it makes folders, but not out of a file
+                (room.outputs / "none").write_text("")  # eval makes folders, so a file blocks it
             words = [
                 str(room.outputs / "none" / target.name) if word == str(target) else word
                 for word in words
@@ -336,7 +339,7 @@ def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Several processes write one file, fill one cache, do one batch."""
+    """Several processes write the same file, fill the same cache, or run the same batch."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
@@ -359,7 +362,7 @@ def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def _batches(rounds: int) -> Row:
-    """Two batches in one folder: one does it, the other says who does, or comes later."""
+    """Two batches in one folder: one works; the other names the first, or runs after it."""
     row = Row("at once", "batch")
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as text:
@@ -380,7 +383,7 @@ def _batches(rounds: int) -> Row:
 
 
 def mutations(rounds: int, names: Sequence[str] = (), seed: int | None = None) -> Iterator[Row]:
-    """Mutants of every command's inputs, others in each run: a result or a sentence, in bounds."""
+    """Mutated inputs of all commands, new in each run, give a result or a sentence in bounds."""
     drawn = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"mutations: --seed {drawn} repeats them", flush=True)
     yield from trials(5 * rounds, drawn, tuple(names))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Inputs of every command, each with a few small faults in it, by a seed.
+"""Makes inputs of all commands with a few small random faults.
 
-A JSON, TOML or table gets another value in one of its places, loses a part or has one twice; a
-binary file gets other bytes. Sometimes a word of the command line is another one. Whatever comes of
-it, a command ends with a result or a sentence, within bounds, and a failure leaves no file behind.
+In JSON, TOML and tables, a value is replaced, or a part is removed or duplicated. In binary files,
+bytes change. Sometimes a word of the command line is replaced. Each command must end with a result
+or a sentence within the limits, and a failure must leave no file.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from risorius.web import page as web_page
 from room import Done, Row, complaints
 from valid_inputs import make_inputs
 
-CPU_SECONDS = 20  # of a round
-MEMORY = 300 * MiB  # what any small file may take, as budgets grant it
+CPU_SECONDS = 20  # limit of a round
+MEMORY = 300 * MiB  # limit for small files, which the budgets of readers grant too
 MEMORY_PER_BYTE = 40
 _PAGE = "<html><!--FACE--></html>"
 
@@ -58,7 +58,7 @@ ODD_WORDS = (
 
 
 def in_json(data: bytes, draw: random.Random) -> bytes:
-    """Another value somewhere, a key less, an item twice, deep lists."""
+    """Replace a value, remove a key, duplicate an item, or insert deep lists."""
     document = json.loads(data)
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         places = list(_places(document))
@@ -83,7 +83,7 @@ def _odd(draw: random.Random) -> Any:
         for _ in range(draw.choice((70, 500, 900))):
             deep = [deep]
         return deep
-    return json.loads(json.dumps(draw.choice(ODD)))  # a list of its own
+    return json.loads(json.dumps(draw.choice(ODD)))  # a copy, because lists are mutable
 
 
 def _places(value: Any) -> Iterator[tuple[Any, Any]]:
@@ -95,7 +95,7 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def in_text(data: bytes, draw: random.Random) -> bytes:
-    """Another number or word, a line less or twice, a byte that no text has."""
+    """Replace a number or word, remove or duplicate a line, or insert invalid bytes."""
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         what = draw.random()
         if what < 0.6:
@@ -142,7 +142,7 @@ _NUMBERS = (b"\xff" * 4, b"\0" * 4, b"\0\0\x80\x7f", b"\0\0\xc0\x7f", b"\xff\xff
 
 
 def in_bytes(data: bytes, draw: random.Random) -> bytes:
-    """Other bits, numbers that stand for none, a part less, a part twice."""
+    """Flip bits, insert special numbers, remove or duplicate a part."""
     out = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 8))):
         at = draw.randrange(len(out) + 1)
@@ -163,7 +163,7 @@ def in_bytes(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_dna(data: bytes, draw: random.Random) -> bytes:
-    """Bytes, or values of fields that still make a file."""
+    """Change bytes, or change values of fields that can still be stored."""
     if draw.random() < 0.4:
         return in_bytes(data, draw)
     for _ in range(8):
@@ -179,7 +179,7 @@ def _as_json(data: bytes) -> bytes:
 
 
 def in_glb(data: bytes, draw: random.Random) -> bytes:
-    """Bytes, or the JSON in front of them."""
+    """Change bytes, or the JSON at the beginning."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     (size,) = struct.unpack_from("<I", data, 12)
@@ -191,7 +191,7 @@ def in_glb(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_npz(data: bytes, draw: random.Random) -> bytes:
-    """Bytes, or another array."""
+    """Change bytes, or an array."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     arrays = dict(np.load(io.BytesIO(data)))
@@ -223,15 +223,15 @@ IN: dict[str, Callable[[bytes, random.Random], bytes]] = {
 
 
 def mutant(name: str, data: bytes, draw: random.Random) -> bytes:
-    """A file with a fault or some, of its own kind or, seldom, of any."""
+    """A mutated file. The faults fit its format; sometimes they are arbitrary bytes."""
     kind = in_bytes if draw.random() < 0.1 else IN.get(Path(name).suffix, in_bytes)
     try:
         return kind(data, draw)
-    except (RecursionError, UnicodeError):  # too deep to be written, or letters that are none
+    except (RecursionError, UnicodeError):  # nested too deeply, or invalid characters
         return in_bytes(data, draw)
 
 
-# Name -> the files that get faults, and the words; OUT.x is what is written, FILE one of the files.
+# Name -> (files that get faults, command line). OUT.x is the output, FILE one of the files.
 TRIALS: dict[str, tuple[list[str], str]] = {
     "info": (["core.dna", "face.dna"], "info FILE"),
     "info json": (["core.dna", "face.dna"], "info FILE --json"),
@@ -281,13 +281,13 @@ TRIALS: dict[str, tuple[list[str], str]] = {
     "plot": (["core.dna", "face.dna"], "plot FILE -o OUT.png --dpi 40"),
     "bench": (["frames.npz"], "bench core.dna --frames frames.npz --quick"),
 }  # fmt: skip
-SLOW = {"plot": 10, "speech": 4, "bench": 4}  # one round of so many
+SLOW = {"plot": 10, "speech": 4, "bench": 4}  # one of this number of rounds runs
 KEPT = ("--dry-run", "--offline", "--seconds")  # without them a round takes minutes
 QUICK = ("info", "convert json", "clip info", "clip check", "author names", "sample", "batch")
 
 
 class Round:
-    """A command with faults in its inputs, drawn by a key."""
+    """A command with faults in its inputs, drawn by a seed."""
 
     def __init__(self, inputs: dict[str, bytes], name: str, key: str) -> None:
         self.draw = random.Random(key)
@@ -305,7 +305,7 @@ class Round:
             self.files[target] = mutant(target, inputs[target], self.draw)
 
     def write(self, folder: Path) -> None:
-        """Put the files into an empty folder."""
+        """Write the files into an empty folder."""
         for name, data in self.files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -316,7 +316,7 @@ class Round:
                     (folder / word).write_text("old")
 
     def faults(self, folder: Path) -> list[str]:
-        """Run the command in the folder. Returns complaints about its end."""
+        """Run the command in the folder. Returns sentences on failures."""
         before = _contents(folder)
         memory, began = _begin_peak(), time.process_time()
         signal.setitimer(signal.ITIMER_PROF, 3 * CPU_SECONDS)  # ends the process
@@ -351,17 +351,17 @@ def _contents(folder: Path) -> dict[str, int]:
 
 
 def _run(words: list[str]) -> Done:
-    """A command in this process, as a terminal would see it."""
+    """Run a command in this process. Returns its exit code and output."""
     try:
         done = command_line.run(*words)
-    except BaseException:  # noqa: BLE001  whatever it is, a command lets nothing through
+    except BaseException:  # noqa: BLE001  a command must not raise any exception
         return Done(-1, "", traceback.format_exc())
     out, err = (text.decode("utf-8", "replace") for text in (done.stdout, done.stderr))
     return Done(done.returncode, out, err.splitlines()[-1] if err.startswith("usage:") else err)
 
 
 def _begin_peak() -> int:
-    """Bytes held now; from here on the peak is counted, where the system lets one."""
+    """Reset the system's peak memory if possible. Returns the used bytes."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
     return _peak()
@@ -376,7 +376,7 @@ def _peak() -> int:
 
 
 def rounds_of(name: str, seed: int, rounds: int, only: int | None = None) -> Row:
-    """Rounds of a command in a process of their own, and another after each that ends it.
+    """Run rounds of a command in a separate process, and in a new one after each crash.
 
     Args:
         name: one of TRIALS.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands of the command line, the folders that they work in, and how they end."""
+"""Runs commands of the command line in temporary folders, and checks how they end."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from risorius import importing
 from risorius.files import fileio
 
 CORE = GOLDEN / "core.dna"
-# A command that says when it listens to signals: before, Python itself would answer them.
-# As the program does, it hears no interrupt once the work is done.
+# Runs the command line and prints a line once it handles signals; earlier, Python would handle
+# them. Like the program, it ignores interrupts after the work is done.
 READY = """
 import signal, sys, risorius.cli as c
 print("ready", flush=True)
@@ -35,7 +35,7 @@ MOST_LINES = 12
 
 @dataclass
 class Done:
-    """How a command ended."""
+    """The end of a command: exit code, output, and peak memory in bytes."""
 
     code: int
     out: str
@@ -45,7 +45,7 @@ class Done:
 
 @dataclass
 class Row:
-    """A trial: how often it ran, what went wrong."""
+    """The results of a trial: number of runs and failures."""
 
     group: str
     name: str
@@ -59,7 +59,7 @@ class Row:
 
 
 def take(path: Path, frames: int = 60) -> Path:
-    """A clip of core's controls by formula."""
+    """Write a take of core.dna's controls, made by a formula."""
     names = risorius.load(CORE).raw_control_names
     t = np.arange(frames) / 30.0
     curves = 0.5 + 0.5 * np.sin(np.outer(1 + np.arange(len(names)) % 5, t))
@@ -69,7 +69,7 @@ def take(path: Path, frames: int = 60) -> Path:
 
 
 def voice(path: Path) -> Path:
-    """A second of a hum."""
+    """Write a sound: a hum of one second."""
     t = np.arange(16000) / 16000.0
     with wave.open(str(path), "wb") as file:
         file.setparams((1, 2, 16000, 0, "NONE", ""))
@@ -78,7 +78,7 @@ def voice(path: Path) -> Path:
 
 
 def jobs(folder: Path) -> Path:
-    """A batch of four jobs on the take, into folder / "out"."""
+    """Write a batch of four jobs with the take; its output folder is folder / "out"."""
     path = folder / "jobs.toml"
     path.write_text(
         'output = "out"\n[[jobs]]\nclips = "*.csv"\n'
@@ -87,7 +87,7 @@ def jobs(folder: Path) -> Path:
     return path
 
 
-# Name -> end of the target's name and the arguments; IN is an animation, VOICE a sound.
+# Name -> (file ending of the target, arguments); IN is an animation, VOICE a sound.
 COMMANDS: dict[str, tuple[str, list[str]]] = {
     "convert": (".dna", ["convert", "CORE", "OUT"]),
     "convert json": (".json", ["convert", "CORE", "OUT"]),
@@ -106,7 +106,7 @@ QUICK = ("convert", "clip csv", "eval npz")
 
 @dataclass
 class Room:
-    """A folder of inputs and one for outputs."""
+    """A folder of inputs and a folder for outputs."""
 
     inputs: Path
     outputs: Path
@@ -137,7 +137,7 @@ class Room:
 def begin(
     arguments: Sequence[str], limit: Callable[[], None] | None = None
 ) -> subprocess.Popen[str]:
-    """A command that has just begun to listen to signals."""
+    """Start a command and wait until it handles signals."""
     process = subprocess.Popen(
         [sys.executable, "-c", READY, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
@@ -155,7 +155,7 @@ def finish(process: subprocess.Popen[str]) -> Done:
 
 
 def measured(arguments: Sequence[str], folder: Path) -> Done:
-    """Run a command to its end, within bounds that are far beyond what is allowed."""
+    """Run a command to its end, with limits far above the allowed ones. Measures peak memory."""
 
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
@@ -176,7 +176,7 @@ def measured(arguments: Sequence[str], folder: Path) -> Done:
 
 
 def complaints(done: Done, codes: Sequence[int]) -> list[str]:
-    """What is wrong with how a command ended: a crash, a traceback, no sentence, too many."""
+    """Sentences on a wrong end: a crash, a traceback, no error sentence, or several."""
     lines = done.err.strip().splitlines()
     out = []
     if done.code not in codes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small valid inputs of every command, made by code: what mutants_of_inputs puts faults into."""
+"""Makes small valid inputs of all commands, into which mutants_of_inputs puts faults."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _glb_head() -> bytes:
 
 
 def _glb_take() -> bytes:
-    """Morph weights that move, in a GLB."""
+    """A GLB with animated morph weights."""
     times = np.arange(8, dtype="<f4") / 30
     binary = times.tobytes() + np.linspace(0, 1, 16, dtype="<f4").tobytes()
     document = {
@@ -107,7 +107,7 @@ def _wav() -> bytes:
 
 
 def make_inputs(folder: Path) -> dict[str, bytes]:
-    """The valid files of all trials, by name."""
+    """Name -> bytes of the valid input files of all trials."""
     core = (GOLDEN / "core.dna").read_bytes()
     dna = risorius.load(core)
     names = dna.raw_control_names

@@ -62,13 +62,13 @@ class Seeds {
     add_rig(name, *read);
   }
 
-  /// Lists that multiply each other, for `evaluate` to run once. Each takes as long as a thousand
-  /// other inputs, so that they are not used as seeds for mutation.
+  /// Adds a file whose lists multiply each other, which `evaluate` runs once. It takes as long as a
+  /// thousand other inputs and is therefore no seed for mutation.
   void add_bomb(const std::string& name, const Bytes& file) {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
 
-  /// For the deliberately faulty target: one run with it finds the fault.
+  /// A seed for the deliberately faulty target: one run with this seed finds the fault.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
 
   /// Rows and packed buffers of each mode, as packed_fuzz reads them.

@@ -57,7 +57,7 @@ class HeapBound {
            " bytes of the heap, at most " + std::to_string(most_) + " were expected");
   }
 
-  /// For sizes that an input announces as a number without a list behind it.
+  /// Allows more heap, for a size that an input declares as a number without a list of that size.
   void allow(std::size_t bytes) { most_ += bytes; }
 
  private:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds Any in what a module shows: what functions take and give, members, and names for types."""
+"""Finds Any in the public types of a module: arguments, results, members, and type aliases."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from contextlib import suppress
 
 
 def shown_any(tree: ast.Module) -> list[str]:
-    """Dotted names of the public functions, members and names of a module that have Any in them.
+    """Dotted names of the public functions, members and names of a module whose types contain Any.
 
-    A variable inside a function is not shown, nor is what a leading underscore hides; __init__ is.
+    Variables inside functions are not public, nor are names with a leading underscore, except
+    __init__.
     """
     return [name for name, types in _shown(tree.body, "") if any(map(_has_any, types))]
 
@@ -38,7 +39,7 @@ def _public(name: str) -> bool:
 
 
 def _has_any(kind: ast.AST | None) -> bool:
-    """Whether an expression has Any in it, also one that is written as a text."""
+    """Whether a type expression contains Any, also inside a string annotation."""
     if kind is None:
         return False
     parts = list(ast.walk(kind))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds public functions whose docstring does not say what their arguments and errors are."""
+"""Finds public functions whose docstring does not explain their arguments and errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import ast
 import re
 from collections.abc import Iterator
 
-# What Blender calls on the classes of an add-on, always with the same arguments.
+# Methods that Blender calls on an add-on's classes, always with the same arguments.
 BLENDERS = {"poll", "execute", "invoke", "modal", "draw", "draw_item", "filter_items"}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -16,8 +16,9 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 def public_functions(tree: ast.Module) -> Iterator[tuple[str, Function]]:
     """(dotted name, definition) of the functions of a module and the methods of its classes.
 
-    Names that begin with an underscore, and what lies in them, are not public. Overloads are left
-    to the definition behind them, and what Blender calls on its classes to Blender's manual.
+    Names that begin with an underscore and their members are not public. Overloads are skipped,
+    because their definition has the docstring. Methods that Blender calls are skipped, because
+    Blender's manual explains them.
     """
     for node in tree.body:
         if isinstance(node, Function) and _shown(node):
@@ -45,10 +46,10 @@ def arguments(node: Function) -> list[str]:
 
 
 def unsaid(node: Function) -> list[str]:
-    """What the docstring of a function with two arguments or more leaves out.
+    """Names of the arguments that a docstring does not mention, and "Raises" if it omits errors.
 
-    Each argument has to be named in it, and errors where the function raises some itself: under
-    Args and Raises, or in sentences where these say enough.
+    Only functions with at least two arguments are checked. The docstring must mention each
+    argument, and errors if the function itself raises some, in Args and Raises or in sentences.
     """
     names = arguments(node)
     if len(names) < 2:

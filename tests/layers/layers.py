@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the include and import lines of a part of the project against its rooms in rooms.toml."""
+"""Checks the includes and imports of a part of the project against its rooms in rooms.toml."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Use(NamedTuple):
 
 
 def sources(root: Path, part: str) -> dict[str, str]:
-    """The text of each file of a part of the project by its path inside the part's folder."""
+    """Path inside the part's folder -> text, for each file of a part of the project."""
     plan = ROOMS[part]
     base = root / plan["folder"]
     found = {}
@@ -40,13 +40,13 @@ def sources(root: Path, part: str) -> dict[str, str]:
 
 
 def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
-    """The room of a file: the file itself, or its folder; None where rooms has neither."""
+    """The room of a file: the file itself or its folder; None if `rooms` has neither."""
     folder = PurePosixPath(path).parent.as_posix()
     return next((room for room in (path, folder) if room in rooms), None)
 
 
 def included(path: str, text: str, files: frozenset[str]) -> Iterator[Use]:
-    """What a C++ file includes; a quoted name is looked for beside the file, then under native/."""
+    """Yields a C++ file's includes. A quoted name is searched beside the file, then in native/."""
     for quoted, angled, other in _includes(text):
         name = quoted or angled
         places = [_joined(PurePosixPath(path).parent, name)] if quoted else []
@@ -77,7 +77,7 @@ def _joined(folder: PurePosixPath, name: str) -> str:
 
 
 def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
-    """What a Python file imports, in functions, under TYPE_CHECKING and by import_module too."""
+    """Yields a Python file's imports, also in functions, under TYPE_CHECKING, by import_module."""
     package = (name, *PurePosixPath(path).parts[:-1])
     for module, member in _imports(text, package):
         if module is None:
@@ -104,7 +104,7 @@ def _imports(text: str, package: tuple[str, ...]) -> list[tuple[tuple[str, ...] 
 def _names(
     nodes: list[ast.AST], package: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...] | None, str]]:
-    """(module, member) of each import; (None, the line) of one whose name is not written down."""
+    """(module, member) of each import; (None, the line) if the name is not a literal."""
     importers = {"import_module", "__import__"}
     for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == "importlib":
@@ -127,7 +127,7 @@ def _names(
 
 
 def _literal(node: ast.expr) -> tuple[str, bool]:
-    """The text that an expression begins with, and whether that is all of it."""
+    """The literal text at the beginning of an expression, and whether it is the whole text."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value, True
     if isinstance(node, ast.JoinedStr) and isinstance(node.values[0], ast.Constant):
@@ -142,7 +142,7 @@ def _absolute(name: str, package: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def uses(part: str, files: Mapping[str, str]) -> dict[str, list[Use]]:
-    """What each file of a part uses."""
+    """Path of a file -> its imports or includes."""
     known = frozenset(files)
     out = {}
     for path, text in files.items():
@@ -154,7 +154,7 @@ def uses(part: str, files: Mapping[str, str]) -> dict[str, list[Use]]:
 
 
 def violations(part: str, files: Mapping[str, str]) -> list[str]:
-    """One sentence for each file, import or folder of a part that the plan does not allow."""
+    """A sentence for each file, import or folder of a part that the plan does not allow."""
     plan = ROOMS[part]
     used = uses(part, files)
     found = [
@@ -219,7 +219,7 @@ def _disordered(rooms: Mapping[str, list[str]]) -> list[str]:
 
 
 def _stale(used: Mapping[str, list[Use]], rooms: Mapping[str, list[str]]) -> list[str]:
-    """What the plan allows and no file needs: so the plan is a drawing of the house as it is."""
+    """Sentences on uses that the plan allows but no file needs, so that the plan stays exact."""
     needed = {
         (room_of(path, rooms), room)
         for path, targets in used.items()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The tables of the READMEs that say what lies where, and what does lie there.
+"""Compares the tables of files and folders in READMEs with the actual files and folders.
 
-A map is a table of a page; the first column of its rows has names in backquotes. `Map.wrong` says
-in sentences which names of the table are nowhere, and which the table lacks.
+A map is a table of a page; the first column of its rows has names in backquotes. `Map.wrong`
+returns sentences on names that do not exist, and on names that the table lacks.
 """
 
 import re
@@ -18,11 +18,11 @@ def first_cells(text: str, head: str) -> list[str]:
     """The names in backquotes in the first column of the table whose head begins with a text.
 
     Args:
-        text: of the page, as Markdown.
-        head: how the first cell of the table's head begins.
+        text: Markdown text of the page.
+        head: beginning of the first cell of the table's head.
 
     Returns:
-        The names without options and without words that follow them; none without such a table.
+        The names without options and following words; empty if the page lacks the table.
     """
     found = re.search(rf"^\| {re.escape(head)}[^\n]*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE)
     cells = [row.split("|")[1] for row in found[1].splitlines()] if found else []
@@ -31,22 +31,25 @@ def first_cells(text: str, head: str) -> list[str]:
 
 
 def folders(path: Path) -> list[str]:
-    """The names of the folders in a folder that hold a file, but for those that Python makes."""
+    """The names of the subfolders that contain a file, without caches of Python."""
     inside = (p for p in path.iterdir() if p.is_dir() and p.name != "__pycache__")
     return [p.name for p in inside if any(f.is_file() and f.suffix != ".pyc" for f in p.rglob("*"))]
 
 
 def files(path: Path) -> list[str]:
-    """The names of the files in a folder, but for its README.md and what marks a package."""
+    """The names of the files in a folder without README.md, __init__.py and CMakeLists.txt."""
     return [p.name for p in path.iterdir() if p.is_file() and p.name not in _UNNAMED]
 
 
 @dataclass(frozen=True)
 class Map:
-    """A table: its page, its head, the names that are there, and the places where they lie.
+    """A table of a page.
 
-    `there` are the names that the table must have; each name that it has must be a path below one
-    of `places`.
+    Attributes:
+        page: path of the page.
+        head: beginning of the first cell of the table's head.
+        there: names that the table must contain.
+        places: folders; each name in the table must be a path below one of them.
     """
 
     page: str
@@ -55,7 +58,7 @@ class Map:
     places: tuple[str, ...]
 
     def wrong(self, text: str) -> list[str]:
-        """A sentence for each name that is missing in the table, or on the disk."""
+        """A sentence for each name that is missing in the table of a page's text or on the disk."""
         named = [name.rstrip("/") for name in first_cells(text, self.head)]
         where = f"{self.page}, table {self.head}"
         lost = [n for n in named if not any((ROOT / place / n).exists() for place in self.places)]
@@ -69,7 +72,7 @@ def _all(*names: Iterable[str]) -> tuple[str, ...]:
 
 
 def maps() -> list[Map]:
-    """The maps of the project, with what lies there now."""
+    """The maps of the project with the existing names."""
     at = ROOT.joinpath
     native = [f"native/{name}" for name in folders(at("native"))]
     others = ["addon/risorius", "tests", "blender_tests", "packaging", "docs"]

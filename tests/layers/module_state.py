@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Finds what a module or a class of the add-on remembers outside scene/base/session.py.
+"""Finds mutable state of modules and classes of the add-on outside scene/base/session.py.
 
-A name of a module may stand for
+A name of a module may have these values:
 
-- what session gave: `_found = session.table(...)`;
-- what cannot change: a number, a text, a tuple of these, a frozenset, a pattern, a type;
-- in UPPER_CASE, any table, list or set: nothing of the add-on changes one of that name.
+- a result of session: `_found = session.table(...)`;
+- an immutable value: a number, a string, a tuple of these, a frozenset, a pattern, a type;
+- in UPPER_CASE, any table, list or set, if no code changes it.
 
-The names of a class are held to the same; those that begin with bl_ are read by Blender, which
-wants sets. Nothing is rebound by `global`, by `Class.name = ...` or by `module.name = ...`. A
-function is cached by `session.cached`; logic, language and native.py know no session: their cached
-functions are handed to `session.adopt` in registration.py.
+The same rules hold for names of classes, except names with bl_, because Blender requires sets
+there. `global`, `Class.name = ...` and `module.name = ...` must not rebind a name. Functions are
+cached by `session.cached`. logic, language and native.py may not import session, so registration.py
+passes their cached functions to `session.adopt`.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ def _first(node: ast.expr) -> str:
 
 
 def _is_fixed(value: ast.expr, session: str) -> bool:
-    """Whether a value cannot change, or is another name of something that has its own rule.
+    """Whether an assigned value is immutable, or a name for which another rule holds.
 
     Args:
-        value: what is assigned.
-        session: the name that the file has for the registry.
+        value: the assigned expression.
+        session: the file's name for the module session.
     """
     parts = {"Tuple": "elts", "IfExp": "body orelse", "Starred": "value"}
     if type(value).__name__ in parts:
@@ -80,7 +80,7 @@ def _is_fixed(value: ast.expr, session: str) -> bool:
 
 
 def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
-    """Whether a name in UPPER_CASE may stand for a value. Args: frozen  see _frozen."""
+    """Whether a name in UPPER_CASE may have a value. Args: frozen  see _frozen()."""
     if not isinstance(value, ast.Call):
         return not isinstance(value, (ast.GeneratorExp, ast.NamedExpr))
     name = _last(value.func)
@@ -91,7 +91,7 @@ def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
 
 
 class _File(NamedTuple):
-    """A file that was read. Attributes: body  its statements; nodes  all that is in it, by kind."""
+    """A parsed file. Attributes: body  its statements; nodes  kind -> all its syntax nodes."""
 
     body: list[ast.stmt]
     nodes: dict[type, list[Any]]
@@ -121,7 +121,7 @@ def _frozen(file: _File) -> set[str]:
 
 
 def _statements(body: list[ast.stmt], inside: str = "") -> Iterator[tuple[str, ast.stmt]]:
-    """The statements that run once when a module is read, with the class that they stand in."""
+    """The statements that run when a module is imported, each with the name of its class or ""."""
     for node in body:
         yield inside, node
         if isinstance(node, ast.ClassDef):
@@ -140,14 +140,14 @@ def _names(target: ast.expr) -> list[str]:
 
 
 def _registry(file: _File) -> str:
-    """The name that a file has for session, empty where it knows none."""
+    """The file's name for the module session; "" if it does not import session."""
     imports = file.of(ast.ImportFrom)
     names = (alias for node in imports for alias in node.names if alias.name == "session")
     return next((alias.asname or alias.name for alias in names), "")
 
 
 def _of_names(file: _File) -> Iterator[tuple[int, str]]:
-    """The names of a module and its classes that stand for something which changes."""
+    """The names of a module and its classes that have mutable values."""
     frozen, session = _frozen(file), _registry(file)
     for inside, node in _statements(file.body):
         if isinstance(node, ast.Assign):
@@ -166,7 +166,7 @@ def _of_names(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _modules(path: str, file: _File, files: Mapping[str, str]) -> set[str]:
-    """The names by which a file calls other modules of the add-on."""
+    """The file's names for other modules of the add-on."""
     found = set()
     for node in file.of(ast.ImportFrom):
         if node.level:
@@ -188,7 +188,7 @@ def _targets(node: ast.AST) -> list[ast.expr]:
 
 
 def _changed(node: ast.AST) -> ast.expr | None:
-    """What a call or an assignment changes in place, as `x` of x[0] = 1 and x.append(1)."""
+    """The object that a call or an assignment changes, for example x in x[0] = 1 or x.append(1)."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
         return node.func.value if node.func.attr in CHANGES else None
     for target in _targets(node):
@@ -217,7 +217,7 @@ def _of_changes(file: _File, modules: set[str]) -> Iterator[tuple[int, str]]:
 
 
 def _cached(file: _File) -> Iterator[tuple[int, str]]:
-    """The functions of a module that functools keeps results of."""
+    """The functions of a module whose results functools caches."""
     for node in file.of(ast.FunctionDef, ast.AsyncFunctionDef):
         for decorator in node.decorator_list:
             call = decorator.func if isinstance(decorator, ast.Call) else decorator
@@ -226,7 +226,7 @@ def _cached(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _of_defaults(file: _File) -> Iterator[tuple[int, str]]:
-    """Defaults of arguments that change: Python makes them once."""
+    """Mutable defaults of arguments, which all calls share."""
     for arguments in file.of(ast.arguments):
         for value in [*arguments.defaults, *filter(None, arguments.kw_defaults)]:
             if isinstance(value, (ast.Dict, ast.List, ast.Set)):
@@ -234,7 +234,7 @@ def _of_defaults(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _adopted(text: str) -> set[str]:
-    """`module.function` of all that registration.py hands to session.adopt."""
+    """`module.function` of all functions that registration.py passes to session.adopt."""
     found = (call for call in _read(text).of(ast.Call) if ast.unparse(call.func) == "session.adopt")
     return {ast.unparse(value) for call in found for value in call.args}
 
@@ -247,7 +247,7 @@ def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int,
 
 
 def entries(files: Mapping[str, str]) -> list[str]:
-    """The names that are given to the registry, in the order of the files."""
+    """The names of all entries of the registry, in the order of the files."""
     read = [_read(text) for path, text in files.items() if path != SESSION]
     return [
         ast.literal_eval(node.args[0])
@@ -259,10 +259,10 @@ def entries(files: Mapping[str, str]) -> list[str]:
 
 
 def found(files: Mapping[str, str]) -> list[str]:
-    """`path:line: what` of everything that remembers outside the registry.
+    """`path:line: reason` for all mutable state outside the registry.
 
     Args:
-        files: path below addon/risorius -> text, of all Python files of the add-on.
+        files: path below addon/risorius -> text, for all Python files of the add-on.
     """
     adopted = _adopted(files.get(REGISTRATION, ""))
     rows: list[tuple[str, int, str]] = []

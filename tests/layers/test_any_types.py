@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Nothing that the add-on shows takes or gives Any, but for names that say what Blender lacks."""
+"""Public types of the add-on do not contain Any, except names for types that Blender lacks."""
 
 import ast
 from pathlib import Path

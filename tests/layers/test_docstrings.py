@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public functions with two arguments or more say what these are, and the check can fail."""
+"""Docstrings of public functions explain two or more arguments, and the check can fail."""
 
 import ast
 from pathlib import Path

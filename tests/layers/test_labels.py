@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Labels of the add-on: each word that counts begins with a capital, one thing has one name."""
+"""Labels of the add-on use title case, and each thing has one name."""
 
 import re
 from pathlib import Path
@@ -12,16 +12,16 @@ LABEL = re.compile(
     r"(?:Mode\(words\.say|words\.show\([^\"]{1,40}say|text=words\.say|bl_label = |heading=|"
     r'[( ]text=|status\.\w+, words\.say)\(?"([^"]+)"'
 )
-# German: what the rows call it, and what they do not.
+# German terms of the table, and terms that it must not contain.
 NAMES = {"Tafel": "Brett", "Regler": "Schieberegler"}
 
 
 def lower_words(text):
-    """Words of the labels in a source that begin small, with their labels."""
+    """Words of the labels in a source that begin with a lower case letter, with their labels."""
     for label in LABEL.findall(text):
         bare = re.sub(r"\([^)]*\)", "", label)
         if "{" in label or label.endswith((".", "?", ":", "…")):
-            continue  # it says something: a sentence, or how much
+            continue  # a sentence or a text with a number is no label
         for word in re.findall(r"[A-Za-z][A-Za-z'-]*", bare)[1:]:
             if word[0].islower() and word not in SMALL:
                 yield word, label

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The files keep to the plan of rooms.toml, and each rule of the check can fail."""
+"""The files follow the plan of rooms.toml, and each rule of the check can fail."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +16,7 @@ def files_of(part):
 
 
 def planted(part, path, text):
-    """What the check says, but for the size of folders, where a part gets one more file or line."""
+    """The check's sentences, without sizes of folders, after adding a file or a line to a part."""
     files = dict(files_of(part))
     files[path] = files.get(path, "") + "\n" + text + "\n"
     return [line for line in violations(part, files) if "are the most" not in line]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The maps in the READMEs name what is there, all of it and no more; and the check can fail."""
+"""The tables in the READMEs list exactly the existing names; and the check detects errors."""
 
 import pytest
 from layers import ROOMS

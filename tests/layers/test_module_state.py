@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""No module and no class of the add-on remembers anything that the registry does not own."""
+"""No module and no class of the add-on has mutable state outside the registry."""
 
 from collections import Counter
 from pathlib import Path
@@ -102,5 +102,5 @@ def test_rooms_without_session_have_their_caches_adopted():
     assert found(files) == [f"{LOGIC}:2: table is cached without session"]
     adopted = "session.adopt(('quit',), planted.table)"
     assert found({**files, "registration.py": adopted}) == []
-    files = {SCENE: files[LOGIC], "registration.py": adopted}  # that room has session.cached
+    files = {SCENE: files[LOGIC], "registration.py": adopted}  # rooms with session must use it
     assert found(files) == [f"{SCENE}:2: table is cached without session"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The product asks nothing that Windows has not, but in files that posix_only.toml names."""
+"""The product uses functions that Windows lacks only in files that posix_only.toml lists."""
 
 from pathlib import Path
 

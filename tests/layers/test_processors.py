@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which processor it is, only native/simd asks, and which system core, simd and bytes alone: the
-other folders need not be compiled for each (packaging/check/cross.sh). risorius.h is C,
-for compilers of any system."""
+"""Only native/simd depends on the processor, and only core, simd and bytes depend on the system.
+
+So packaging/check/cross.sh need not compile the other folders for each system. risorius.h also
+tests for the system, because it is C for any compiler.
+"""
 
 import re
 from pathlib import Path
@@ -9,24 +11,30 @@ from pathlib import Path
 import pytest
 
 NATIVE = Path(__file__).resolve().parents[2] / "native"
-# As the manuals of gcc and MSVC name them.
+# Macros and headers for processors, from the manuals of gcc and MSVC.
 PROCESSOR = re.compile(
     r"\b(__x86_64__|__i386__|__aarch64__|__arm__|__ARM_\w+|__SSE\w*|__AVX\w*|__F16C__|__FMA__"
     r"|_M_X64|_M_IX86|_M_ARM64|_M_AMD64|__amd64__|immintrin\.h|arm_neon\.h)\b"
 )
 
 
-# What compilers define, and headers that the C++ standard does not have.
+# Macros for systems and compilers, and headers outside the C++ standard.
 SYSTEM = re.compile(
     r"\b(_WIN32|_WIN64|__APPLE__|__linux__|__unix__|_MSC_VER|__GLIBC__|__MINGW\w+|__ANDROID__)\b"
     r"|#include <[\w/]+\.h>"
 )
-# Headers of packages whose source is the same everywhere.
+# Headers of packages, which are the same on every system.
 PACKAGES = re.compile(r"#include <(pybind11/[\w/]+|meshoptimizer/meshoptimizer|xxhash)\.h>")
 
 
 def that_ask(sources, words, folders):
-    """Names of those sources (name: text) outside the folders that have such words."""
+    """Sorted names of the sources outside given folders that contain a pattern.
+
+    Args:
+        sources: name -> text.
+        words: compiled regular expression.
+        folders: tuple of beginnings of names.
+    """
     elsewhere = {name: text for name, text in sources.items() if not name.startswith(folders)}
     return sorted(name for name, text in elsewhere.items() if words.search(PACKAGES.sub("", text)))
 

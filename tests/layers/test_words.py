@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Some things are defined in one place only, and a second definition is found."""
+"""The words of words.toml are defined in one place only, and a second definition is found."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds second definitions of what words.toml says is defined once."""
+"""Finds second definitions of the words that words.toml lists."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def product_files(root: Path) -> dict[str, str]:
 
 
 def defines(word: Mapping, path: str, text: str) -> bool:
-    """Whether a file has a definition of a word: a table of words.toml."""
+    """Whether a file defines a word. Args: word  table of words.toml; path, text  the file."""
     if not path.endswith(word.get("in", "")):
         return False
     if "words" in word:
@@ -38,6 +38,6 @@ def _code(path: str, text: str) -> str:
 
 
 def second_definitions(word: Mapping, files: Mapping[str, str]) -> list[str]:
-    """The files that define a word beside its home; and the home, and others that may, if not."""
+    """The files that define a word but may not, and the files that should define it but do not."""
     found = {path for path, text in files.items() if defines(word, path, text)}
     return sorted(found ^ {word["home"], *word.get("also", {})})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mutants of source lines: universalmutator's rules make them, a seed draws them."""
+"""Draws mutants of source lines, which the rules of universalmutator make, by a seed."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ NO_CODE = ("#", "using ", "namespace ", "struct ", "class ", "template")
 SIGNATURE = re.compile(r"[\w:<>,&*\s]+[ *&][\w:]+\((const |bool |float |double |std::)")
 OPERATORS = "+-*/%<>=&|!"
 STATEMENT = re.compile(r"\*?[\w:.>\[\]()-]+(\s*[-+|&*/^]?=|\().*;$")
-# Words that a rule puts another in the place of.
+# Words that a rule may replace.
 WORDS = {"min", "max", "begin", "end", "any_of", "all_of", "none_of", "front_inserter",
          "back_inserter", "min_element", "max_element", "break", "continue"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """One line of one file, written otherwise."""
+    """A changed line of a file."""
 
     path: str  # from the root of the project
     line: int  # counted from 1
@@ -45,13 +45,12 @@ class Mutant:
 
 
 def drawn(root: Path, paths: list[str], seed: int) -> Iterator[Mutant]:
-    """Mutants without end of use: every line that has any, in an order that the seed gives, and one
-    of its mutants.
+    """Yields one mutant for each line that has mutants, in random order.
 
     Args:
-        root: The project.
-        paths: Source files, from the root.
-        seed: Another seed draws other lines.
+        root: The project's folder.
+        paths: Source files, relative to the root.
+        seed: Seed of the order and of the choice.
     """
     choose = random.Random(seed)
     lines = []
@@ -81,7 +80,7 @@ def drawn(root: Path, paths: list[str], seed: int) -> Iterator[Mutant]:
 def _mutants(source: list[str], rules: list[str]) -> dict[int, list[str]]:
     from universalmutator import mutator
 
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells which rules it reads
+    with contextlib.redirect_stdout(io.StringIO()):  # universalmutator prints its rules
         found = mutator.mutants_regexp(source, ruleFiles=rules, ignorePatterns=[])
     table: dict[int, list[str]] = {}
     for number, after, *_ in found:
@@ -90,40 +89,42 @@ def _mutants(source: list[str], rules: list[str]) -> dict[int, list[str]]:
 
 
 def _differs(path: str, before: str, after: str) -> bool:
-    """Whether a mutant is another program: more than a comment, docstring or annotation."""
+    """Whether a mutant changes the program, not only a comment, docstring or annotation."""
     if not path.endswith(".py"):
         return _bare(before) != _bare(after)
     try:
-        compile(after, path, "exec", dont_inherit=True)  # sees a `continue` outside of a loop too
+        compile(after, path, "exec", dont_inherit=True)  # also detects `continue` outside of loops
         return _tree(after) != _tree(before)
     except (SyntaxError, ValueError):
         return False
 
 
 def _same(before: str, after: str) -> int:
-    """How many characters both begin with."""
+    """The length of the common beginning of two texts."""
     pairs = enumerate(zip(before, after, strict=False))
     return next((i for i, (a, b) in pairs if a != b), min(len(before), len(after)))
 
 
 def _whole_words(before: str, after: str) -> bool:
-    """Whether no name is cut: the rules find `end` in `blend`, and a name that is not there dies at
-    once."""
+    """Whether a mutant replaces whole words.
+
+    The rules also match `end` in `blend`, but an unknown name would fail at once.
+    """
     same = _same(before, after)
     words = [w for w in re.finditer(r"[A-Za-z_]\w*", before) if w.start() < same < w.end()]
     return not words or words[0].group() in WORDS
 
 
 def _may_build(lines: list[str], number: int, after: str) -> bool:
-    """Whether a line of C++ may be one still: the rules know neither words nor types.
+    """Whether a mutated line of C++ may compile, because the rules know neither words nor types.
 
-    An operator is what clang-format has put between spaces, a statement is taken out whole, and
-    only a loop is left or gone on with.
+    Operators must have spaces around them, as clang-format writes them. Statements must be removed
+    as a whole. `break` and `continue` must be inside a loop.
 
     Args:
-        lines: The source.
-        number: The line's, from 1.
-        after: What the line becomes.
+        lines: The lines of the source.
+        number: Number of the line, from 1.
+        after: The mutated line.
     """
     before = lines[number - 1]
     code = before.split("//")[0].strip()
@@ -151,7 +152,7 @@ def _may_build(lines: list[str], number: int, after: str) -> bool:
 
 
 def _in_loop(lines: list[str], number: int) -> bool:
-    """By indentation: whether a line that encloses this one begins a loop."""
+    """Whether a line is inside a loop, judged by indentation."""
     inner = len(lines[number - 1]) - len(lines[number - 1].lstrip())
     for line in reversed(lines[: number - 1]):
         indent = len(line) - len(line.lstrip())
@@ -187,7 +188,7 @@ def _tree(source: str) -> str:
 
 
 def _says_nothing(node: ast.AST) -> bool:
-    """Whether a statement does nothing when it runs: texts, `pass`, `__future__`, types alone."""
+    """Whether a statement has no effect: a string, `pass`, `__future__`, or a bare annotation."""
     text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     future = isinstance(node, ast.ImportFrom) and node.module == "__future__"
     types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"

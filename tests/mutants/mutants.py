@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Which small faults does a test see? Draws mutants by a seed, tries each in a copy of the project.
+"""Mutation tests: draws mutants by a seed, and tests each in a copy of the project.
 
     check/mutants.sh native|package|scene [--under PATH...] [--count N] [--seed N] [--list]
                          [--programs] [--survivors]
 
-A mutant is killed by the first test that fails, or that takes far longer than it does without it;
-tests.toml says which tests stand for which file, the quickest first. One that does not build is
-not counted, another is drawn for it. What is found is kept in build/mutants: a run that was ended
-goes on where it was; --survivors tries once more those that lived, with the tests of now.
+A mutant is killed by the first test that fails or takes much longer than without the mutant.
+tests.toml lists the tests of each file, the fastest first. A mutant that does not build is replaced
+by another one. Results are stored in build/mutants, so that an interrupted run continues.
+--survivors tests the surviving mutants again with the present tests.
 """
 
 from __future__ import annotations
@@ -38,16 +38,17 @@ HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parents[1]
 SEED = 15
 COUNTS = {"native": 80, "package": 60, "scene": 60}
-# Headers stay out: each is a build of all that includes it. Bindings are tables of names.
+# Headers are left out, because a change rebuilds all files that include them. Bindings are left
+# out, because they are tables of names.
 SOURCES = {
     "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*", "native/web/*"]),
     "package": (["native/python/risorius/**/*.py", "native/python/risorius_people/**/*.py"], []),
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }
-SLOW = 300  # CPU seconds for a test of which it is not yet known how many it takes
-WAITS = 10  # seconds of the clock for each CPU second: other programs use the machine too
-MEMORY = 6 << 30  # bytes of any program: a count without end is not to fill the machine
-# Each mutant is compiled and linked: neither symbols for a debugger nor the last optimisations.
+SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
+WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
+MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
+# No debug symbols and low optimisation, because each mutant is compiled and linked.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -58,15 +59,15 @@ OPTIONS = [
 
 
 def sources(root: Path, part: str, under: Sequence[str] = ()) -> list[str]:
-    """The files of a part that mutants are made of, from the root.
+    """Paths, relative to the root, of the files of a part that get mutants.
 
     Args:
-        root: The project.
+        root: The project's folder.
         part: native, package or scene.
-        under: Folders or files, from the root, of which they are; none: of the whole part.
+        under: Folders or files, relative to the root, to which the files are limited; empty: all.
 
     Raises:
-        SystemExit: The part has no file under one of them.
+        SystemExit: The part has no file in an entry of `under`.
     """
     patterns, left_out = SOURCES[part]
     found = {str(p.relative_to(root)) for pattern in patterns for p in root.glob(pattern)}
@@ -83,7 +84,7 @@ def _lies_under(path: str, place: str) -> bool:
 
 
 def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
-    """Tests that stand for a file, the quickest first: those of every pattern that fits it."""
+    """The tests of a file, in the order of the table: those of all patterns that match its path."""
     found: list[str] = []
     for pattern, tests in table.items():
         if fnmatch.fnmatch(path, pattern):
@@ -98,25 +99,27 @@ def programs(table: dict[str, list[str]]) -> list[str]:
 
 
 class Copy:
-    """A copy of the project's files in build/mutants, in which mutants are tried."""
+    """A copy of the project's files in build/mutants, in which mutants are tested."""
 
     def __init__(self, part: str, targets: list[str]):
-        """Args:
-        part: native, package or scene.
-        targets: What is built before a native mutant is tried.
+        """Prepare the copy.
+
+        Args:
+            part: native, package or scene.
+            targets: CMake targets that refresh() builds.
         """
         self.part = part
         self.targets = targets
         self.root = PROJECT / "build" / "mutants" / part
         self._times = self.root.with_suffix(".json")
-        # CPU seconds that a test takes when nothing is wrong.
+        # Test -> CPU seconds without a mutant.
         self.usual: dict[str, float] = (
             json.loads(self._times.read_text()) if self._times.exists() else {}
         )
-        self._fresh = False  # whether the Python module is that of the present sources
+        self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Bring changed files over; those that are as they were keep their time, for Ninja."""
+        """Copy changed files. Unchanged files keep their time stamps, so that Ninja skips them."""
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
@@ -160,7 +163,7 @@ class Copy:
             sys.exit(f"{' '.join(command)}\n{text[-2000:]}")
 
     def try_one(self, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
-        """(killed, slow, survived, unbuildable or unsure; which test said it)."""
+        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the test."""
         place = self.root / mutant.path
         source = place.read_text(encoding="utf-8")
         place.write_text(mutant.applied(source), encoding="utf-8")
@@ -179,7 +182,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the test that failed passes without the mutant; only then does it count."""
+        """Whether the failed test passes without the mutant; only then the failure counts."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
@@ -194,7 +197,7 @@ class Copy:
         return self.outcome(test)[0] == "passed"
 
     def outcome(self, test: str) -> tuple[str, str]:
-        """What one test says of the sources as they are: passed, killed, slow or unbuildable."""
+        """Run a test on the present sources: passed, killed, slow or unbuildable; and a line."""
         if "/" not in test.partition(":")[0]:
             target = test.partition(":")[0]
             if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:
@@ -223,11 +226,11 @@ class Copy:
         return "killed", lines[-1] if lines else f"exit {code}"
 
     def _run(self, command: list[str], limit: float) -> tuple[int | None, float, str]:
-        """Exit code, None if the time was over; CPU seconds; what was printed.
+        """Run a command. Returns exit code (None after the limit), CPU seconds, and output.
 
         Args:
-            command: What is run.
-            limit: CPU seconds of each of its processes.
+            command: program and arguments.
+            limit: CPU seconds of each process.
         """
         began = _seconds_of_children()
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as room:
@@ -257,13 +260,13 @@ class Copy:
 
 
 def _seconds_of_children() -> float:
-    """CPU seconds of all programs that were started and have ended."""
+    """CPU seconds of all child processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:
-    """The test and every process that it started; Ninja ends its compilers, which are apart."""
+    """Kill a test and its processes. Ninja gets SIGTERM first, so that it ends its compilers."""
     with contextlib.suppress(ProcessLookupError):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
@@ -278,13 +281,13 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def told(mutant: Mutant, outcome: str, said: str) -> str:
-    """One mutant in three lines."""
+    """The text of a mutant's result in three lines."""
     head = f"{outcome}: {mutant.path}:{mutant.line} {said}"
     return f"{head}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}"
 
 
 def summary(outcomes: list[str]) -> str:
-    """The last line."""
+    """The last line of the output, with the counts."""
     counts = Counter(outcomes)
     tried = sum(counts.values()) - counts["unbuildable"]
     return (
@@ -295,7 +298,7 @@ def summary(outcomes: list[str]) -> str:
 
 
 def main() -> None:
-    """Draw, try, count."""
+    """Draw mutants, test them, and count the outcomes."""
     parser = argparse.ArgumentParser()
     parser.add_argument("part", choices=SOURCES)
     parser.add_argument("--under", nargs="+", default=[], metavar="PATH", help="only of these")
@@ -305,9 +308,9 @@ def main() -> None:
     parser.add_argument("--survivors", action="store_true", help="try again those that lived")
     parser.add_argument("--programs", action="store_true", help="GoogleTest alone, for a first run")
     options = parser.parse_args()
-    # A shell's background job ignores it, and so would the programs that tests interrupt.
+    # Background jobs of a shell ignore SIGINT, and tests' programs would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # what it starts has it too
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # child processes inherit it
     part, wanted = options.part, options.count or COUNTS[options.part]
     paths = sources(PROJECT, part, options.under)
     order = drawn(PROJECT, paths, options.seed)
@@ -316,7 +319,7 @@ def main() -> None:
             print(told(mutant, "drawn", ""))
         return
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
-    # The Python module is a long build that the programs alone do not wait for.
+    # With --programs, the Python module is not built, because that takes long.
     used = {"": [test for path in paths for test in tests_of(path, table)]}
     copy = Copy(part, programs(used) + ([] if options.programs else ["_native"]))
     copy.root.mkdir(parents=True, exist_ok=True)

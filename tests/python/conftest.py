@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Folders of test data, and extras that need data outside a clone."""
+"""Folders of test data, and fixtures for tests that need data outside the repository."""
 
 import contextlib
 import json
@@ -11,19 +11,22 @@ import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
 GOLDEN = PROJECT / "tests" / "data" / "golden"
-# The same kind of data in another folder: files of other shapes, made by the same program.
+# Folder with golden data; another one may hold files of other shapes from the same generator.
 GOLDEN_SET = Path(os.environ.get("RISORIUS_GOLDEN", GOLDEN))
 SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
 
 _not_run: set[str] = set()
 
-# A job in the background ignores Ctrl-C, and so would the commands that tests start and interrupt.
+# A background job ignores Ctrl-C, and so would the commands that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object]]]:
-    """(rig, tag, what its file says) of every evaluation in the golden set, or with one tag: "" as
-    loaded whole, ".quat" with quaternions, ".seq" through time, others filtered on load."""
+    """All evaluations of the golden set, or those with a tag: (rig, tag, content of its JSON).
+
+    Tags: "" for a complete load, ".quat" for quaternions, ".seq" for a sequence in time; others
+    were filtered on load.
+    """
     found = []
     for path in sorted(GOLDEN_SET.glob("*.eval*.json")):
         name, _, rest = path.name.partition(".eval")
@@ -38,7 +41,7 @@ def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object
 
 
 def lods_of(about: dict) -> list[int] | None:
-    """LODs of the file that a filtered load kept; None: it was not filtered."""
+    """The file's LODs that a filtered load kept; None if it was not filtered."""
     load, count = about["load"], about["counts"]["lods"]
     if load["lods"]:
         return load["lods"]
@@ -48,7 +51,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip an extra whose data are missing; the summary names it."""
+    """Skip a test whose data are missing; the summary of the run names them."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")
@@ -62,15 +65,15 @@ def pytest_terminal_summary(terminalreporter):
 
 @pytest.fixture(scope="session")
 def standard_controls():
-    """The raw controls of a standard face, as a DNA spells them."""
+    """Full names of a standard face's raw controls."""
     path = PROJECT / "tests" / "data" / "controls" / "standard_raw.txt"
     return path.read_text(encoding="utf-8").split()
 
 
 @contextlib.contextmanager
 def no_room(size):
-    """Limit the length of files, as on a full disk."""
-    import resource  # of POSIX
+    """Limit the size of files, which simulates a full disk."""
+    import resource  # exists on POSIX only
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))

@@ -9,7 +9,7 @@
 namespace risorius::registering {
 namespace {
 
-/// Two squares of side 1 that face each other: z = 0 looks up, z = 1 looks down.
+/// Two squares of side 1 that face each other: the normal at z = 0 points up, at z = 1 down.
 ClosestPoints slit() {
   return ClosestPoints::make({{0, 0, 0},
                               {1, 0, 0},

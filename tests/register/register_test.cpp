@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A template laid onto a target: a ball with a nose on one with a longer nose and other vertices.
+// Registers a ball with a nose onto a ball with a longer nose and other vertices.
 #include "register/register.h"
 
 #include <gtest/gtest.h>

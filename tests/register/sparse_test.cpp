@@ -10,7 +10,7 @@ namespace risorius::registering {
 namespace {
 
 TEST(Sparse, SolvesEverySide) {
-  // 2 -1 0 / -1 2 -1 / 0 -1 2; the 2 in the middle is two entries, one entry lies above.
+  // Rows 2 -1 0, -1 2 -1, 0 -1 2. Two entries sum to the middle 2; one entry is above the diagonal.
   const std::vector<std::int32_t> rows{0, 1, 1, 1, 2, 2, 0}, columns{0, 0, 1, 1, 1, 2, 2};
   const std::vector<double> values{2, -1, 1, 1, -1, 2, 99};
   const auto factors = SparseCholesky::make(rows, columns, values, 3).value();

@@ -183,7 +183,7 @@ int damage_each_byte(const BlockBytes& whole) {
   return refused;
 }
 
-// After a change with a corrected hash, the check of indices finds it or evaluation does no harm.
+// If a changed byte has a corrected hash, the index check refuses it or evaluation is safe.
 TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   int refused = 0;
   for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {

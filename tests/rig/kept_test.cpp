@@ -69,7 +69,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       columns.push_back(static_cast<std::uint16_t>((first + f * (1 + p % 2)) % kInputs));
     }
   }
-  // A negative weight turns the corrective: its product may be -0.
+  // A negative weight gives a corrective of -0 if a factor is 0.
   std::vector<float> weights(rows.size(), 1.25f);
   for (std::size_t i = 0; i < weights.size(); i += 5) weights[i] = -0.5f;
   psds.values = std::move(weights);

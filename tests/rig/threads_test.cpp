@@ -87,7 +87,7 @@ TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
 TEST(OneRig, GivesEveryInstanceItsOwnPast) {
   for (const CompileOptions& way : ways()) {
     const Rig rig = full_rig(way);
-    // The last pose of a face that saw the frames from `first` on, alone and beside others.
+    // The last pose of an Instance that evaluates the frames from `first` on.
     const auto film = [&rig](std::size_t first) {
       Instance face(rig);
       face.set_mask(0, static_cast<float>(first % 2));

@@ -92,7 +92,7 @@ class Traversals : public testing::TestWithParam<std::string> {
 
 TEST_P(Traversals, GiveTheSumsOfTheFile) {
   const Rig rig = must_compile(dna_, kernels_);
-  Workspace work = make_workspace(rig);  // one for all frames: no state of a frame may remain
+  Workspace work = make_workspace(rig);  // shared by all frames, to find state that remains
   std::size_t whole = 0;
   for (const std::size_t active : {kRaw, std::size_t{0}, std::size_t{1}, std::size_t{9}, kRaw}) {
     for (std::uint32_t lod = 0; lod < 3; ++lod) {

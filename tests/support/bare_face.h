@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A face without behavior, for tests and other programs.
+// A face without behavior, for tests, benchmarks and fuzz targets.
 #pragma once
 
 #include <string>

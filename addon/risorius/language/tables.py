@@ -2,7 +2,8 @@
 """Reads the tables of words that lie beside this file.
 
 controls_<language>.toml has a row for each control, with * for its side; interface_<language>.toml
-the words of panels, dialogs and reports by their English ones. A new language is two files.
+the words of panels, dialogs and reports by their English ones; errors_<language>.toml the error
+messages of the package by the English ones. A new language is three files.
 """
 
 from __future__ import annotations
@@ -29,6 +30,12 @@ def controls(language: str = ENGLISH) -> ControlWords:
     """What is said of the standard controls in a language."""
     table = _read(f"controls_{language}")
     return expand(table, table.pop("sides"))
+
+
+@cache
+def error_rows(language: str) -> dict[str, str]:
+    """Error messages of the package with {names} of values: English -> the language."""
+    return _read(f"errors_{language}")
 
 
 @cache

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans to Blender objects, poses to Blender objects."""
+"""Builds characters as Blender objects from plans, and writes their poses to these objects."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators and panels: thin."""
+"""Blender's operators, panels and menus; the work is done in `scene` and `logic`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators with work beside Blender: progress in the status bar, Esc cancels."""
+"""Base class of operators that work in a background task, which Esc cancels."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ else:
 
 
 class RunsBeside(_Base):
-    """Base of such operators, which define `finish`, `shown` and `cancelled_text`.
+    """Base of operators with a background task; they define `finish`, `shown` and `cancelled_text`.
 
-    In background mode, and in the redo panel, it waits for the result instead.
+    In background mode and in the redo panel, the operator waits for the result instead.
     """
 
     def wait_beside(self) -> None:
-        """Work beside Blender; called by invoke, when a person uses the interface."""
+        """Let `begin` run the task in the background; `execute` alone waits for its result."""
         self._beside = not bpy.app.background
 
     def begin(self, context: Context, task: Task) -> Result:
-        """Start the task, or do it now.
+        """Start the task in the background, or run it and wait.
 
         Args:
-            context: with a window, if any.
+            context: context of the operator, with a window if the task runs in the background.
             task: the task of the operator.
         """
         self._running = task
-        # Adjusting the last operation calls this again, on the same operator.
+        # The redo panel runs the same operator object again, so the flag is cleared.
         beside, self._beside = getattr(self, "_beside", False), False
         if not beside:
             task.run()
@@ -47,7 +47,10 @@ class RunsBeside(_Base):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
-        """Blender calls this with each event of the context's window."""
+        """Blender calls this with each event: Esc cancels, the timer shows progress and finishes.
+
+        Args: context, event  of the operator.
+        """
         if event.type == "ESC":
             self.cancel(context)
             self.report({"WARNING"}, self.cancelled_text())
@@ -62,7 +65,7 @@ class RunsBeside(_Base):
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Context) -> None:
-        """Blender calls this too, when it closes."""
+        """Cancel the task; Blender also calls this when it closes."""
         self._running.cancel()
         self._end(context)
 
@@ -77,7 +80,7 @@ class RunsBeside(_Base):
         raise NotImplementedError
 
     def shown(self, share: int) -> str:
-        """The text of the status bar. Args: share finished per cent."""
+        """The text of the status bar. Args: share  finished part of the task, 0 to 100."""
         raise NotImplementedError
 
     def cancelled_text(self) -> str:

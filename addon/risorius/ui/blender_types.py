@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A checker sees methods that take a Context with a scene; Blender's take any:
+# A type checker expects a Context with a scene here; Blender's own methods accept any:
 # pyright: reportIncompatibleMethodOverride=false
-"""Blender's classes for annotations of operators, panels and menus.
+"""Blender's classes for type annotations of operators, panels and menus.
 
-In the stubs of Blender's API a panel may lack a layout. It has one while it is drawn, so code need
-not test it each time. At run time all names here are Blender's own classes. Any is used because a
-list shows items of any kind.
+In the stubs of Blender's API a panel may lack a layout. While a panel is drawn it always has one,
+so code need not test this. At run time all names here are Blender's own classes. Any is used
+because a list shows items of any kind.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -15,15 +15,15 @@ from bpy_extras import io_utils
 
 from ..scene.base.blender_types import Context
 
-Result: TypeAlias = "set[OperatorReturnItems]"  # of an operator
+Result: TypeAlias = "set[OperatorReturnItems]"  # return value of an operator
 Icon: TypeAlias = "IconItems"
-Item = tuple[str, str, str]  # of an enumeration: identifier, name, description
+Item = tuple[str, str, str]  # item of an enum: identifier, name, description
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import IconItems, OperatorReturnItems
 
     class OperatorButton(bpy.types.OperatorProperties):
-        """The properties that a button gives its operator; each operator has others."""
+        """Properties that a button sets on its operator; their names depend on the operator."""
 
         def __setattr__(self, name: str, value: object) -> None: ...
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         ) -> "tuple[UILayout, UILayout | None]": ...
 
     class Operator(bpy.types.Operator):
-        """An operator while it runs or its dialog is drawn."""
+        """An operator while it runs or while its dialog is drawn."""
 
         @property
         def layout(self) -> UILayout: ...
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
         def draw(self, context: Context) -> None: ...
 
     class _FileSelector:
-        """Mixin of Operator with a path that the user chooses."""
+        """Mixin of operators with the path of a file that the user chooses."""
 
         filepath: str
 
@@ -86,7 +86,7 @@ if TYPE_CHECKING:
         def draw(self, context: Context) -> None: ...
 
     class UIList(bpy.types.UIList):
-        """A list while its lines are drawn, which are of any kind."""
+        """A list while its items, which may be of any type, are drawn."""
 
         def draw_item(
             self,
@@ -110,7 +110,7 @@ if TYPE_CHECKING:
         def poll_drop(cls, context: Context) -> bool: ...
 
     class AddonPreferences(bpy.types.AddonPreferences):
-        """The preferences while they are drawn."""
+        """The add-on's preferences while they are drawn."""
 
         layout: UILayout  # pyright: ignore[reportIncompatibleVariableOverride]
 
@@ -122,4 +122,4 @@ else:
     FileHandler, AddonPreferences = bpy.types.FileHandler, bpy.types.AddonPreferences
     ImportHelper, ExportHelper = io_utils.ImportHelper, io_utils.ExportHelper
     OperatorButton = bpy.types.OperatorProperties
-    OperatorBase = PanelBase = object  # of classes that are not registered themselves
+    OperatorBase = PanelBase = object  # for base classes that are not registered themselves

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared code of operators and panels: availability, reports."""
+"""Shared code of operators and panels: poll functions, the active face, errors, progress."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,11 +25,11 @@ MODES = (
 
 
 def explain(path: str | Path, error: Exception) -> str:
-    """One sentence about an error of a file.
+    """One sentence about an error with a file.
 
     Args:
-        path: of the file; its name begins the sentence, unless the error names it.
-        error: error from reading or writing it.
+        path: path of the file; the sentence begins with its name, unless the error contains it.
+        error: error from reading or writing the file.
     """
     reason = error.strerror if isinstance(error, OSError) else None
     text = names.printable(reason or of_error(error)).strip().rstrip(".")
@@ -41,7 +41,7 @@ def system_path(path: str) -> str:
     """Convert a path of a dialog or script to a system path; `//` is the folder of the .blend.
 
     Args:
-        path: of a file or folder; an empty path stays.
+        path: path of a file or folder; an empty path stays empty.
     """
     return bpy.path.abspath(path) if path else path
 
@@ -50,8 +50,8 @@ def proposed_file(name: str, ending: str) -> str:
     """The name that a file dialog proposes; names from a .blend cannot lead to another folder.
 
     Args:
-        name: of the exported thing.
-        ending: of its file, with the dot.
+        name: name of the exported object or action.
+        ending: extension of the file, with the dot.
     """
     found: str = native.part("files.names").file_name(name.removesuffix("_rig"), ending)
     return found
@@ -67,7 +67,7 @@ def usable(cls: type[Operator]) -> bool:
 
 @contextmanager
 def shown_progress(context: Context) -> Iterator[Callable[[float], None]]:
-    """Show progress at the mouse; gives a function that takes the share that is done, 0 to 1."""
+    """Show progress at the cursor; yields a function that takes the finished share, 0 to 1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:
@@ -77,16 +77,16 @@ def shown_progress(context: Context) -> Iterator[Callable[[float], None]]:
 
 
 def active_controls(context: Context) -> ArmatureObject | None:
-    """The control armature of the active face, or None; never without the native module."""
+    """The control armature of the active face; None without a face or without the native module."""
     rig = None if native.problem() else parts.active_rig(context)
     return parts.controls_of(rig) if rig is not None else None
 
 
 def face_rig(context: Context) -> ArmatureObject:
-    """The deforming armature of the active face, after poll has said that there is one.
+    """The deforming armature of the active face, for operators whose poll requires a face.
 
     Raises:
-        FaceError: there is none.
+        FaceError: no face is active.
     """
     rig = parts.active_rig(context)
     if rig is None:
@@ -95,10 +95,10 @@ def face_rig(context: Context) -> ArmatureObject:
 
 
 def face_controls(context: Context) -> ArmatureObject:
-    """The control armature of the active face, after poll has said that there is one.
+    """The control armature of the active face, for operators whose poll requires a face.
 
     Raises:
-        FaceError: there is none.
+        FaceError: no face is active.
     """
     controls = active_controls(context)
     if controls is None:
@@ -107,22 +107,22 @@ def face_controls(context: Context) -> ArmatureObject:
 
 
 def as_seen(context: Context) -> bool:
-    """Whether left and right are those of the viewer, and not the character's."""
+    """Whether the preferences define left and right as the viewer sees them."""
     addon = context.preferences.addons.get(native.ADDON)
     return addon is None or getattr(addon.preferences, "sides", "SEEN") == "SEEN"
 
 
 class FaceOperator(OperatorBase):
-    """Base of all operators on a face. Class attributes say which faces are suitable."""
+    """Base of operators on the active face. Class attributes define which faces are suitable."""
 
     bl_options = {"REGISTER", "UNDO"}
-    whole_face = True  # the face must have its controls and its DNA
-    baked_too = False  # a face that plays baked actions will do
-    by_sliders = False  # it works on sliders alone: the face board must not lead
+    whole_face = True  # the face needs its control armature and its DNA
+    baked_too = False  # faces with baked actions are accepted
+    by_sliders = False  # a face that its face board moves is rejected
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether a suitable face exists; otherwise set the reason."""
+        """Whether the active face is suitable; otherwise set the reason."""
         if not usable(cls):
             return False
         rig = parts.active_rig(context)
@@ -144,15 +144,15 @@ class FaceOperator(OperatorBase):
 
 
 class FacePanel(PanelBase):
-    """Base of all panels of the tab."""
+    """Base of all panels in the sidebar tab Risorius."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
-    bl_category = "Risorius"  # a name: Blender translates a tab without a context
+    bl_category = "Risorius"  # not translated, because it is a name
 
 
 class FaceOnlyPanel(FacePanel):
-    """A panel that is shown only with a face."""
+    """Base of panels that are hidden without a face."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text in panels and dialogs: fitting, wrapping, and meanings of special values."""
+"""Translation of texts, and labels of panels and dialogs: wrapping and special values."""
 
 import textwrap
 from typing import Any
@@ -8,25 +8,26 @@ import blf
 import bpy
 
 from .. import native
-from ..language import tables
+from ..language import errors, tables
 from ..language.tables import CONTEXT
 from ..logic.base.sentences import Sentence
 from ..scene.base import session
 from .blender_types import Context, Icon, UILayout
 
-NAMES = "Names"  # the context of names of things, in which nothing is translated
-_SIDEBAR = 280  # pixels that Blender gives the sidebar at first
-_EDGES = 36  # of them the tabs and the panel's margins
-_MARGIN = 12  # around the text of a label
-# locale: Blender's of now; given: the language that it has our words of.
+_REASONS = ("error", "reason", "said", "trouble", "why")  # values that are error messages
+NAMES = "Names"  # translation context of names, which are not translated
+_SIDEBAR = 280  # default width of Blender's sidebar in pixels
+_EDGES = 36  # pixels of the sidebar for tabs and the panel's margins
+_MARGIN = 12  # pixels around the text of a label
+# locale: the current locale of Blender; given: the language whose table Blender has received.
 _language = session.keep("words.language", lambda: {"locale": "", "given": ""}, ("unregister",))
 
 
 class Ruler:
-    """Tells which labels can be read whole in a share of the sidebar's width."""
+    """Computes which labels fit completely into a share of the sidebar's width."""
 
     def __init__(self, context: Context, share: float) -> None:
-        """Args: context with the region, or a new sidebar is assumed; share 0 to 1."""
+        """Args: context  context with the region, or a new sidebar is assumed; share  0 to 1."""
         preferences, region = context.preferences, context.region
         width: float = _SIDEBAR
         if region is not None and region.type == "UI" and region.width > 1:
@@ -36,20 +37,20 @@ class Ruler:
         self._font = preferences.view.font_path_ui
 
     def fits(self, text: str) -> bool:
-        """Whether a label can be read whole."""
+        """Whether the label fits completely."""
         return width_of(text, self._points, self._font) <= self._room
 
 
 @session.cached(
     ("unregister",), 2048
-)  # a panel asks for the names of all sliders each time it is drawn
+)  # a panel measures the names of all sliders each time it is drawn
 def width_of(text: str, points: float, font: str = "") -> float:
-    """Width of a text in buttons and labels in pixels, at an interface scale of 1.
+    """The width of a text in buttons and labels, in pixels at interface scale 1.
 
     Args:
-        text: the words.
-        points: size of the letters in the preferences.
-        font: path of the interface's font: another font has other widths.
+        text: the text.
+        points: size of the letters in points, from the preferences.
+        font: path of the interface's font, because widths depend on it.
     """
     blf.size(0, points)
     return blf.dimensions(0, text)[0]
@@ -58,11 +59,11 @@ def width_of(text: str, points: float, font: str = "") -> float:
 def prop_or(
     layout: UILayout, owner: bpy.types.bpy_struct, name: str, empty: float | str, meaning: str
 ) -> None:
-    """A property, and below it the meaning of its special value.
+    """Draw a property, and below it the meaning of its special value.
 
     Args:
-        layout: of the panel or dialog.
-        owner, name: the property.
+        layout: layout of the panel or dialog.
+        owner, name: owner and name of the property.
         empty: the special value, such as -1, 0 or "".
         meaning: meaning of the special value.
     """
@@ -74,11 +75,11 @@ def prop_or(
 
 
 def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
-    """A search field. Blender's own placeholder is translated into few languages.
+    """Draw a search field with our placeholder; Blender translates its own into few languages only.
 
     Args:
-        layout: of the panel.
-        owner, name: the property.
+        layout: layout of the panel.
+        owner, name: owner and name of the property.
     """
     placeholder: Any = {"placeholder": say("Search")} if _has_placeholder() else {}
     layout.prop(owner, name, text="", icon="VIEWZOOM", **placeholder)
@@ -86,17 +87,17 @@ def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
 
 @session.cached(("unregister",))
 def _has_placeholder() -> bool:
-    """Whether fields of this Blender have placeholders."""
+    """Whether text fields of this Blender support placeholders."""
     functions: Any = bpy.types.UILayout.bl_rna.functions  # pyright: ignore  the stub has none
     return "placeholder" in functions["prop"].parameters
 
 
 def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
-    """A sentence in as many lines as a narrow sidebar needs.
+    """Draw a sentence in as many lines as a narrow sidebar needs.
 
     Args:
-        layout: of the panel.
-        text: the sentence; it is translated if the table has it.
+        layout: layout of the panel.
+        text: the sentence, which is translated if the table contains it.
         icon: icon before the first line.
     """
     column = layout.column(align=True)
@@ -106,18 +107,27 @@ def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
 
 
 def say(text: str, **values: object) -> str:
-    """A label or sentence in the user's language.
+    """Translate a label or sentence into the user's language.
 
     Args:
-        text: English text of the table, with {names} of values; or a Sentence.
-        values: values: numbers and names, which are never translated.
+        text: English text of the table with {names} of values, or a Sentence.
+        values: name -> number, name or Sentence; only Sentences are translated.
     """
     follow_language()
     if isinstance(text, Sentence):
         return say(text.template, **text.values)
-    values = {name: say(v) if isinstance(v, Sentence) else v for name, v in values.items()}
+    values = {name: _local_value(name, v) for name, v in values.items()}
     local = bpy.app.translations.pgettext_iface(text, CONTEXT) or text
     return local.format(**values) if values else local
+
+
+def _local_value(name: str, value: object) -> object:
+    """A value of a sentence: a Sentence and an error message of the package are translated."""
+    if isinstance(value, Sentence):
+        return say(value)
+    if name in _REASONS and isinstance(value, str):
+        return errors.local(value, _language["given"])
+    return value
 
 
 def name_of_new(text: str) -> str:
@@ -129,24 +139,27 @@ def name_of_new(text: str) -> str:
 def of_error(error: Exception) -> str:
     """The text of an error, translated if it has a Sentence."""
     first = error.args[0] if error.args else ""
-    return say(first) if isinstance(first, Sentence) else str(error)
+    if isinstance(first, Sentence):
+        return say(first)
+    follow_language()
+    return errors.local(str(error), _language["given"])
 
 
 def local(text: str) -> str:
-    """A translated Sentence; other text stays as it is."""
+    """Translate a Sentence; other text stays unchanged."""
     return say(text) if isinstance(text, Sentence) else text
 
 
 def mark(text: str) -> str:
-    """A label that Blender itself looks up later; so the test of the tables finds it."""
+    """Mark a label that Blender translates itself, so that the test of the tables finds it."""
     return text
 
 
 def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
-    """A label shown unchanged: a name, or text from `say`.
+    """Draw a label unchanged: a name, or a text that `say` has translated.
 
     Args:
-        layout: of the panel.
+        layout: layout of the panel.
         text: the label.
         icon: icon before the label.
     """
@@ -154,18 +167,18 @@ def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
 
 
 def bar(layout: UILayout, value: float) -> None:
-    """A number from 0 to 1 as a read-only bar.
+    """Draw a number from 0 to 1 as a read-only bar.
 
     Args:
-        layout: of the panel.
-        value: the number.
+        layout: layout of the panel.
+        value: the number, 0 to 1.
     """
     number = format(value, ".2f")
     layout.progress(factor=value, type="BAR", text=number, translate=False)
 
 
 def follow_language() -> None:
-    """Give Blender our words in the user's language; they are read when it is first chosen."""
+    """Register the table of the user's language with Blender, if the language changed."""
     locale = bpy.app.translations.locale or ""
     if locale == _language["locale"]:
         return
@@ -178,17 +191,17 @@ def follow_language() -> None:
 
 
 def forget_language() -> None:
-    """Take our words away from Blender."""
+    """Remove our translations from Blender."""
     if _language["given"]:
         bpy.app.translations.unregister(native.ADDON)
     _language["locale"] = _language["given"] = ""
 
 
 def give_context(cls: type) -> None:
-    """Let Blender search translations of a class and its properties in the add-on's table first.
+    """Make Blender search the add-on's table first for texts of a class and its properties.
 
     Args:
-        cls: an operator, a panel, a menu or a group of properties, before it is registered.
+        cls: operator, panel, menu or property group, before it is registered.
     """
     if issubclass(cls, (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu)):
         cls.bl_translation_context = CONTEXT

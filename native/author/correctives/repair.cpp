@@ -268,8 +268,8 @@ struct Best {
   std::vector<Vec3> x;
   FaultSums sums;
   double left = 0.0, cost = 0.0;
-  // The cheapest displacement even if something is worse there. Pushing its faults out may give the
-  // best result.
+  // The cheapest displacement, even if it makes some faults worse. Pushing its faults out may give
+  // the best result.
   std::vector<Vec3> any;
   double any_cost = 0.0;
 

@@ -26,7 +26,7 @@ constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms a
 // against each other. Tried from 1e-4 to 10 on a head with 52 expressions, and on four others.
 constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
-// Of the energy of a step. With a limit 10000 times as large some rounds made the fit worse.
+// Conjugate gradients stop at this share of a step's energy; at 1e-2 some rounds worsened the fit.
 constexpr double kEnough = 1e-6;
 constexpr double kTurnAtPivot = 0.01;  // at a pivot a joint should turn and not shift
 constexpr double kShiftAtPivot = 0.01;

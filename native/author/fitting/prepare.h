@@ -18,7 +18,8 @@ core::Status check(const Shapes& shapes, const FitOptions& options);
 Problem make_problem(const Shapes& shapes, const FitOptions& options);
 /// The pivots in the fit's unit, each with the pivot of the other side.
 void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
-/// The given joints. If none of them rests, a resting head is added, and it gets all vertices.
+/// The state with the given joints. If none of them rests, a resting joint, the head, is added. The
+/// resting joint gets all vertices.
 /// In: own  number of expressions without the added mirrored ones
 /// Out: problem.nearest_given
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own);

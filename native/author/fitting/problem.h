@@ -34,7 +34,7 @@ struct Problem {
     std::size_t mirrored = 0;       // the pivot of the other side, itself in the middle
   };
   std::vector<Pivot> pivots;
-  bool to_pivots = false;  // whether joints lie at their pivots already
+  bool to_pivots = false;  // whether joints are placed at their pivots
   double smoothness = 0.0;
   /// The share of the last change by which weights continue, because consecutive rounds mostly go
   /// the same way.

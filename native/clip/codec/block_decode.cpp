@@ -245,7 +245,7 @@ core::Result<EncodedCurves> EncodedCurves::open(View bytes, std::size_t controls
   return curves;
 }
 
-// A coded chunk that waits here for a second one of the same kind.
+// A coded chunk that waits for a second one of the same order, because two are decoded together.
 struct EncodedCurves::Pending {
   std::size_t control = 0;
   View chunk;
@@ -257,7 +257,7 @@ core::Status EncodedCurves::refuse(std::size_t control, const char* message) con
               parts_[control].offset);
 }
 
-// Fills a control that needs no decoding. Out: false if it does
+// Fills a control that needs no decoding. Out: false if the control is coded
 core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
   const Part& part = parts_[control];
   if (part.kind == Part::kConstant) {

@@ -18,12 +18,12 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// magic, version, size of the body; the body and its hash follow
+// Bytes of magic, version and size of the body; the body and its hash follow.
 inline constexpr std::size_t kHeadStart = 12;
-// mark, size of the bytes behind the hash, frames, first frame (8), hash (8) of these fields and of
-// the bytes that follow
+// Bytes of a block's head: mark, size of the bytes behind the hash, frames, first frame (8), hash
+// (8) of these fields and of the bytes that follow.
 inline constexpr std::size_t kBlockStart = 28;
-// offset of the index (8), its size, mark; their hash is the end of the file
+// Bytes of the end: offset of the index (8), its size, mark, and the hash (8) of these fields.
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 

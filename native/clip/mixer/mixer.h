@@ -156,7 +156,7 @@ class Mixer {
  public:
   /// In:    controls   names, each once
   ///        low, high  [controls], low <= high
-  /// reactions that can be active at once
+  ///        max_fired  largest number of reactions that are active at once
   /// Fails: kInvalidLength, kInvalidValue.
   static core::Result<Mixer> make(std::vector<std::string> controls, std::vector<float> low,
                                   std::vector<float> high, std::size_t max_fired = 256);

@@ -55,7 +55,7 @@ Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
     out[i] = std::atan2(parity * r[j][k], r[k][k]);
     out[k] = std::atan2(parity * r[i][j], r[i][i]);
   }
-  // cos(90 degrees) in double is not exactly 0; the rest would keep a row of a matrix alive.
+  // cos(90 degrees) in double is not exactly 0; the remainder would keep a row of zeros.
   for (double& angle : out) {
     if (std::abs(angle) < 1e-14) angle = 0;
   }

@@ -451,7 +451,7 @@ void convert_ml_joints(const Conversion& c, const System& target, MlJoints& join
   }
 }
 
-// ---- the whole
+// ---- the whole Dna
 
 void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
   for (const UnknownLayer& layer : dna.unknown_layers) {

@@ -216,7 +216,7 @@ std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::
   return r_.failed() ? 0 : cut_influences(*plan, weights, joints, n, &known.finite);
 }
 
-// An invalid channel counts as wanted, so that the check of indices names it.
+// An invalid channel counts as wanted, so that the index check reports it.
 bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
   const IndexMap& channels = plan->blend_shape_channels;
   return channel >= channels.size() || channels.keeps(channel);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Free sample people, built from CC0 data and written through the risorius DNA writer."""
+"""Free sample people, made from CC0 data and written as DNA files by risorius."""
 
 from .build import build_sample
 from .people import PEOPLE, Person

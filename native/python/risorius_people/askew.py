@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Asymmetry: small one-sided shapes that are laid over a finished rig.
+"""Makes faces asymmetric: adds small one-sided shapes to a finished rig.
 
-No face is symmetric. The shapes are added last because joints are fitted to a symmetric face, as an
-animator expects them. The shapes move the skin by some millimetres, so joints and expressions still
-fit.
+No face is symmetric. The shapes are added last, because joints are fitted to a symmetric face,
+which animators expect. The shapes move the skin by some millimetres, so joints and expressions
+still fit.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ _STAYS = (
     "cornea",
     "teeth",
     "tongue",
-)  # groups of the base mesh, by parts of names
+)  # parts of names of groups of the base mesh that stay symmetric
 
 
 def askew(source: Source, body: Body, person: Person) -> Floats:
-    """Vertex displacements that make the two sides of a face differ, float64[V, 3], decimetres.
+    """float64[V, 3]: vertex displacements that make the two sides of a face differ, in decimetres.
 
     Args:
-        source: the data to read the shapes from.
+        source: the data with the shapes.
         body: the person's body.
-        person: names the shapes and their weights.
+        person: the person, with the names and weights of the shapes.
     """
     count = len(body.positions)
     out = np.zeros((count, 3))
@@ -47,13 +47,14 @@ def askew(source: Source, body: Body, person: Person) -> Floats:
 
 
 def set_askew(dna: Dna, parts: list[Part], shape: Floats, unit: float) -> None:
-    """Add the asymmetry shape to the meshes of all LODs.
+    """Adds the asymmetry shape to the meshes of all LODs.
 
     Args:
-        dna: a face made of `parts`; vertices of coarser LODs are vertices of LOD 0. Is changed.
-        parts: the meshes of the face.
-        shape: float64[V, 3], decimetres.
-        unit: unit of the Dna's meshes, in decimetres.
+        dna: a face made of `parts`, in which vertices of coarser LODs are vertices of LOD 0;
+            changed.
+        parts: the meshes of the face that were made from the base mesh.
+        shape: float64[V, 3], displacement of the base mesh's vertices in decimetres.
+        unit: factor from decimetres to the unit of the Dna's meshes.
     """
     if not shape.any():
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A sample person as a blend shape face: meshes, skeleton, controls and correctives."""
+"""Makes a sample person as a blend shape face: meshes, skeleton, controls and correctives."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ from .polygons import (
 )
 from .source import BaseMesh, Source
 
-CM = 10.0  # the data are in decimetres
+CM = 10.0  # centimetres per decimetre, the unit of the data
 FLUSH = ("head_flush_L", "head_flush_R")
-PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
+PARTS = {  # mesh -> (groups of the base mesh, subdivisions at LOD 0, subdivisions at LOD 1)
     "head": (["body"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
 }
 
 
 def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
-    """Make every mesh of both LODs.
+    """Makes all meshes of both LODs.
 
-    base: the base mesh with its eyeballs.
+    Args:
         base: the base mesh with its eyeballs.
-        groups: vertex indices by group.
+        groups: name of a group -> vertex indices.
     """
     count = len(base.positions)
     out = []
@@ -70,8 +70,8 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
                 base.uvs,
                 count,
             )
-            # Clipping at the neck drops the body below it; the small parts all lie above.
-            aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
+            # The cut at the neck drops the body below it; the other meshes are all above the cut.
+            aside = np.hypot(base.positions[:, 0], 0.35)  # makes the cut round in front
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
             if name == "head":
@@ -90,16 +90,16 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """The blend shape delta to add before skinning, so that delta and joints give the motion.
+    """The blend shape delta that, added before skinning, gives the displacement with the joints.
 
     Args:
-        positions: float64[v, 3], decimetres.
-        weights: float64[v, 9], skin weights.
+        positions: float64[v, 3], positions at rest in decimetres.
+        weights: float64[v, 9], skin weights of the vertices.
         expression: displacements of the same vertices, and the motions of its joints.
-        joints: positions of the joints by name.
+        joints: name of a joint -> float64[3], its position in decimetres.
 
     Returns:
-        float64[v, 3], decimetres.
+        float64[v, 3], delta in decimetres.
     """
     if not expression.joints:
         return expression.displacement
@@ -115,7 +115,7 @@ def bind_displacement(
 
 
 def euler_xyz(rotation: Floats) -> Floats:
-    """Degrees about x, y, z of a column-vector matrix Rz Ry Rx."""
+    """Angles about x, y, z in degrees of a matrix Rz Ry Rx for column vectors."""
     return np.degrees(
         [
             np.arctan2(rotation[2, 1], rotation[2, 2]),
@@ -126,10 +126,10 @@ def euler_xyz(rotation: Floats) -> Floats:
 
 
 def add_skin(mesh: Mesh, weights: Floats) -> None:
-    """Give a mesh its skin weights; weights of 0.001 or less are left out.
+    """Adds skin weights to a mesh; weights of 0.001 or less are left out.
 
     Args:
-        mesh: is changed.
+        mesh: the mesh; changed.
         weights: float64[v, 9].
     """
     kept = np.where(weights > 1e-3, weights, 0)
@@ -142,12 +142,12 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
 
 def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
-    """Geometry and skin weights of a part, in centimetres.
+    """The geometry and skin weights of a part as a mesh in centimetres.
 
     Args:
-        part: a part of the base mesh.
-        positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        weights: float64[v, 9], skin weights of the part's own vertices.
+        part: part of the base mesh.
+        positions: float64[V, 3], all vertices of the base mesh, in decimetres.
+        weights: float64[v, 9], skin weights of the part's vertices.
     """
     p = part.carry(positions)
     polygons = part.polygons
@@ -166,13 +166,13 @@ def add_definition(
     raw: list[str],
     channels: list[str],
 ) -> None:
-    """Fill the descriptor and the definition: names, skeleton, the lists of each LOD.
+    """Fills the descriptor and the definition: names, skeleton, the lists of each LOD.
 
     Args:
-        dna: is filled.
-        person: gives name and gender.
-        parts: the meshes, LOD 0 first.
-        joints: positions of the joints by name, decimetres.
+        dna: the face; changed.
+        person: the person, with name, gender and age.
+        parts: the meshes, those of LOD 0 first.
+        joints: name of a joint -> float64[3], its position in decimetres.
         raw: names of the raw controls without their prefix.
         channels: names of the blend shape channels.
     """
@@ -202,10 +202,10 @@ def add_definition(
 
 
 def add_gui(dna: Dna, raw: list[str]) -> None:
-    """Fill the GUI controls and the table that maps them to raw controls.
+    """Fills the GUI controls and the table that maps them to raw controls.
 
     Args:
-        dna: is filled.
+        dna: the face; changed.
         raw: names of the raw controls without their prefix.
     """
     table = gui_table()
@@ -234,12 +234,12 @@ def add_behavior(
     units: dict[str, ex.Expression],
     correctives: list[tuple[str, ...]],
 ) -> None:
-    """Fill the correctives, joint groups, blend shape channels and animated maps.
+    """Fills the correctives, joint groups, blend shape channels and animated maps.
 
     Args:
-        dna: is filled.
+        dna: the face; changed.
         raw: names of the raw controls without their prefix.
-        units: the expression of each raw control, by name.
+        units: raw control -> its expression.
         correctives: the raw controls of each corrective.
     """
     names = [name for name, _ in JOINTS]
@@ -290,11 +290,11 @@ def add_behavior(
 
 
 def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
-    """Add one blend shape target per channel that moves a vertex by more than 0.01 mm.
+    """Adds a blend shape target for each channel that moves a vertex by more than 0.01 mm.
 
     Args:
-        mesh: is changed.
-        deltas: float64[v, 3] of each channel, decimetres.
+        mesh: the mesh; changed.
+        deltas: float64[v, 3] per channel, in decimetres.
     """
     targets = []
     for channel, delta in enumerate(deltas):
@@ -313,11 +313,11 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
 def assemble(
     source: Source, say: Callable[[str], None], person: Person = MAN
 ) -> tuple[Dna, list[Part], Body]:
-    """The whole Dna, its parts and the person's body.
+    """Makes the blend shape face of a person; returns it with its parts and the person's body.
 
     Args:
-        source: the data.
-        say: gets a sentence per step.
+        source: the data of the sample people.
+        say: called with a line of text per step.
         person: the person to make.
     """
     base = with_eyeballs(source.base_mesh())
@@ -332,8 +332,7 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # CLOSED has no shape of its own: it corrects the rotations of its joints, which do not add
-    # up.
+    # CLOSED has no shape: its corrective completes joint rotations, which do not add up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)
@@ -358,7 +357,7 @@ def assemble(
             jaw = raw.index("jawOpen")
             for pair, way in correctives.items():
                 delta = part.carry(way)
-                if pair in body.closing:  # an offset in space that the open jaw does not turn
+                if pair in body.closing:  # this delta is not rotated by the open jaw
                     open_jaw = units["jawOpen"]
                     both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
                     delta = bind_displacement(p, w, both, joints) - deltas[jaw]

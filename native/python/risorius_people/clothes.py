@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A shirt that covers neck and shoulders: cut from the base mesh's tights, with a collar.
+"""Makes a shirt that covers neck and shoulders: cut from the base mesh's tights, with a collar.
 
-The tights fit every body of the data. Added vertices are affine combinations of theirs. Lengths are
-decimetres; places are on the base mesh.
+The tights fit every body of the data. New vertices are affine combinations of vertices of the
+tights. Lengths are in decimetres, positions on the base mesh.
 """
 
 from __future__ import annotations
@@ -14,41 +14,41 @@ from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, edges
 from .source import BaseMesh
 
 GROUP = "helper-tights"
-# Collar: its height at x = z = 0, the drop per decimetre to the front, and the rise per square of
-# the distance to the side.
+# Height of the collar at x = z = 0, its drop per decimetre to the front, and its rise per squared
+# distance to the side.
 COLLAR = 5.66
 COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3
-HEM = 4.62  # height
-SHOULDER = 2.02  # largest distance to the side
-ROOM = 0.02  # the shirt is wider than the body by this share
-# The collar's rows from its seam over its edge to the inside: millimetres away from the neck and
-# up. It leans to the neck as ribbing does; an upright collar looks like a pipe.
+HEM = 4.62  # height of the lower edge
+SHOULDER = 2.02  # largest |x|, where the sleeve is cut
+ROOM = 0.02  # the shirt is wider than the body by this fraction
+# Rows of the collar from its seam over its edge to the inside: millimetres away from the neck, and
+# up. It leans towards the neck like ribbing; an upright collar looks like a pipe.
 _COLLAR = (
     (1.6, -2.5), (2.4, 0.5), (1.3, 5.0), (-1.4, 9.6), (-3.2, 10.6), (-4.0, 9.2), (-2.4, 3.0),
 )  # fmt: skip
-# weights of the mean along the collar's ring.
+# Weights of the moving average along the collar's ring.
 _EVEN = tuple(k / 64 for k in (1, 6, 15, 20, 15, 6, 1))
 MM = 0.01
 
 
 def collar_heights(positions: Floats) -> Floats:
-    """Height above the collar's seam, all round the neck, float64[v], decimetres.
+    """float64[v]: height above the collar's seam, in decimetres.
 
     Args:
-        positions: float64[v, 3], on the base mesh.
+        positions: float64[v, 3] on the base mesh.
     """
     x, y, z = positions.T
-    # A shoulder may be as high as the collar, so cut only near the neck.
+    # Shoulders may be as high as the collar, so the seam rises away from the neck.
     sides = COLLAR_ROUND * x**2 + 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
     return np.asarray(y + COLLAR_SLOPE * z - sides - COLLAR)
 
 
 def rings(polygons: Polygons) -> list[list[int]]:
-    """The borders of a mesh, each a ring of vertices in the order of its faces.
+    """The borders of a mesh, each as vertices in the order of the faces along it.
 
     Args:
-        polygons: all faces must have the same winding.
+        polygons: a mesh whose faces all have the same winding.
     """
     edges = edges_of(polygons.faces)
     after: dict[int, int] = {}
@@ -66,11 +66,11 @@ def rings(polygons: Polygons) -> list[list[int]]:
 
 
 def shirt(base: BaseMesh, lod: int) -> Part:
-    """The shirt of a level of detail.
+    """Makes the shirt of one LOD.
 
     Args:
         base: the base mesh.
-        lod: 0 or 1.
+        lod: number of the LOD, 0 or 1.
     """
     corners = base.faces[GROUP]
     polygons = Polygons(
@@ -100,38 +100,39 @@ def shirt(base: BaseMesh, lod: int) -> Part:
 
 
 def unrolled(positions: Floats) -> Floats:
-    """Texture coordinates round the body and up, float64[v, 2]; the texture repeats each decimetre.
+    """float64[v, 2]: texture coordinates around the body and up; the texture repeats each
+    decimetre.
 
     Args:
-        positions: float64[v, 3].
+        positions: float64[v, 3], in decimetres.
     """
     return np.column_stack([positions[:, 0] + 0.5 * positions[:, 2], positions[:, 1]])
 
 
 def spread(vertices: list[int], most: int) -> list[int]:
-    """About `most` of the vertices, evenly spaced: means over few vertices keep operators sparse.
+    """About `most` of the vertices, evenly spaced; few vertices keep operators sparse.
 
     Args:
-        vertices: in their order on the ring.
-        most: number of vertices to take.
+        vertices: vertices in their order on the ring.
+        most: wanted number of vertices.
     """
     return vertices[:: max(1, len(vertices) // most)]
 
 
 def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
-    """The shirt widened, with collar and turned-in hems; and the operator from the cut tights.
+    """Widens the shirt, and adds collar and turned-in hems; returns faces and operator.
 
     Args:
-        polygons: the cut tights.
-        positions: float64[v, 3], decimetres.
+        polygons: the cut tights, on whose vertices the operator works.
+        positions: float64[v, 3], in decimetres.
     """
     count = polygons.vertex_count
     faces = [list(face) for face in polygons.faces]
     rows: list[tuple[int, int, float]] = []
     trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
-    # Widening away from the trunk's middle at the same height would need a division. Away from
-    # one middle it is linear and looks much the same.
+    # Each vertex moves away from the mean of the trunk's vertices, because this is linear. The
+    # middle at the vertex's height would need a division and looks much the same.
     for i in range(count):
         rows.append((i, i, 1 + ROOM))
         rows += [(i, j, -ROOM * near) for j in trunk]
@@ -144,7 +145,7 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
         radius = float(np.linalg.norm(positions[ring] - middle, axis=1).mean())
         rise = float(np.linalg.norm(middle - positions[trunk].mean(axis=0)))
         share = 1 / len(few)
-        # The cut crosses large faces: without the mean the edge would show their corners.
+        # The cut crosses large faces; without the moving average the edge would show their corners.
         even = _EVEN if collar else (1.0,)
         before, size = ring, len(ring)
         for away, up in profile:

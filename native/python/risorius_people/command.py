@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius sample build: make a free sample person."""
+"""The command risorius sample build, which makes a free sample person."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rig(spec: str | None, joints: int | None) -> tuple[RigOptions | None, CorrectiveOptions]:
-    """The options of the joint fit (None: no joints) and of the search for correctives."""
+    """Options of the joint fit (None: no joints), and of the search for correctives."""
     rig, correctives = RIG, NO_SEARCH
     if spec == "full":
         with resources.as_file(resources.files("risorius_people") / "full.toml") as path:

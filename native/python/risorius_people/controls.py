@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""GUI controls of the sample: names and ranges of the board, mapped to raw controls."""
+"""GUI controls of the sample people: names, ranges, and their mapping to raw controls."""
 
-# GUI control, raw control for its positive half, raw control for its negative half or "".
-# {s} stands for the side.
+# (GUI control, raw control for its positive half, raw control for its negative half or ""). {s} is
+# replaced by the side.
 SIDED = [
     ("CTRL_{s}_brow_down.ty", "browDown", ""),
     ("CTRL_{s}_brow_lateral.ty", "browLateral", ""),
@@ -81,7 +81,7 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Controls of the upper and the lower lip ({v} is U or D) and of the teeth.
+# Controls of both lips and of the teeth; {v} is replaced by U or D.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
@@ -99,16 +99,16 @@ LIPS_MIDDLE = [
     ("CTRL_C_teeth{v}.tx", "teethLeft{v}", "teethRight{v}"),
     ("CTRL_C_teeth_fwdBack{v}.ty", "teethFwd{v}", "teethBack{v}"),
 ]
-# GUI control and the raw controls that follow one another from 0 to 1: STICKY ones stay on,
-# SWALLOW ones go off again.
+# (GUI control, raw controls that follow one another as it goes from 0 to 1): those of STICKY stay
+# on, those of SWALLOW go off again.
 STICKY = ("CTRL_{s}_mouth_lipSticky.ty", [f"mouthLipsSticky{{s}}Ph{n}" for n in (1, 2, 3)])
 SWALLOW = ("CTRL_C_neck_swallow.ty", [f"neckSwallowPh{n}" for n in (1, 2, 3, 4)])
-# A conditional: from, to, slope, cut.
+# (from, to, slope, cut) of a conditional.
 Range = tuple[float, float, float, float]
 
 
 def gui_table() -> list[tuple[str, list[tuple[str, Range]]]]:
-    """GUI controls, each with its raw controls and their input ranges."""
+    """(GUI control, its raw controls with their input ranges) for each GUI control."""
     rows = []
     for side in "LR":
         for gui, up, down in SIDED:
@@ -134,7 +134,7 @@ def _two_sided(up: str, down: str) -> list[tuple[str, Range]]:
 
 
 def _filling(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise one raw control after the other from 0 to 1; each stays on."""
+    """Conditionals that raise raw controls from 0 to 1 one after the other; each stays at 1."""
     count = len(names)
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):
@@ -145,7 +145,7 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that turn raw controls on and off in turn: each starts where the last peaks."""
+    """Conditionals that raise and lower raw controls: each starts where the last one peaks."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The expression of each raw control: displacements of all vertices, and joint motions."""
+"""Makes the expression of each raw control: displacements of all vertices, and joint motions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from .further import find_places, further_units, unit_shape
 from .polygons import Floats, Ints
 from .source import BaseMesh, Source
 
-_CHEEK_BALL, _ROLL = 0.032, 0.022  # decimetres
+# decimetres: heights of the cheek's ball and of the roll at the laugh line
+_CHEEK_BALL, _ROLL = 0.032, 0.022
 PREFIX = "CTRL_expressions."
 LIPS_TOGETHER = [f"mouthLipsTogether{lip}{side}" for lip in "UD" for side in "LR"]
 CLOSED = ("jawOpen", *LIPS_TOGETHER)
@@ -25,22 +26,25 @@ _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("do
 
 @dataclass
 class Expression:
-    """The motion of one raw control at 1, and the part of it that the joints do."""
+    """The motion of a raw control at 1, and the part of it that joints perform."""
 
-    displacement: Floats  # [V, 3], decimetres: the whole motion, joints included
-    joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # rotation, translation
+    displacement: Floats  # [V, 3], decimetres: the whole motion, including that of the joints
+    # joint -> (rotation [3, 3], translation [3])
+    joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
 
 def side_masks(positions: Floats) -> dict[str, Floats]:
-    """Weights of the left and right half, with sum 1; the character's left is +x."""
+    """float64[V] by "L" and "R": weights with sum 1; the character's left is +x."""
     left = smooth_step(positions[:, 0] / 0.5 + 0.5)
     return {"L": left, "R": 1 - left}
 
 
 def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
-    """Weights of the upper and lower lip, with sum 1; vertices that jawOpen moves are lower.
+    """float64[V] by "U" and "D": weights of upper and lower lip with sum 1.
 
-    The lips touch, so positions cannot separate them; the jaw's motion can.
+    Vertices that jawOpen moves are of the lower lip.
+
+    The lips touch, so their positions cannot distinguish them; the jaw's motion can.
     """
     travel = np.linalg.norm(jaw_open, axis=1)
     lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
@@ -48,11 +52,11 @@ def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
 
 
 def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
-    """The 52 ARKit units, divided over the raw controls of their rows in arkit.toml.
+    """Divides the 52 ARKit units over the raw controls of their rows in arkit.toml.
 
     Args:
         source: the data with the units.
-        positions: float64[V, 3], decimetres; they separate left from right.
+        positions: float64[V, 3] in decimetres, which distinguish left from right.
     """
     count = len(positions)
     sides = side_masks(positions)
@@ -75,12 +79,12 @@ def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
 def extra_units(
     source: Source, positions: Floats, origin: Mapping[str, float]
 ) -> dict[str, Expression]:
-    """Expressions beyond ARKit, from the FACS-like targets of the data.
+    """Makes expressions beyond ARKit from FACS-like targets of the data.
 
     Args:
         source: the data with the targets.
-        positions: float64[V, 3], decimetres; they separate left from right.
-        origin: share of each origin of the data, with sum 1.
+        positions: float64[V, 3] in decimetres, which distinguish left from right.
+        origin: origin of the data -> its share in the person; the sum is 1.
     """
     sides = side_masks(positions)
 
@@ -113,18 +117,18 @@ def add_further_units(
     positions: Floats,
     origin: Mapping[str, float],
 ) -> dict[tuple[str, str], Floats]:
-    """Add the expressions of further.toml, which the data do not have as units.
+    """Adds the expressions of further.toml, for which the data have no units.
 
     Args:
-        out: expressions by name; the further ones are added.
+        out: raw control -> expression; changed.
         source: the data.
         base: the base mesh.
-        groups: vertex indices by group of the base mesh.
-        positions: float64[V, 3], decimetres.
-        origin: share of each origin of the data, with sum 1.
+        groups: name of a group of the base mesh -> vertex indices.
+        positions: float64[V, 3], in decimetres.
+        origin: origin of the data -> its share in the person; the sum is 1.
 
     Returns:
-        Their correctives: float64[V, 3] by two raw controls.
+        Correctives: two raw controls -> float64[V, 3].
     """
     count = len(positions)
     brows = sum(np.abs(unit_shape(source, origin, name, count)) for name in _BROWS)
@@ -143,13 +147,14 @@ def add_joint_motion(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Give jaw, teeth and eyes joint motions: the rigid motions that fit teeth and eyeballs best.
+    """Adds joint motions of jaw, teeth and eyes: the rigid motions that best fit teeth and
+    eyeballs.
 
     Args:
-        out: expressions by name; jawBack and jawOpenExtreme are added.
-        groups: vertex indices by group of the base mesh.
-        positions: float64[V, 3], decimetres.
-        pivots: joint positions by name.
+        out: raw control -> expression; changed; jawBack and jawOpenExtreme are added.
+        groups: name of a group of the base mesh -> vertex indices.
+        positions: float64[V, 3], in decimetres.
+        pivots: name of a joint -> float64[3], its position.
     """
     teeth = groups["helper-lower-teeth"]
     jaw = pivots["FACIAL_C_Jaw"]
@@ -180,13 +185,14 @@ def add_joint_motion(
 
 
 def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
-    """The fat of a cheek that a true smile pushes up, over the laugh line, float64[V, 3].
+    """float64[V, 3]: the displacement of a cheek that a true smile pushes up over the laugh line.
 
-    The displacement ends at the laugh line, where the skin folds in. Teeth do not move.
+    It ends at the laugh line, where the skin folds in. Teeth do not move.
 
     Args:
-        units: the expression of each raw control, by name.
-        places: float64[V, 3] on the man's head, from the point between his eyes, decimetres.
+        units: raw control -> expression.
+        places: float64[V, 3] on the man's head, relative to the point between his eyes, in
+            decimetres.
         side: L or R.
     """
     away, there = from_laugh_line(places)
@@ -211,13 +217,13 @@ def leave_bones(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Move teeth and eyeballs by their joints alone, so that they stay rigid. Pupils may change.
+    """Moves teeth and eyeballs by their joints alone, so that they stay rigid; pupils may change.
 
     Args:
-        out: expressions by name, with their joints; displacements are changed.
-        groups: vertex indices by group of the base mesh.
-        positions: float64[V, 3], decimetres.
-        pivots: joint positions by name.
+        out: raw control -> expression with its joints; displacements are changed.
+        groups: name of a group of the base mesh -> vertex indices.
+        positions: float64[V, 3], in decimetres.
+        pivots: name of a joint -> float64[3], its position.
     """
     bones: dict[str, tuple[str, ...]] = {
         "helper-upper-teeth": ("FACIAL_C_TeethUpper",),
@@ -240,13 +246,16 @@ def leave_bones(
 
 
 def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
-    """Take the displacements that close the lips of an open jaw, by jawOpen and quarter control.
+    """Removes the displacements that close the lips of an open jaw, and returns them.
 
-    The data's shape undoes the opening of the jaw. On a shut jaw it would lift the lower lip far
-    over the upper one, so the controls alone do nothing and the displacement becomes a corrective.
+    Returns ("jawOpen", control of a lip's quarter) -> float64[V, 3].
+
+    The data's shape undoes the opening of the jaw. With a shut jaw it would lift the lower lip far
+    over the upper one; therefore the controls alone do nothing, and the displacement becomes a
+    corrective.
 
     Args:
-        out: expressions by name; the quarters' displacements become 0.
+        out: raw control -> expression; displacements of the quarters become 0.
     """
     result: dict[tuple[str, str], Floats] = {}
     for name in LIPS_TOGETHER:
@@ -258,19 +267,20 @@ def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
 def corrective_displacements(
     out: dict[str, Expression], places: Floats
 ) -> dict[tuple[str, str], Floats]:
-    """Displacements to add where two controls are active; (a, b) has the weight a * b.
+    """Displacements to add if two controls are active; (a, b) has the weight a * b.
 
     Args:
-        out: the expression of each raw control, by name.
-        places: float64[V, 3] of the man's vertices, from the point between his eyes, decimetres.
+        out: raw control -> expression.
+        places: float64[V, 3] of the man's vertices, relative to the point between his eyes, in
+            decimetres.
     """
     lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
     result: dict[tuple[str, str], Floats] = {}
     for side in ("L", "R"):
-        # The open jaw stretches the lower lip, so a smile lifts it less.
+        # The open jaw stretches the lower lip, so a smile lifts the lip less.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
-        # The raised lower lid leaves the upper lid a shorter way to close.
+        # If the lower lid is raised, the upper lid has a shorter way to close.
         blink = out[f"eyeBlink{side}"].displacement
         raised = out[f"eyeCheekRaise{side}"].displacement
         travel = np.linalg.norm(blink, axis=1)
@@ -282,6 +292,6 @@ def corrective_displacements(
         ball = cheek_mass(out, places, side)
         result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
-            # Lips pushed forward touch the teeth line less as the jaw drops.
+            # The open jaw moves the lower lip off the teeth, so the lip is pushed forward less.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The laugh line, along which a smile folds the cheek over the lip. Lengths are decimetres."""
+"""The laugh line, along which a smile folds the cheek over the lip. Lengths are in decimetres."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from risorius.base.easing import smooth_step
 
 from .polygons import Floats
 
-_DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # below the eye
-_ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # from the middle of the face
+_DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # points of the line: distance below the eye
+_ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # and distance from the middle of the face
 
 
 def from_laugh_line(places: Floats) -> tuple[Floats, Floats]:
-    """Distance from the laugh line, which runs from the wing of the nose past the mouth.
+    """Distance from the laugh line, which goes from the wing of the nose past the mouth.
 
     Args:
-        places: float64[..., 3] on the man's head, from the point between his eyes.
+        places: float64[..., 3] on the man's head, relative to the point between his eyes.
 
     Returns:
-        Distances float64[...], positive on the cheek; and weights float64[...], 1 beside the line
+        Distances float64[...], positive on the cheek; and weights float64[...], 1 along the line
         and 0 beyond its ends.
     """
     x, y = np.abs(places[..., 0]), places[..., 1]

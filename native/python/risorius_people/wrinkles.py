@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Wrinkles from compression: masks of expressions, and the relief of the folds.
+"""Makes wrinkles from compression: masks of expressions, and the relief of the folds.
 
-A fold runs across the direction of compression, so its lines follow from the expression. The
-smallest stretch of each polygon gives the depth, its direction gives the lines (line integral
+Folds are perpendicular to the direction of compression, so their lines follow from the expression.
+The smallest stretch of each polygon gives the depth, its direction gives the lines (line integral
 convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using Line Integral Convolution",
-1993). The names are MetaHuman's names of maps and masks, so that programs that know them show the
+1993). Maps and masks have MetaHuman's names, so that programs which know these names show the
 wrinkles.
 """
 
@@ -21,23 +21,24 @@ from .folds import from_laugh_line
 from .part import Part
 from .polygons import Floats, Ints, Polygons
 
-_LEAST = 0.015  # share of its length that skin loses before it folds
-_FULL = 0.15  # share at which folds have their full depth
-_ROUNDS = 3  # smoothing rounds over neighbours: skin is stiffer than a mesh
-DEPTH = 0.007  # decimetres
-_FOLD_DEPTH = 0.015  # decimetres
-_LINES = 24  # texels to each side along which noise is averaged into a line
+_LEAST = 0.015  # fraction of its length that skin loses before it folds
+_FULL = 0.15  # fraction of lost length at which folds have their full depth
+_ROUNDS = 3  # smoothing rounds over neighbours, because skin is stiffer than a mesh
+DEPTH = 0.007  # decimetres: depth of a fold
+_FOLD_DEPTH = 0.015  # decimetres: depth of the smile's fold
+_LINES = 24  # texels to each side over which noise is averaged along a line
 _FINE, _COARSE = 1.5, 3.5  # texels: smallest and largest width of a fold
-_TILE = 512  # texels after which the noise repeats
+_TILE = 512  # texels after which the noise of the folds repeats
 _SEED = 23
 
 
 @dataclass(frozen=True)
 class Region:
-    """A mask: the texture set that it shows, and its drivers."""
+    """A mask of wrinkles: its texture set, and the controls that drive it."""
 
-    number: int  # number of the set, 1 to 3
-    drivers: Mapping[str, float]  # raw control without its side -> weight of the mask at 1
+    number: int  # number of the texture set, 1 to 3
+    # raw control without its side -> weight of the mask if the control is at 1
+    drivers: Mapping[str, float]
 
 
 REGIONS = {
@@ -66,7 +67,7 @@ def map_names() -> list[str]:
 
 
 def mask_name(region: str, side: str) -> str:
-    """The name of a mask and of its file: head_wm1_blink_L.
+    """The name of a mask and of its file, such as head_wm1_blink_L.
 
     Args:
         region: a key of REGIONS.
@@ -79,16 +80,16 @@ SMILE, FROWN = mask_name("smile", "L"), mask_name("browsDown", "L")
 
 
 def masks_of(number: int) -> list[str]:
-    """The masks of a set.
+    """The masks of a texture set, left before right.
 
     Args:
-        number: number of the set.
+        number: number of the texture set.
     """
     return [mask_name(n, side) for n, r in REGIONS.items() if r.number == number for side in "LR"]
 
 
 def drivers() -> list[tuple[str, int, float]]:
-    """(raw control, map, slope) of each driver."""
+    """(raw control, number of the map, slope) for each driver of each map."""
     out = []
     number = 0
     for region in REGIONS.values():
@@ -99,7 +100,7 @@ def drivers() -> list[tuple[str, int, float]]:
 
 
 class Surface:
-    """The head's polygons as triangles in the neutral pose, with their texture coordinates."""
+    """The head as triangles in the neutral pose, with their texture coordinates."""
 
     def __init__(self, polygons: Polygons, uvs: Floats, positions: Floats) -> None:
         corners, places = [], []
@@ -115,21 +116,21 @@ class Surface:
         size = np.linalg.det(edges)
         flat = np.abs(size) < 1e-12
         edges[flat] = np.eye(2)
-        # Maps from the triangle's plane to the texture.
+        # Map from the triangle's plane to the texture.
         self.back = np.linalg.inv(self.rest)
         self.to_uv = edges @ self.back
 
     def folds(self, moved: Floats) -> Floats:
-        """Compression at each vertex (0 to 1), and the direction of the folds in the texture as a
-        tensor xx, xy, yy, float64[V, 4].
+        """float64[V, 4]: compression at each vertex (0 to 1), and the direction of the folds in the
+        texture as a tensor xx, xy, yy, multiplied by the compression.
 
         Args:
-            moved: float64[V, 3], vertices in the expression.
+            moved: float64[V, 3], positions in the expression.
         """
         change = _frames(moved[self.corners]) @ self.back
         _, stretch, right = np.linalg.svd(change)
         depth = np.clip((1 - stretch[:, 1] - _LEAST) / (_FULL - _LEAST), 0, 1)
-        along = right[:, 0]  # the axis across the compression
+        along = right[:, 0]  # the axis perpendicular to the compression
         lines = np.einsum("tij,tj->ti", self.to_uv, along)
         lines /= np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
         x, y = lines.T
@@ -137,8 +138,7 @@ class Surface:
         return self.evened(self._at_vertices(rows), _ROUNDS)
 
     def evened(self, values: Floats, rounds: int) -> Floats:
-        """Smooth values: each round takes half of each vertex and half of the mean of its
-        triangles.
+        """Smooths values: each round averages each vertex with the mean of its triangles.
 
         Args:
             values: float64[V, ...].
@@ -150,7 +150,7 @@ class Surface:
         return values
 
     def _at_vertices(self, rows: Floats) -> Floats:
-        """The mean of the triangles' values [T, ...] about each vertex, float64[V, ...]."""
+        """float64[V, ...]: mean of the triangles' values [T, ...] at each vertex."""
         sums = np.zeros((len(self._about), *rows.shape[1:]))
         for k in range(3):
             np.add.at(sums, self.corners[:, k], rows)
@@ -158,7 +158,7 @@ class Surface:
 
 
 def _frames(triangles: Floats) -> Floats:
-    """The two edges of each triangle in its own plane, float64[n, 2, 2]."""
+    """float64[n, 2, 2]: two edges of each triangle in the triangle's plane."""
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
     first = a / length[:, None]
@@ -173,13 +173,13 @@ def _frames(triangles: Floats) -> Floats:
 def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
-    """Folds of each mask, float64[V, 4] by name, see Surface.folds.
+    """Name of a mask -> float64[V, 4], folds as in Surface.folds.
 
     Args:
-        part: the head.
+        part: the head mesh.
         uvs: float64[T, 2] in [0, 1].
-        positions: float64[v, 3] of its vertices, decimetres.
-        units: expression of each raw control, by name.
+        positions: float64[v, 3] of its vertices, in decimetres.
+        units: raw control -> expression.
     """
     surface = Surface(part.polygons, uvs, positions)
     out = {}
@@ -194,18 +194,18 @@ def vertex_folds(
 def folds_of_sides(
     surface: Surface, positions: Floats, moves: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Folds of both sides together, shared between the sides, float64[V, 4] by side.
+    """Side -> float64[V, 4]: folds of both sides together, divided between the sides.
 
-    One side alone compresses the skin in the middle of the face, where its motion fades out. Both
-    sides together do not.
+    One side alone would compress the skin in the middle of the face, where its motion fades out.
+    Both sides together do not.
 
     Args:
-        surface: the head.
+        surface: surface of the head.
         positions: float64[V, 3] of its vertices.
-        moves: float64[V, 3] by side, displacement of that side's control.
+        moves: side -> float64[V, 3], displacement by that side's control.
     """
     both = surface.folds(positions + sum(moves.values()))
-    # Smooth as widely as folds: otherwise still skin amid moving skin would get no folds.
+    # Smoothed as widely as the folds; otherwise still skin amid moving skin would get no folds.
     far = {
         side: surface.evened(np.linalg.norm(move, axis=1), _ROUNDS + 1)
         for side, move in moves.items()
@@ -215,11 +215,11 @@ def folds_of_sides(
 
 
 def blurred(image: Floats, width: float) -> Floats:
-    """An image [h, w, ...] blurred by a Gaussian; its rims are repeated outward.
+    """An image [h, w, ...] blurred by a Gaussian; border texels are repeated outward.
 
     Args:
         image: float64[h, w, ...].
-        width: standard deviation, texels.
+        width: standard deviation in texels.
     """
     reach = int(np.ceil(3 * width))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
@@ -236,11 +236,11 @@ def blurred(image: Floats, width: float) -> Floats:
 
 
 def relief(tensors: Floats, there: Floats) -> Floats:
-    """Folds along the lines of a tensor field, float64[h, w], from -1 (deepest) to 0.
+    """float64[h, w]: folds along the lines of a tensor field, from -1 (deepest) to 0.
 
     Args:
-        tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture.
-        there: bool[h, w], texels to compute.
+        tensors: float64[h, w, 3], xx, xy, yy of the lines' direction in the texture.
+        there: bool[h, w], texels that are computed.
     """
     size = len(tensors)
     noise = np.random.default_rng(_SEED).normal(size=(_TILE, _TILE))
@@ -268,17 +268,17 @@ def relief(tensors: Floats, there: Floats) -> Floats:
             dx, dy = np.where(turned, -x_here, x_here), np.where(turned, -y_here, y_here)
     total /= total.std() or 1.0
     out = np.zeros((size, size))
-    # Valleys are narrow and hills are round.
+    # makes valleys narrow and hills round
     out[rows, columns] = -smooth_step(np.clip(total, 0, 2) / 2)
     return out
 
 
 def normals(heights: Floats, places: Floats) -> Floats:
-    """Normals of a relief in texture space, float64[h, w, 3] in [0, 1].
+    """float64[h, w, 3] in [0, 1]: normals of a relief in texture space.
 
     Args:
-        heights: float64[h, w], decimetres.
-        places: float64[h, w, 3], place of each texel on the head, decimetres.
+        heights: float64[h, w], in decimetres.
+        places: float64[h, w, 3], position of each texel on the head, in decimetres.
     """
     slopes = []
     for axis in (1, 0):
@@ -292,13 +292,14 @@ def normals(heights: Floats, places: Floats) -> Floats:
 
 
 def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
-    """The smile's fold from the wing of the nose past the corner of the mouth.
+    """The fold of a smile from the wing of the nose past the corner of the mouth.
 
-    Compression alone gives fine lines there, but the cheek's fat slides over the lip as one mass.
+    Compression alone gives only fine lines there, but the cheek's fat slides over the lip as one
+    mass.
 
     Args:
-        places: float64[h, w, 3], place of each texel on the head, decimetres.
-        eye: float64[3], the left eye's middle.
+        places: float64[h, w, 3], position of each texel on the head, in decimetres.
+        eye: float64[3], middle of the left eye.
 
     Returns:
         Heights in decimetres, float64[h, w], and a mask of the fold, float64[h, w], 0 to 1.
@@ -310,11 +311,11 @@ def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
 
 
 def fold_heights(folds: Floats, strength: Floats) -> Floats:
-    """The relief of all folds of a set, float64[h, w], decimetres, 0 without folds.
+    """float64[h, w]: the relief of all folds of a texture set, in decimetres, 0 without folds.
 
     Args:
-        folds: float64[h, w, 4], sums of vertex_folds in the texture.
-        strength: float64[h, w], depth factor: 1 is a forehead at 30 years.
+        folds: float64[h, w, 4], sum of vertex_folds in the texture.
+        strength: float64[h, w], factor on the depth: 1 for a forehead at 30 years.
     """
     depth = np.clip(folds[..., 0], 0, 1)
     height = relief(folds[..., 1:], depth > 0.01)

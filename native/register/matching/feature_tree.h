@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The nearest of many points by position, normal and bending.
+// Finds the nearest of many points by position, normal and bending.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace risorius::registering::steps {
 
-/// Position, normal and bending of a point, each already multiplied by how much it counts.
+/// Position, normal and bending of a point, each multiplied by its weight.
 inline constexpr std::size_t kFeatures = 9;
 using Feature = std::array<float, kFeatures>;
 
@@ -19,17 +19,17 @@ class FeatureTree {
 
   struct Found {
     std::int32_t index = -1;  // -1: none
-    float squared = 0;        // distance
+    float squared = 0;        // squared distance
   };
-  /// The feature that is nearest, nearer than the root of `squared`.
+  /// The nearest feature whose squared distance is below `squared`.
   Found nearest(const Feature& query, float squared) const;
   std::size_t size() const { return features_.size(); }
 
  private:
   struct Branch {
     float at = 0;
-    std::uint32_t begin = 0, end = 0;  // in order_
-    std::uint32_t second = 0;          // 0: a leaf; the first branch follows
+    std::uint32_t begin = 0, end = 0;  // range in order_
+    std::uint32_t second = 0;          // second child, 0: a leaf; the first child is next in order
     std::uint8_t axis = 0;
   };
   std::uint32_t grow(std::uint32_t begin, std::uint32_t end);

@@ -13,15 +13,15 @@ namespace risorius::registering::steps {
 
 namespace {
 
-constexpr double kLeastRobust = 1.0;  // mm
-constexpr double kOutside = 2.5;      // times the median distance
+constexpr double kLeastRobust = 1.0;  // mm: least distance at which a weight is a quarter
+constexpr double kOutside = 2.5;      // that distance, in median distances
 constexpr double kLeastCosine = 0.2;  // between normals of a match by features
-constexpr double kBackwards = 0.5;    // weight of the matches of the target
-constexpr double kInside = 0.3;       // belief in a match of a hidden vertex
+constexpr double kBackwards = 0.5;    // weight of matches from the target to the template
+constexpr double kInside = 0.3;       // largest weight of a match of a hidden vertex
 constexpr double kInsideReach = 2.0;  // mm
 constexpr double kInsideCosine = 0.8;
-constexpr double kRimReach = 25.0;  // mm to a border of the target
-constexpr std::size_t kEach = 3;    // of so many samples one looks for its vertex
+constexpr double kRimReach = 25.0;  // mm, largest distance to a border of the target
+constexpr std::size_t kEach = 3;    // every third sample searches for its vertex
 
 Feature feature(const Vec3& point, const Vec3& normal, const Bend& bend, const Counting& counting) {
   Feature out{};
@@ -127,7 +127,7 @@ void Matcher::add_backwards(const Points& points, const Points& normals, const C
         }
       },
       8);
-  // Sums first: a vertex may be found by many samples.
+  // Averages, because several samples may find the same vertex.
   Points to(points.size(), Vec3::Zero()), looking = to;
   std::vector<double> weight(points.size(), 0.0);
   for (std::size_t i = 0; i < count; ++i) {

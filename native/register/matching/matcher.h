@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which point of the target a vertex of the template goes to, and how far that is believed.
+// Finds matches: for each vertex of the template a point of the target and a weight.
 #pragma once
 
 #include <memory>
@@ -11,53 +11,53 @@
 
 namespace risorius::registering::steps {
 
-/// The target, in millimetres, as matches need it.
+/// The target with samples and borders, in millimetres.
 struct Target {
   Form form;
-  std::vector<std::uint8_t> borders;  // as border_edges has them
+  std::vector<std::uint8_t> borders;  // the result of border_edges
   Samples samples;
 };
 
-/// The template's surface as it began, with what does not change while it moves.
+/// Properties of the template at its start, which stay constant while its vertices move.
 struct Looks {
   std::vector<Bend> bends;           // [V]
   std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
-  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may have too
+  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may also have
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
   std::vector<RimEdge> rim;          // the edges of that border
 };
 
-/// How features count: millimetres that a difference of 1 is worth.
+/// Weights of a search by features.
 struct Counting {
-  double normal = 10.0;
-  double bend = 40.0;
-  double farthest = 40.0;  // mm
-  double along = 0.5;      // how much a match holds along the surface, beside across it
-  bool backwards = true;   // also from the target to the template
+  double normal = 10.0;    // mm that a difference of 1 of the normals counts
+  double bend = 40.0;      // mm that a difference of 1 of the bends counts
+  double farthest = 40.0;  // mm, largest distance in the space of features
+  double along = 0.5;      // weight of a match along the surface, against 1 across it
+  bool backwards = true;   // also search from the target's samples to the template
 };
 
 class Matcher {
  public:
-  /// Both are kept, not copied.
+  /// Keeps references to target and looks.
   Matcher(const Target& target, const Looks& looks, std::size_t threads);
 
-  /// [V] by position, normal and bending, among samples of the target.
+  /// [V] matches with samples of the target, nearest by position, normal and bending.
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The closest point of the target's triangles that look the same way.
+  /// The closest point of the target's triangles with a similar normal.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();
     Vec3 point = Vec3::Zero();
-    Vec3 normal = Vec3::Zero();  // of the target there, smooth
+    Vec3 normal = Vec3::Zero();  // interpolated normal of the target, length 1
     double distance = 0.0;
-    bool beyond_border = false;  // the template ends elsewhere than the target
+    bool beyond_border = false;  // the vertex lies beside the target's border, not above it
   };
   std::vector<Closest> closest(const Points& points, const Points& normals, double farthest,
                                double least_cosine) const;
-  /// Whether a vertex in a cavity lies on a surface so near and so parallel that it is the same.
+  /// Whether a vertex in a cavity is within 2 mm of the target, with a cosine of normals above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
-  /// [V] by closest points. In: robust  mm, a distance at which a match counts a quarter
+  /// [V] matches with closest points. In: robust  mm, distance at which the weight is a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

@@ -11,10 +11,10 @@ namespace risorius::registering::steps {
 namespace {
 
 constexpr double kStep = 1.5;        // mm between places of a border
-constexpr double kTurn = 15.0;       // mm that a difference of directions of 1 counts
-constexpr double kSameWay = 0.6;     // least cosine of the ways out of both surfaces
-constexpr double kAlike = 1.6;       // times as long as the other a border may be
-constexpr double kLeastLoop = 25.0;  // mm: shorter ones are faults of a mesh
+constexpr double kTurn = 15.0;       // mm that a difference of 1 of outward directions counts
+constexpr double kSameWay = 0.6;     // least cosine between the outward directions
+constexpr double kAlike = 1.6;       // largest ratio of the lengths of both borders
+constexpr double kLeastLoop = 25.0;  // mm: shorter borders are faults of a mesh
 constexpr double kAlong = 0.1;       // weight along the border
 
 Vec3 way_out(const Vec3& a, const Vec3& b, const Vec3& normal) {
@@ -74,7 +74,7 @@ Rims::Rims(const Form& target, const std::vector<std::uint8_t>& borders) {
 void Rims::match(const std::vector<RimEdge>& edges, const Points& points, const Points& normals,
                  double farthest, std::vector<Match>& matches) const {
   if (places_.empty()) return;
-  std::map<std::uint32_t, std::pair<Vec3, double>> outward;  // of each vertex, and its loop
+  std::map<std::uint32_t, std::pair<Vec3, double>> outward;  // by vertex; with length of its loop
   for (const RimEdge& edge : edges) {
     const Vec3 way = way_out(points[edge.a], points[edge.b], normals[edge.a] + normals[edge.b]);
     for (const std::uint32_t v : {edge.a, edge.b}) {

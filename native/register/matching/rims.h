@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where surfaces end: a neck, an eye opening, a hole.
+// Matches borders of surfaces: a neck, an eye opening, a hole.
 #pragma once
 
 #include "register/matching/feature_tree.h"
@@ -7,25 +7,25 @@
 
 namespace risorius::registering::steps {
 
-/// An edge at the border of a surface. Its triangle lies to the left of the way from a to b.
+/// An edge at the border of a surface. Its triangle is to the left of the direction from a to b.
 struct RimEdge {
   std::uint32_t a = 0, b = 0;
-  double loop = 0.0;  // mm, length of all edges that hang together with it
+  double loop = 0.0;  // mm, total length of the edges that are connected with it
 };
 
-/// In: borders  as border_edges has them
+/// In: borders  the result of border_edges
 std::vector<RimEdge> rim_edges(const Form& form, const std::vector<std::uint8_t>& borders);
 
-/// The borders of a target, which those of a template find.
+/// The borders of a target, for matches with borders of a template.
 class Rims {
  public:
   explicit Rims(const Form& target, const std::vector<std::uint8_t>& borders);
 
-  /// Lays vertices of the template's borders onto borders of the target that are about as long and
-  /// end in the same direction; along the border a vertex is nearly free.
-  /// In: points, normals  [V] of the template as it lies now
+  /// Matches border vertices of the template with borders of the target that have a similar length
+  /// and outward direction. Such a match has little weight along the border.
+  /// In: points, normals  [V] current vertices of the template
   ///     farthest         mm
-  ///     matches          [V] those of border vertices that find something are replaced
+  ///     matches          [V] replaced for border vertices with a match
   void match(const std::vector<RimEdge>& edges, const Points& points, const Points& normals,
              double farthest, std::vector<Match>& matches) const;
 

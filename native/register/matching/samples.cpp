@@ -12,7 +12,7 @@ namespace risorius::registering::steps {
 
 namespace {
 
-/// Samples by the cube of space that they lie in.
+/// Samples sorted into the cubes of a grid.
 class Grid {
  public:
   Grid(const Points& points, double side) : side_(side) {
@@ -33,7 +33,7 @@ class Grid {
     for (std::uint32_t i = 0; i < points.size(); ++i) order_[next[cube(points[i])]++] = i;
   }
 
-  /// Calls visit(index) for what may lie within a radius.
+  /// Calls visit(index) for all samples that may be within a radius, and for some beyond it.
   template <class Visit>
   void around(const Vec3& p, double radius, const Visit& visit) const {
     if (order_.empty()) return;

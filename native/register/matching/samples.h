@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Points spread evenly over a surface, and how it bends around points.
+// Samples points evenly over a surface, and measures its bending around points.
 #pragma once
 
 #include <array>
@@ -8,8 +8,8 @@
 
 namespace risorius::registering::steps {
 
-/// How far the middle of the surface within each of kRadii lies above a point, along its normal and
-/// in shares of the radius: below 0 on a ridge, above 0 in a groove.
+/// Height of the mean of the surface within each of kRadii above a point, along the point's normal,
+/// divided by the radius: below 0 on a ridge, above 0 in a groove.
 using Bend = std::array<double, 3>;
 inline constexpr std::array<double, 3> kRadii{6.0, 12.0, 24.0};  // mm
 
@@ -20,13 +20,13 @@ struct Samples {
   double spacing = 1.0;
 };
 
-/// Normals of vertices, by the angles of their triangles; 0 where there is none.
+/// Unit normals of vertices, weighted by the angles of their triangles; 0 without triangles.
 Points vertex_normals(const Points& points, const std::vector<Triangle>& triangles);
 /// [T] bit k: the edge from corner k to the next belongs to no other triangle.
 std::vector<std::uint8_t> border_edges(const std::vector<Triangle>& triangles);
-/// About `count` points, without bends.
+/// About `count` evenly spread points; their bends are left empty.
 Samples sample(const Form& form, const std::vector<std::uint8_t>& borders, std::size_t count);
-/// In: normals  of `points`, length 1
+/// The bending of the surface `around` at points. In: normals  of `points`, length 1
 std::vector<Bend> bends(const Points& points, const Points& normals, const Samples& around,
                         std::size_t threads);
 

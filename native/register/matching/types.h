@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the steps of a registration share.
+// Types that the steps of a registration share.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,18 +13,18 @@ namespace risorius::registering::steps {
 using Vec3 = Eigen::Vector3d;
 using Points = std::vector<Vec3>;
 
-/// A surface of triangles with the normals of its vertices, of length 1 (0: of no triangle).
+/// A surface of triangles with unit vertex normals (0 for a vertex without triangles).
 struct Form {
   Points points, normals;
   std::vector<Triangle> triangles;
 };
 
-/// Where a vertex is to go. weight 0: nothing is known.
+/// The goal of a vertex. weight 0: the vertex has no goal.
 struct Match {
   Vec3 point = Vec3::Zero();
-  Vec3 normal = Vec3::Zero();  // of the target there, length 1
-  double weight = 0.0;         // along the normal
-  double along = 1.0;          // weight in the plane of the target, in shares of `weight`
+  Vec3 normal = Vec3::Zero();  // of the target at the point, length 1
+  double weight = 0.0;         // in the direction of the normal
+  double along = 1.0;          // weight across the normal, in shares of `weight`
 
   /// weight (n n' + along (1 - n n')) x
   Vec3 pulled(const Vec3& x) const {

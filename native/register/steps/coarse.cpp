@@ -15,16 +15,16 @@ using Sparse = Eigen::SparseMatrix<double>;
 using Row4 = Eigen::Vector4d;
 using Block = Eigen::Matrix4d;
 
-constexpr double kBound = 0.1;    // how far the affine parts of neighbours are bound to each other
-constexpr double kAtRest = 1e-4;  // holds what nothing else holds
-constexpr int kConjugate = 25;    // rounds at most
+constexpr double kBound = 0.1;    // stiffness between the affine parts of neighbours
+constexpr double kAtRest = 1e-4;  // weight of a node's current motion, for nodes without matches
+constexpr int kConjugate = 25;    // largest number of rounds
 
-/// A match that lets its vertex go along the surface.
+/// A match with a smaller weight along the surface.
 struct Drawn {
   std::uint32_t node;
   Row4 row;
   Vec3 normal;
-  double free;  // weight that it does not have along the surface
+  double free;  // weight across the surface minus weight along it
 };
 
 }  // namespace
@@ -34,10 +34,10 @@ struct Coarse::Impl {
 
   const Nodes& nodes;
   const Points& rest;
-  Eigen::MatrixX3d motion;  // [4 N] of each node its position, then its affine part transposed
+  Eigen::MatrixX3d motion;  // [4 N] for each node: position, then transposed affine part
   std::vector<std::size_t> in_cell;
   std::vector<double> stiff;  // [edges]
-  Sparse matrix;              // lower triangle, as if every match held in all directions alike
+  Sparse matrix;              // lower triangle, with equal match weights in all directions
   Eigen::SimplicialLLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> solver;
   bool analyzed = false;
 
@@ -46,10 +46,10 @@ struct Coarse::Impl {
     const Vec3 away = p - at(node);
     return {1.0, away[0], away[1], away[2]};
   }
-  /// The upper left block of every node, and what is between two.
+  /// Adds the stiffness to the diagonal block of every node and to the blocks of node pairs.
   void add_stiffness(double stiffness, std::vector<Block>& own,
                      std::vector<Eigen::Triplet<double>>& between) const;
-  /// Holds nodes that nothing else holds where they are.
+  /// Adds a small weight for the current motion, so that nodes without matches are determined.
   void hold(std::vector<Block>& own, Eigen::MatrixX3d& right) const;
   bool factorize(const std::vector<Block>& own, std::vector<Eigen::Triplet<double>>& entries);
 };
@@ -82,7 +82,7 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
   for (std::size_t e = 0; e < nodes.edges.size(); ++e) {
     const std::uint32_t a = nodes.edges[e][0], b = nodes.edges[e][1];
     const double weight = stiffness * stiff[e];
-    // What each of both says about the position of the other.
+    // Each node predicts the position of the other one.
     const Row4 here = row(a, at(b)), there = row(b, at(a)), place(1, 0, 0, 0);
     Block cross = -weight * (here * place.transpose() + place * there.transpose());
     own[a] += weight * (here * here.transpose() + place * place.transpose());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The first steps: nodes with affine motions that change smoothly along the surface.
+// The coarse steps: affine motions of nodes that change smoothly along the surface.
 #pragma once
 
 #include <memory>
@@ -10,18 +10,18 @@ namespace risorius::registering::steps {
 
 class Coarse {
  public:
-  /// Both are kept, not copied. In: rest  where the vertices begin, in millimetres
+  /// Keeps references to both. In: rest  [V] positions at the beginning, in millimetres
   Coarse(const Nodes& nodes, const Points& rest);
   ~Coarse();
 
   struct Pull {
-    double stiffness = 1.0;  // of the nodes, beside what vertices of a cell pull together
-    double landmarks = 1.0;  // of a pair, beside the same
+    double stiffness = 1.0;  // of the nodes, against the sum of the matches of a cell
+    double landmarks = 1.0;  // weight of a pair, against the same sum
   };
-  /// Finds the motions that bring vertices near their matches. False: the system has no solution.
+  /// Solves for motions that bring vertices near their matches. False: there is no solution.
   /// In: matches  [V]
   bool solve(const std::vector<Match>& matches, const std::vector<Landmark>& landmarks, Pull pull);
-  /// [V] where the motions bring the vertices.
+  /// [V] positions of the vertices after the motions.
   Points moved() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Conjugate gradients for systems that are near one whose factors are known.
+// Conjugate gradients, preconditioned by the known factors of a similar system.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,14 +8,14 @@ namespace risorius::registering::steps {
 
 /// Solves apply(x) = right. Both matrices are symmetric positive definite.
 /// In: apply    the product of the matrix and x
-///     nearly   what solves the near system: the preconditioner
+///     nearly   the preconditioner: solves a similar system
 ///     x        a guess; becomes the solution
-///     rounds   at most
+///     rounds   largest number of rounds
 /// Source: Hestenes and Stiefel, "Methods of Conjugate Gradients for Solving Linear Systems" (1952)
 template <class Apply, class Nearly>
 void conjugate(const Apply& apply, const Nearly& nearly, const Eigen::MatrixX3d& right,
                Eigen::MatrixX3d& x, int rounds) {
-  constexpr double kEnough = 1e-6;  // of the squared residual in the near system's measure
+  constexpr double kEnough = 1e-6;  // of the first squared residual in the preconditioner's norm
   Eigen::MatrixX3d rest = right - apply(x), near = nearly(rest), way = near;
   double left = rest.cwiseProduct(near).sum();
   const double first = left;

@@ -12,11 +12,11 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kStretch = 0.02;  // of the stiffness: how far motions of neighbours may differ
-constexpr int kSlides = 12;        // rounds of conjugate gradients at most
-constexpr double kHold = 1e-6;     // holds what nothing else holds
+constexpr double kStretch = 0.02;  // of the stiffness: weight of differences between neighbours
+constexpr int kSlides = 12;        // largest number of rounds of conjugate gradients
+constexpr double kHold = 1e-6;     // weight of motion 0, for vertices without matches
 
-/// Rows that tell how far a value differs from that of its neighbours, nearer ones first.
+/// Rows of the difference between a value and the mean of its neighbours, weighted by 1 / distance.
 Sparse differences(const Graph& graph, const Points& base) {
   std::vector<Eigen::Triplet<double>> entries;
   for (std::uint32_t v = 0; v < graph.size(); ++v) {
@@ -39,7 +39,7 @@ Sparse differences(const Graph& graph, const Points& base) {
   return out;
 }
 
-/// The sum of squared differences over edges.
+/// [V, V] rows: the sum of the differences between a value and each of its neighbours' values.
 Sparse stretches(const Graph& graph) {
   std::vector<Eigen::Triplet<double>> entries;
   for (std::uint32_t v = 0; v < graph.size(); ++v) {
@@ -64,8 +64,8 @@ struct Fine::Impl {
 
   const Points& base;
   Points points;
-  Eigen::MatrixX3d moved;  // from the base
-  Sparse smooth;           // of one unit of stiffness, lower triangle
+  Eigen::MatrixX3d moved;  // displacements from the base
+  Sparse smooth;           // matrix of stiffness 1, lower triangle
   Eigen::SimplicialLLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> solver;
   bool analyzed = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The last steps: every vertex moves by itself, and neighbours nearly alike.
+// The fine steps: each vertex has a motion of its own, similar to its neighbours' motions.
 #pragma once
 
 #include <memory>
@@ -10,12 +10,12 @@ namespace risorius::registering::steps {
 
 class Fine {
  public:
-  /// In: base  where the coarse steps brought the vertices: kept, not copied
+  /// In: base  [V] result of the coarse steps; the reference is kept
   Fine(const Graph& graph, const Points& base);
   ~Fine();
 
   /// Moves the vertices near their matches. False: the system has no solution.
-  /// In: stiffness  of how motions of neighbours bend, beside a match of weight 1
+  /// In: stiffness  weight of the bending of the motions, against a match of weight 1
   bool solve(const std::vector<Match>& matches, double stiffness);
   const Points& points() const;
 

@@ -12,12 +12,12 @@ namespace risorius::registering::steps {
 namespace {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
-constexpr double kReach = 2.2;  // of a node's carriers, in spacings of nodes
+constexpr double kReach = 2.2;  // radius in which a node moves vertices, in spacings of nodes
 
 using Open = std::pair<double, std::uint32_t>;
 using Queue = std::priority_queue<Open, std::vector<Open>, std::greater<>>;
 
-/// Lengths of edges of which dense parts of a surface have more than their share.
+/// Lengths of edges that are increased in dense regions, so that these get more nodes.
 class Metric {
  public:
   Metric(const Graph& graph, const Points& points) : points_(points) {
@@ -40,7 +40,7 @@ class Metric {
   double mean_ = 1.0;
 };
 
-/// Lowers `distance` around a vertex that becomes a node.
+/// Makes vertex `from` a node: updates `distance` and `cell` of the vertices nearest to it.
 void grow(const Graph& graph, const Metric& metric, std::uint32_t from, std::uint32_t node,
           std::vector<double>& distance, std::vector<std::uint32_t>& cell) {
   Queue open;
@@ -72,7 +72,7 @@ std::vector<std::array<std::uint32_t, 2>> touching(const Graph& graph,
   return {found.begin(), found.end()};
 }
 
-/// Shares that fall off smoothly with the distance along the surface.
+/// Sets carriers with weights that fall off smoothly with the distance along the surface.
 void carry(const Graph& graph, const Metric& metric, double reach, Nodes& nodes) {
   nodes.carriers.assign(graph.size(), {});
   std::vector<double> distance(graph.size(), kFar);
@@ -140,7 +140,7 @@ Nodes spread(const Graph& graph, const Points& points, std::size_t count) {
   Nodes nodes;
   nodes.cell.assign(vertices, 0);
   std::vector<double> distance(vertices, kFar);
-  // The farthest vertex is the next node. The heap holds old distances, which only decrease.
+  // The farthest vertex is the next node. Outdated distances in the heap are too large.
   std::priority_queue<Open> farthest;
   for (std::uint32_t v = 0; v < vertices; ++v) farthest.emplace(kFar, v);
   double spacing = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The vertices of a template as a graph, and few nodes of it that stand for all.
+// The vertices of a template as a graph, and nodes of the graph that carry its vertices.
 #pragma once
 
 #include <span>
@@ -23,16 +23,16 @@ class Graph {
   std::vector<std::uint32_t> next_;
 };
 
-/// Nodes spread over a surface, denser where its vertices are denser.
+/// Nodes spread over a surface, denser in regions with dense vertices.
 struct Nodes {
-  std::vector<std::uint32_t> vertices;  // [N]
-  std::vector<std::uint32_t> cell;      // [V] the node that is nearest along the surface
+  std::vector<std::uint32_t> vertices;              // [N]
+  std::vector<std::uint32_t> cell;                  // [V] the nearest node along the surface
   std::vector<std::array<std::uint32_t, 2>> edges;  // nodes whose cells touch
-  /// [V] nodes that carry a vertex, with shares of sum 1
+  /// [V] nodes that move a vertex, with weights of sum 1
   std::vector<std::vector<std::pair<std::uint32_t, float>>> carriers;
 };
 
-/// In: count  of nodes; every piece of the surface gets one at least
+/// In: count  number of nodes; each connected piece of the surface gets at least one
 Nodes spread(const Graph& graph, const Points& points, std::size_t count);
 
 }  // namespace risorius::registering::steps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A head whose sides follow each other.
+// Symmetry: matches of one side of a head are added to the other side.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,10 @@
 
 namespace risorius::registering::steps {
 
-/// Adds to each match that of the vertex of the other side, seen in the plane between both sides as
-/// they lie now.
-/// In: mirrored  [V] the vertex of the other side
-///     share     of the weight that the other side's match has; 1: as much as the own
-///     missing   only vertices that have no match of their own get one
+/// Adds to each match the match of its mirror vertex, reflected in the current symmetry plane.
+/// In: mirrored  [V] the mirror vertex
+///     share     factor of the weight of the reflected match
+///     missing   true: only vertices without a match get a reflected one
 void add_mirrored(const std::vector<std::uint32_t>& mirrored, const Points& points, double share,
                   bool missing, std::vector<Match>& matches);
 

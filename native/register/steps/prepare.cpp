@@ -16,12 +16,12 @@ using core::fail;
 
 namespace {
 
-constexpr double kAround = 60.0;                    // mm around the start that count of the target
-constexpr std::size_t kSamples = 40000;             // of the target
-constexpr double kCloser = 1.2;                     // mm between samples at least
-constexpr double kLeastSize = 10, kMostSize = 1e5;  // mm, of templates
-constexpr int kRays = 16;                           // that tell whether a vertex is hidden
-constexpr double kHidden = 0.12, kShown = 0.3;      // shares of rays that meet nothing
+constexpr double kAround = 60.0;                    // mm around the start: used part of the target
+constexpr std::size_t kSamples = 40000;             // largest number of samples of the target
+constexpr double kCloser = 1.2;                     // mm, least spacing of samples
+constexpr double kLeastSize = 10, kMostSize = 1e5;  // mm, RMS radius of a template
+constexpr int kRays = 16;                           // per vertex, to find out if it is hidden
+constexpr double kHidden = 0.12, kShown = 0.3;      // shares of free rays: belief 0 and belief 1
 constexpr int kRounds = 12;                         // of robust alignment
 
 std::string place(const char* name, std::size_t i) {
@@ -107,7 +107,7 @@ core::Status check_options(const RegisterOptions& options) {
   return core::ok();
 }
 
-/// The similarity of weighted points (Umeyama 1991).
+/// The least-squares similarity between weighted points (Umeyama 1991). False: points on a line.
 bool similarity(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
                 const std::vector<double>& weights, Eigen::Matrix3d& turn, Vec3& shift) {
   Vec3 middle = Vec3::Zero(), there = Vec3::Zero();
@@ -136,7 +136,7 @@ bool similarity(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
 
 Vec3 vec(const Vector3& p) { return {p[0], p[1], p[2]}; }
 
-/// The triangles with one vertex alone at each position: a seam of the texture is no border.
+/// The triangles with one index per position, so that a texture seam is not a border.
 std::vector<Triangle> welded(const Mesh& mesh) {
   std::vector<std::uint32_t> order(mesh.points.size()), first(mesh.points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -152,13 +152,13 @@ std::vector<Triangle> welded(const Mesh& mesh) {
   return out;
 }
 
-/// The share of rays into the half space before a vertex that meet nothing of its own surface.
+/// The share of rays into the half space above a vertex that do not hit its own surface.
 double openness(const author::detail::Nearest& own, const Vec3& point, const Vec3& normal) {
   if (normal.squaredNorm() < 0.5) return 1.0;
   const Vec3 side = normal.unitOrthogonal(), other = normal.cross(side);
   int open = 0;
   for (int i = 0; i < kRays; ++i) {
-    // A spiral of directions, more of them along the normal.
+    // A spiral of directions, denser near the normal.
     const double share = (i + 0.5) / kRays, radius = std::sqrt(share), turn = 2.399963 * i;
     const Vec3 way =
         radius * (std::cos(turn) * side + std::sin(turn) * other) + std::sqrt(1 - share) * normal;

@@ -18,7 +18,7 @@ using steps::Points;
 
 namespace {
 
-/// Steps of the coarse part: stiffness of the nodes, weight of a pair, how features count.
+/// Settings of a coarse step: stiffness of nodes, weight of a pair, rounds, weights of features.
 struct CoarseStep {
   double stiffness, landmarks;
   int rounds;
@@ -35,7 +35,8 @@ constexpr std::array<CoarseStep, 8> kCoarse{{
     {0.1, 0.03, 4, {20, 30, 10, 0.1, true}},
 }};
 
-/// Steps of the fine part: stiffness, how far matches may lie, at which distance they count little.
+/// Settings of a fine step: stiffness; in mm the largest distance of a match and the distance of
+/// weight 1/4; weight along the surface; rounds.
 struct FineStep {
   double stiffness, farthest, robust, along;
   int rounds;
@@ -49,16 +50,16 @@ constexpr std::array<FineStep, 6> kFine{{
     {0.05, 4, 2, 0.1, 3},
 }};
 
-constexpr double kLeastCosine = 0.4;  // of the normals of a match by distance
-constexpr double kFound = 0.5;        // mm from the target at which a vertex is no longer on it
-constexpr double kNoise = 2.0;        // mm, of pairs
-constexpr double kSurest = 25.0;      // times the weight, for pairs without an error
-constexpr double kPrepared = 0.15;    // of the whole work
+constexpr double kLeastCosine = 0.4;  // between the normals of a match by distance
+constexpr double kFound = 0.5;        // mm, largest distance of a vertex that lies on the target
+constexpr double kNoise = 2.0;        // mm, error of pairs for which the steps are tuned
+constexpr double kSurest = 25.0;      // largest factor of a pair's weight, for errors near 0
+constexpr double kPrepared = 0.15;    // progress at the end of the preparation
 constexpr double kCoarsely = 0.65;
 
 core::Unexpected stopped() { return fail(ErrorCode::kInvalidArgument, "", "stopped"); }
 
-/// The work itself: everything is in millimetres.
+/// Runs the coarse and the fine steps, in millimetres.
 class Laying {
  public:
   Laying(const Mesh& templ, const steps::Target& target, const steps::Looks& looks,
@@ -139,7 +140,7 @@ core::Result<Points> Laying::fine(const Points& base) const {
 
 std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const steps::Scale& scale,
                                           double noise) {
-  // Errors of pairs count by their variance; the steps are made for those of kNoise.
+  // Weights are inversely proportional to the variance of the error, 1 at kNoise.
   const double sure = kNoise * kNoise / std::max(noise * noise, kNoise * kNoise / kSurest);
   std::vector<steps::Landmark> out;
   for (const Pair& pair : pairs) {
@@ -148,7 +149,7 @@ std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const 
   return out;
 }
 
-/// What is told of the vertices where they lie now.
+/// The result for the final positions of the vertices.
 Registered told(const Points& points, const Mesh& templ, const steps::Matcher& matcher,
                 const steps::Looks& looks, const steps::Scale& scale,
                 const std::vector<std::int32_t>& whole) {

@@ -108,16 +108,16 @@ class DirectFace {
   std::vector<float> raw_;
   std::uint32_t lod_ = 0;
   bool has_pose_ = false;
-  // Of the bones of space, one after the other: location, rotation, scale.
+  // Location, rotation and scale of the bones of `space`, three arrays one after the other.
   std::vector<float> own_;
-  // Of all bones, now and in the frame before.
+  // The same of all bones, in this frame and in the frame before.
   std::vector<float> channels_, last_channels_;
   bool has_matrices_ = false;
   std::vector<JointChain::Affine> affine_;
   std::vector<float> matrices_, last_matrices_;
   core::AlignedVector<float> rows_;
   std::vector<float> weights_;
-  // The frame in which each changed last.
+  // [bones] and [channels]: the frame in which each changed last.
   std::vector<std::uint64_t> bone_changed_, channel_changed_;
 };
 

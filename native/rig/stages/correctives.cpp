@@ -44,12 +44,11 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that may not be 0: those with two known factors that are not 0. If
-// Lists the watched correctives that may not be 0: those with two known factors that are not 0. If
-// a second evaluation has the same active controls, correctives with any resting factor are removed
-// from the list; this test takes longer than one evaluation gains by it.
-//      kept    active equals the list of the evaluation before
-//      rests   whether a control is 0
+// Lists the watched correctives that may not be 0: their watcher and their second factor are not 0.
+// If a second evaluation has the same active controls, correctives with any resting factor are
+// removed from the list; this test takes longer than one evaluation gains by it.
+// In:  kept    active equals the list of the evaluation before
+//      rests   rests(control): whether a control is 0
 // Out: work    firing
 template <class Rests>
 void list_firing(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,

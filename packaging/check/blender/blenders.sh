@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Makes real Blender programs in chroots, for packaging/check/blender/matrix.sh: trixie's Blender 4.3.2 (Python
-# 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written). Needs root
-# and debootstrap on Debian; 3 minutes each on a quiet machine, 18 on two busy cores; 1.5 GB each.
-# Not part of the default tests.
+# Makes real Blender programs in chroots for packaging/check/blender/matrix.sh: Debian trixie's Blender 4.3.2
+# (Python 3.13), and the current Blender of Debian sid (5.2.2 LTS with Python 3.14 in November 2026). Needs
+# root and debootstrap on Debian. Each takes 3 minutes on an idle machine, 18 minutes on two busy cores, and
+# 1.5 GB. Not part of the default tests.
 #
 #   ./packaging/check/blender/blenders.sh [trixie|sid|all] [PREFIX]
-#       makes PREFIX-trixie, PREFIX-sid or both and prints, one a line, the paths of programs to use
-#       as BLENDER=...; puts a wheel for each one's Python into build/dist, which the extension's
-#       zip then holds too, and PocketSphinx into build/speech. Default: trixie, /opt/risorius-blender
+#       makes PREFIX-trixie, PREFIX-sid or both, and prints the paths of the programs, one per line, to
+#       use as BLENDER=... Also puts a wheel for each Python into build/dist, so that the extension's zip
+#       contains it, and PocketSphinx into build/speech. Default: trixie, /opt/risorius-blender
 set -euo pipefail
 suites=${1:-trixie}
 prefix=${2:-/opt/risorius-blender}
@@ -33,7 +33,7 @@ make_system() { # make_system SUITE ROOT
   fi
   mountpoint -q "$2/proc" || mount -t proc proc "$2/proc"
   mountpoint -q "$2/dev" || mount --bind /dev "$2/dev"
-  # The project may lie below /tmp, so /tmp goes first.
+  # /tmp is mounted first, because the project may be below /tmp.
   for folder in /tmp "$project"; do
     mkdir -p "$2$folder"
     [ "$folder" -ef "$2$folder" ] || mount --bind "$folder" "$2$folder"
@@ -43,9 +43,9 @@ make_system() { # make_system SUITE ROOT
 install_blender() { # install_blender SUITE ROOT
   local more=
   [ -x "$2/usr/bin/blender" ] && return 0
-  # sid's Blender needs these for its extensions and asset libraries and does not say so.
+  # sid's Blender needs these packages for extensions and asset libraries, but does not depend on them.
   [ "$1" = sid ] && more="python3-cattr python3-requests"
-  # A mirror that is a dated snapshot calls itself out of date.
+  # A mirror may be a dated snapshot whose Valid-Until has passed.
   chroot "$2" sh -ec "export DEBIAN_FRONTEND=noninteractive
     apt-get -o Acquire::Check-Valid-Until=false update -qq
     apt-get install -y -qq --no-install-recommends blender python3-dev python3-numpy $more \
@@ -53,12 +53,12 @@ install_blender() { # install_blender SUITE ROOT
       ca-certificates xvfb imagemagick libgl1-mesa-dri libegl1 libegl-mesa0"
 }
 
-build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetched where pip is set up
+build_wheel_in() { # build_wheel_in ROOT: builds a wheel in the chroot; pip outside fetches the build tools
   local tools="$project/build/tools" tag
   "$python" -m pip download -q -d "$tools" scikit-build-core pybind11
   tag=$(chroot "$1" python3 -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
   rm -f "$project"/build/dist/risorius-*-"$tag"-*.whl
-  # Sources of PyPI that native/ compiles, too: the first wheel of this machine has fetched them.
+  # native/ also compiles sources from PyPI. Building a wheel outside the chroot fetches them.
   [ -e "$project/build/third_party/meshoptimizer/vertexfilter.cpp" ] || build_wheel >&2
   chroot "$1" sh -ec "
     [ -e /opt/risorius-venv/bin/pip ] || python3 -m venv /opt/risorius-venv
@@ -67,7 +67,7 @@ build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetc
       --no-build-isolation --no-deps --no-index -w build/dist ."
 }
 
-fetch_recogniser() { # fetch_recogniser ROOT: PocketSphinx for its Python, PyPI's wheel or compiled there
+fetch_recogniser() { # fetch_recogniser ROOT: gets PocketSphinx for the chroot's Python: PyPI's wheel, or a wheel compiled there
   local folder="$project/build/speech" tools="$project/build/tools" version pinned
   version=$(chroot "$1" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
   pinned=$(grep -oE 'pocketsphinx==[0-9.]+' "$project/pyproject.toml")
@@ -83,7 +83,7 @@ fetch_recogniser() { # fetch_recogniser ROOT: PocketSphinx for its Python, PyPI'
       --no-build-isolation --no-deps --no-index -w build/speech '$tools'/${pinned/==/-}.tar.gz"
 }
 
-write_launcher() { # write_launcher ROOT: a program that runs as if Blender were installed here
+write_launcher() { # write_launcher ROOT: writes blender.sh, which runs the chroot's Blender from outside
   cat > "$1/blender.sh" << END
 #!/bin/sh
 exec chroot "$1" /usr/bin/env -C "\$PWD" /usr/bin/blender "\$@"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Installs the extension into the running Blender, as its preferences would.
+"""Installs the extension into the running Blender, as Blender's preferences do.
 
 Inside bpy or `blender -b --python`:  install(zip) -> name of the enabled module.
 """
@@ -11,10 +11,13 @@ from pathlib import Path
 
 
 def install(package: str | Path) -> str:
-    """Install and enable the zip.
+    """Install and enable the extension. Returns the name of its module.
+
+    Args:
+        package: zip of the extension.
 
     Raises:
-        RuntimeError: Blender did not accept it.
+        RuntimeError: Blender did not enable the extension.
     """
     import addon_utils
     import bpy
@@ -33,5 +36,5 @@ def install(package: str | Path) -> str:
 
 
 def arguments() -> list[str]:
-    """What follows -- on the command line, in Blender and in Python alike."""
+    """The command line arguments after `--`, or all arguments if there is no `--`."""
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Runs all Blender tests in every Blender that is supported and prints the table version x test
-# file, as Markdown: the bpy modules of the oldest 4.2, the newest 4.2 LTS, 4.5 LTS and 5.0, and
-# the programs that packaging/check/blender/blenders.sh made. Each installs the same zip, EEVEE included. About
-# 4 minutes for each version. In the programs a real pointer then does what an animator does
-# (packaging/check/blender/real_window.sh). Exit code 0 only if all passed in all of them.
+# Runs all Blender tests in every supported Blender, and prints a Markdown table: a column for each version, a
+# row for each test file. The versions are the bpy modules 4.2.0, newest 4.2 LTS, 4.5 LTS and 5.0, and the
+# programs made by packaging/check/blender/blenders.sh. Each installs the same zip and also tests EEVEE. Takes
+# about 4 minutes for each version. Then real_window.sh tests the programs with a real pointer. Exit code 0
+# only if all tests passed in all versions.
 #
 #   ./packaging/check/blender/matrix.sh [PREFIX] [-- PYTEST ARGUMENTS]
 #       PREFIX as given to blenders.sh; BLENDER= names one more program, BPY= other bpy versions
@@ -25,12 +25,12 @@ logs="$project/build/logs/matrix"
 mkdir -p "$logs"
 reports=()
 
-run() { # run NAME KEY COMMAND...: the tests in one Blender, with a user folder of its own
+run() { # run NAME KEY COMMAND...: runs the tests in one Blender with a new user folder
   local name=$1 key=$2 user begin=$SECONDS
   shift 2
   rm -f "$logs/$key.xml"
   user=$(mktemp -d)
-  # Freed memory is filled, so that what reads it dies here and not only now and then.
+  # glibc overwrites freed memory, so that code that reads it crashes reliably.
   MALLOC_PERTURB_=165 BLENDER_USER_RESOURCES="$user" limited 1800 "$@" --extension "$zip" \
     --junitxml "$logs/$key.xml" "${arguments[@]}" > "$logs/$key.log" 2>&1
   local code=$?
@@ -63,7 +63,7 @@ for program in "$prefix-trixie/blender.sh" "$prefix-sid/blender.sh" ${BLENDER:-}
 done
 "$python" packaging/check/blender/matrix_table.py "${reports[@]}" | tee "$logs/table.md"
 code=${PIPESTATUS[0]}
-# A hand in the real windows: rows name, passed, failed; its pictures lie beside.
+# Tests with a real pointer in the windows. Their pictures are in $logs/window.
 if [ ${#windows[@]} -gt 0 ] && [ ${#arguments[@]} -eq 0 ]; then
   ZIP="$zip" packaging/check/blender/real_window.sh "$logs/window" "${windows[@]}" | tee "$logs/window.tsv"
   [ "${PIPESTATUS[0]}" -eq 0 ] || code=1

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The version matrix as Markdown, from pytest's reports.
+"""Prints the version matrix as Markdown, from pytest's reports.
 
     python packaging/check/blender/matrix_table.py NAME=REPORT.xml [NAME=REPORT.xml ...]
 
-A column for each Blender, a row for each test file. A cell holds how many tests passed and, where
-there are any, how many failed and how many were not run. The exit code is 1 if any test failed or
-a report is missing.
+The table has a column for each Blender and a row for each test file. A cell has the number of
+passed tests, and the numbers of failed and not run tests if they are not 0. The exit code is 1 if a
+test failed or a report is missing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from results import FAILED, NOT_RUN, PASSED  # noqa: E402
 
 
 def read(report: Path) -> dict[str, Counter[str]]:
-    """Test file -> how many tests passed, failed and were not run; empty without a report."""
+    """Test file -> counts of passed, failed and not run tests; empty if the report is missing."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for case in results.read(report):
         parts = (case.module or case.name).split(".")
@@ -32,7 +32,7 @@ def read(report: Path) -> dict[str, Counter[str]]:
 
 
 def cell(counts: Counter[str]) -> str:
-    """E.g. `18`, `17, 1 failed`, `16, 2 not run`."""
+    """The text of a cell, for example `18`, `17, 1 failed` or `16, 2 not run`."""
     if not counts:
         return "-"
     extra = [f"{counts[kind]} {kind}" for kind in (FAILED, NOT_RUN) if counts[kind]]
@@ -40,7 +40,7 @@ def cell(counts: Counter[str]) -> str:
 
 
 def table(columns: dict[str, dict[str, Counter[str]]]) -> str:
-    """The Markdown table: a row for each test file, and one for the sums."""
+    """The Markdown table: a row for each test file, and a row of sums."""
     groups = sorted({group for counts in columns.values() for group in counts})
     lines = [
         f"| tests | {' | '.join(columns)} |",

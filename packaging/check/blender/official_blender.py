@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Tries the extension in a Blender as blender.org publishes it: fetches, installs, runs tests.
+"""Tests the extension in an official Blender of blender.org: downloads, installs, runs tests.
 
     official_blender.py VERSION EXTENSIONS [--program PROGRAM] [-- PYTEST ARGUMENTS]
 
-VERSION is the number of a published Blender, such as 4.5.15. Its archive is compared with the
-SHA-256 that blender.org publishes beside it, and stays in build/blender. EXTENSIONS is a folder
-that release.sh made, or one zip. --program takes a Blender of this machine. Without PYTEST
-ARGUMENTS the tests of the front door run: install, import, controls, frames. Works on Linux,
-Windows and macOS. The exit code is pytest's.
+VERSION is a published version of Blender, such as 4.5.15. The downloaded archive must have the
+SHA-256 that blender.org publishes; it is kept in build/blender. EXTENSIONS is a folder made by
+release.sh, or a zip. --program uses an installed Blender instead. Without PYTEST ARGUMENTS, the
+basic tests run: install, controls, vertices, frames. Works on Linux, Windows and macOS. The exit
+code is pytest's.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ CPU_SECONDS = 2400
 
 
 def this_platform() -> tuple[str, str]:
-    """The platform in Blender's words, such as linux-x64, and the ending of its archives."""
+    """Blender's name of this platform, such as linux-x64, and the file ending of its archives."""
     system, ending = SYSTEMS[platform.system()]
     return f"{system}-{PROCESSORS[platform.machine().lower()]}", ending
 
 
 def address(version: str, name: str, ending: str) -> tuple[str, str]:
-    """Where an archive is published, and where the sums of that version are.
+    """The URLs of a version's archive and of the file with its SHA-256 sums.
 
     Args:
-        version: as 4.5.15.
-        name: of the platform, as linux-x64.
-        ending: of the archive, as .tar.xz.
+        version: version, for example 4.5.15.
+        name: platform, for example linux-x64.
+        ending: file ending of the archive, for example .tar.xz.
     """
     folder = f"{PUBLISHED}/Blender{'.'.join(version.split('.')[:2])}"
     return f"{folder}/blender-{version}-{name}{ending}", f"{folder}/blender-{version}.sha256"
@@ -63,8 +63,12 @@ def address(version: str, name: str, ending: str) -> tuple[str, str]:
 def expected_sum(sums: str, archive: str) -> str:
     """The SHA-256 of an archive, from lines `SUM  NAME`.
 
+    Args:
+        sums: the lines.
+        archive: file name of the archive.
+
     Raises:
-        SystemExit: no line names it.
+        SystemExit: no line contains the name.
     """
     for line in sums.splitlines():
         words = line.split()
@@ -74,7 +78,17 @@ def expected_sum(sums: str, archive: str) -> str:
 
 
 def fetch(version: str, folder: Path) -> Path:
-    """Download the archive of a version for this platform, if it is missing, and check its sum."""
+    """Download a version's archive for this platform if it is missing, and check its SHA-256.
+
+    Args:
+        version: version, for example 4.5.15.
+        folder: folder of the archive.
+
+    Returns: path of the archive.
+
+    Raises:
+        SystemExit: the SHA-256 differs; the archive is deleted.
+    """
     url, sums = address(version, *this_platform())
     archive = folder / url.rpartition("/")[2]
     with urllib.request.urlopen(sums, timeout=60) as answer:
@@ -94,10 +108,12 @@ def fetch(version: str, folder: Path) -> Path:
 
 
 def unpack(archive: Path, folder: Path) -> Path:
-    """Unpack an archive of blender.org into a folder, and return the program.
+    """Unpack an archive of blender.org into a folder, unless the folder exists.
+
+    Returns: path of the program.
 
     Raises:
-        SystemExit: the archive has no program where Blender's archives have it.
+        SystemExit: the archive contains no program at the usual place.
     """
     if not folder.exists():
         part = folder.with_name(folder.name + ".part")
@@ -120,7 +136,7 @@ def unpack(archive: Path, folder: Path) -> Path:
 
 
 def _copy_image(image: Path, folder: Path) -> None:
-    """Copy Blender.app out of a disk image of macOS."""
+    """Copy Blender.app from a macOS disk image into a folder."""
     with tempfile.TemporaryDirectory() as mounted:
         subprocess.run(
             ["hdiutil", "attach", "-quiet", "-readonly", "-mountpoint", mounted, image], check=True
@@ -132,10 +148,13 @@ def _copy_image(image: Path, folder: Path) -> None:
 
 
 def extension(place: Path) -> Path:
-    """The zip for this platform in a folder of release.sh; a zip is taken as it is.
+    """The extension's zip for this platform.
+
+    Args:
+        place: a folder made by release.sh, or a zip, which is returned.
 
     Raises:
-        SystemExit: there is none, or more than one.
+        SystemExit: the folder has no zip for this platform, or several.
     """
     if place.is_file():
         return place
@@ -150,7 +169,10 @@ def extension(place: Path) -> Path:
 
 
 def pytest_folder(build: Path) -> Path:
-    """A folder with the pinned pytest, which Blender's own Python does not have."""
+    """Install the pinned pytest below `build`, because Blender's Python lacks it.
+
+    Returns: the folder, to be added to the module path.
+    """
     pinned = (PACKAGING / "requirements.txt").read_text(encoding="utf-8").splitlines()
     wanted = [line for line in pinned if line.startswith("pytest==")]
     folder = build / "pytest-for-blender"
@@ -161,13 +183,13 @@ def pytest_folder(build: Path) -> Path:
 
 
 def run(program: Path, zip_file: Path, tests: list[str], build: Path) -> int:
-    """Run the tests in a Blender with a user folder of its own; the exit code is pytest's.
+    """Run tests in Blender with a temporary user folder. Returns pytest's exit code.
 
     Args:
-        program: of Blender.
+        program: Blender's program.
         zip_file: the extension.
         tests: arguments of pytest.
-        build: where pytest is put and the report goes.
+        build: folder of pytest and of the report.
     """
     command = [str(program), "-b", "--factory-startup", "-noaudio", "--python-exit-code", "1"]
     command += ["--python", "blender_tests/run.py", "--", "--extension", str(zip_file.resolve())]
@@ -180,7 +202,7 @@ def run(program: Path, zip_file: Path, tests: list[str], build: Path) -> int:
 
 
 def main() -> int:
-    """Fetch, unpack, test."""
+    """Download and unpack Blender if no program is given, and run the tests."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("version", metavar="VERSION")
     parser.add_argument("extensions", type=Path, metavar="EXTENSIONS")

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# official_blender.sh: official_blender.py, after the libraries that Blender's program needs on a bare Debian.
-# On other systems Blender brings what it needs; a Python 3.11 or newer must be there.
+# official_blender.sh: installs the libraries that Blender needs on Debian, and runs official_blender.py. Other
+# systems need no libraries, because Blender contains them. Needs Python 3.11 or newer.
 #
 #   official_blender.sh VERSION EXTENSIONS [--program PROGRAM] [-- PYTEST ARGUMENTS]
 set -euo pipefail

@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# real_window.sh: an animator's hand in the real window. Starts real Blender programs under Xvfb with the
-# installed extension and moves a real pointer: the empty tab, sliders, layers, See Why, the import
-# dialog; looks at the pixels whether the face followed, and takes pictures below OUT. Prints rows
-# `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed. Where Xvfb, xdotool,
-# ImageMagick or a program is missing a line `say<TAB>NOT RUN: ...` says so. Minutes for each program on
-# two cores: it waits for states, not for seconds.
+# real_window.sh: tests the user interface with a real pointer. Starts Blender programs under Xvfb with the
+# installed extension, and moves the pointer over the empty tab, sliders, layers, See Why and the import
+# dialog. Compares pixels to see whether the face moved, and takes pictures below OUT. Prints rows
+# `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed. If Xvfb, xdotool, ImageMagick or a
+# program is missing, prints a line `say<TAB>NOT RUN: ...`. Takes minutes for each program on two cores,
+# because it waits for states instead of fixed times.
 #
-#   ./packaging/check/blender/real_window.sh OUT BLENDER...     OUT: a folder below /tmp or the project; BLENDER: as
-#                                            packaging/check/blender/blenders.sh printed them
+#   ./packaging/check/blender/real_window.sh OUT BLENDER...     OUT: a folder below /tmp or the project; BLENDER:
+#                                            programs that packaging/check/blender/blenders.sh printed
 #       STEPS=slider,... runs some steps only; ZIP= names the extension; WINDOW_DISPLAY= another display;
-#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot,board makes them)
+#       DOCS=1 replaces the pictures of docs/images by those of the first program (STEPS=start,shot,board
+#       makes them)
 set -uo pipefail
 [ $# -ge 2 ] || { echo "real_window.sh: real_window.sh OUT BLENDER..." >&2 && exit 2; }
 source "$(dirname "$0")/../../setup.sh"
@@ -26,18 +27,19 @@ zip=${ZIP:-$(ls "$project"/build/dist/risorius-*.zip 2> /dev/null | head -n 1)}
 export DISPLAY=:${WINDOW_DISPLAY:-78}
 failed=0
 
-drive() { # drive BLENDER NAME: all steps in one program
+drive() { # drive BLENDER NAME: runs all steps in one program
   local blender=$1 out="$top/${2// /-}" user packages x
   rm -rf "$out" && mkdir -p "$out"
   user=$(mktemp -d /tmp/window.XXXXXX)
-  # A program in a chroot sees /tmp, and nothing of the project for certain.
+  # A program in a chroot sees /tmp, but may not see the project.
   cp "$zip" "$project/packaging/check/blender/window/inside.py" "$user/"
   espeak-ng -w "$user/voice.wav" "My father bought five big maps of Rome" 2> /dev/null || rm -f "$user/voice.wav"
   cd "$user" || return 1
   export BLENDER_USER_RESOURCES="$user" HOME="$user"
   limited 600 "$blender" --command extension install-file -r user_default -e "$user/$(basename "$zip")" > "$out/install.log" 2>&1 ||
     { printf 'row\t%s: the extension is installed\t0\t1\n' "$2" && return 1; }
-  # Where the extension's own button would put PocketSphinx; a Blender takes the library of its Python.
+  # The folder into which the extension's own button installs PocketSphinx. All wheels are unpacked; each
+  # Blender loads the library for its Python.
   packages=$user/extensions/.user/user_default/risorius/packages
   for x in "$project"/build/speech/pocketsphinx-*.whl; do
     [ ! -e "$x" ] || { mkdir -p "$packages" && unzip -q -o "$x" -d "$packages"; }
@@ -56,7 +58,7 @@ drive() { # drive BLENDER NAME: all steps in one program
   return "$code"
 }
 
-# Picture of OUT, that of docs/images, its width there.
+# Rows: picture of OUT, picture of docs/images, width of the latter in pixels.
 pictures="first-face first_look 1366
 board-smirk board_primary 1366
 animator-drag animator_drag 1080

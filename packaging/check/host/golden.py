@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The installed C library, called by ctypes, against the golden values of an independent evaluator.
+"""Compares the installed C library with the golden values of an independent evaluator, by ctypes.
 
-golden.py LIBRARY FOLDER: how many records of how many files agree; exit code 1 if one does not. Of
-the files without networks and solvers, whose angles may be others of the same rotation: those are
-compared in tests/python/rigs/test_rig_behavior.py, and by tests/api with the evaluator.
+golden.py LIBRARY FOLDER: prints the number of records and files that agree; exit code 1 if one
+differs. Files with networks, solvers, swings or twists are left out, because their angles may
+describe the same rotation differently. tests/python/rigs/test_rig_behavior.py and tests/api compare
+them.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import numpy as np
 
 RAW, JOINTS, SHAPES, MAPS = 0, 2, 3, 4
 BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
-LATENT = 1  # as the reference evaluates
-# Sums of up to some hundred products in another order: of the largest value of their kind.
+LATENT = 1  # option of risorius_create with which the reference evaluates
+# Relative to the largest value of a kind of output. Sums of some hundred products may differ by
+# this, because their order differs.
 TOLERANCE = 64 * np.finfo(np.float32).eps
 
 
@@ -61,7 +63,7 @@ def is_plain(path: Path) -> bool:
 
 
 def records(path: Path) -> int:
-    """How many records of an evaluation agree. Raises: AssertionError."""
+    """Compare all records of a golden file. Returns their number. Raises AssertionError."""
     about = json.loads(path.read_text())
     packed = path.with_name(path.name.removesuffix(".json") + ".bin.gz").read_bytes()
     values = np.frombuffer(gzip.decompress(packed), "<f4")
@@ -71,7 +73,7 @@ def records(path: Path) -> int:
     raw_count = about["counts"]["rawControls"]
     for case in about["cases"]:
         for lod, offset in enumerate(case["lodRecordOffsets"]):
-            # The raw controls stand first in a record, as the reference had them.
+            # A record begins with the raw controls.
             instance = library.instance(face)
             library.evaluate(instance, values[offset : offset + raw_count], lod)
             at = offset

@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""The table platform x Python x what is known, from the facts that wheels.sh left.
+"""Prints a Markdown table of the results of wheels.sh: a row for each platform and Python.
 
     facts.py FACTS.tsv... > table.md
 
-A line of facts: platform, Python, column, what; the newest of each counts. What is in no line was
-not done, and the table says so.
+A line of FACTS.tsv has platform, Python, column and text, separated by tabs. The last line of a
+cell counts. A cell without a line says NOT DONE or NOT RUN.
 """
 
 import sys
 from pathlib import Path
 
 COLUMNS = ["built", "tags and contents", "built twice", "imported", "tests"]
-PLANNED = {  # as wheels.sh makes them: what nobody tried has a row too
+PLANNED = {  # the wheels that wheels.sh makes; each has a row even without results
     "linux-x64": ("3.11", "3.13", "3.14"),
     "windows-x64": ("3.11", "3.13"),
     "windows-arm64": ("3.11", "3.13"),
     "macos-arm64": ("3.11", "3.13"),
     "macos-x64": ("3.11",),
 }
-WHY = {  # of a system that does not run here, by the column
+WHY = {  # start of a platform's name -> text of the columns "imported" and "tests" without results
     "macos": "NOT RUN: no macOS here",
     "windows-arm64": "NOT RUN: no Windows on ARM here",
 }
 
 
 def read(texts: list[str]) -> dict[tuple[str, str], dict[str, str]]:
-    """(platform, Python) -> column -> what."""
+    """(platform, Python) -> column -> text, from the contents of FACTS.tsv files."""
     known: dict[tuple[str, str], dict[str, str]] = {}
     for line in "\n".join(texts).splitlines():
         if line:

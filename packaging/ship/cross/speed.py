@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""How fast an installed wheel is beside another: one process of each in turn, and quotients of the
-least times and of the medians.
+"""Compares the speed of two installed wheels.
 
-    speed.py FACE.dna FOLDER OTHER [ROUNDS]    folders that `pip install --target` filled, for this
-                                               Python
+    speed.py FACE.dna FOLDER OTHER [ROUNDS]    FOLDER, OTHER: made by `pip install --target` for
+                                               this Python
 
-It times frames of a face with 60 changing raw controls, compiling it, and reading its file, as
-docs/measurements/evaluator.md does. A quotient above 1: FOLDER is slower than OTHER.
+Processes of both wheels run in turn. Each times loading a file, compiling the rig, and evaluating
+frames with 60 changing raw controls, like docs/measurements/evaluator.md. Prints the quotients
+FOLDER / OTHER of the shortest times and of the medians; above 1, FOLDER is slower.
 """
 
 import json
@@ -22,7 +22,7 @@ FRAMES = 1000
 
 
 def fastest(work: Callable[[], object], times: int) -> float:
-    """The least seconds of several: what disturbs only ever adds."""
+    """The shortest duration of several runs in seconds, because disturbances only add time."""
     taken = []
     for _ in range(times):
         begin = time.perf_counter()
@@ -72,7 +72,7 @@ def main() -> int:
             for name, seconds in json.loads(done.stdout).items():
                 seen.setdefault(name, ([], []))[which].append(seconds)
     for name, (ours, others) in seen.items():
-        a, b = min(ours), min(others)  # what disturbs only ever adds
+        a, b = min(ours), min(others)
         middle = statistics.median(ours) / statistics.median(others)
         both = f"{a * 1e3:9.3f} ms {b * 1e3:9.3f} ms"
         print(f"{name:<30} {both}   {a / b:5.3f}, of medians {middle:5.3f}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs an installed wheel's own checks, in whatever Python this is, and tells them in one line."""
+"""Runs the self-test of the installed wheel in this Python, and prints the result in one line."""
 
 import platform
 import sys

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A plugin of pytest for Windows: some tests are expected to fail there, each with its reason.
+"""A pytest plugin for Windows: marks tests that are expected to fail there, with the reason.
 
-RISORIUS_NOT_RUN names a .toml of tables: `tests` is a list of patterns of test names (file::name,
-with * and ?), `why` a sentence, `hangs` true where a test would not come back. In wine, a listed
-test that passes is a failure, and its line has to go. On Windows itself it may pass: some reasons
-are wine's.
+RISORIUS_NOT_RUN names a TOML file with tables. `tests` is a list of patterns of test names
+(file::name, with * and ?), `why` is the reason, and `hangs = true` prevents the test from running.
+In wine, a listed test that passes is a failure, so that outdated lines are removed. On Windows
+itself it may pass, because some reasons concern only wine.
 """
 
 import ctypes
@@ -28,7 +28,7 @@ def pytest_collection_modifyitems(items):
     for item in items:
         name = f"{Path(str(item.path)).name}::{item.name}"
         for pattern, rule in rules:
-            # Brackets of parameters are no set of letters here.
+            # Escape the brackets of test parameters, which fnmatch takes for a set of characters.
             if fnmatch(name, pattern.replace("[", "[[]")):
                 runs = not rule.get("hangs", False)
                 item.add_marker(

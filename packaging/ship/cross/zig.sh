@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-# Sourced by cross.sh and wheels.sh, after setup.sh: the compiler for other systems, of PyPI, and the
-# packages of headers that native/ needs. Sets: cross (a folder), tools, prefix.
+# Sourced after setup.sh by the scripts that compile for other systems. Installs zig from PyPI and gathers
+# the headers that native/ needs. Sets the folders cross, tools (compilers) and prefix (headers).
 
 cross="$project/build/cross"
 tools="$cross/tools"
 prefix="$cross/prefix"
 
-# pip_venv FOLDER REQUIREMENTS: a venv with exactly these
+# pip_venv FOLDER REQUIREMENTS: makes a venv with the packages of a requirements file
 pip_venv() {
   local stamp
   stamp="$1/.$(sha256sum "$2" | cut -c1-16)"
   [ -e "$stamp" ] && return 0
   python3 -m venv "$1" && "$1/bin/python" -m pip install -q -r "$2" && touch "$stamp"
 }
-# get_zig TARGET...: compilers of each target in $tools, as CMake and ccache want them: one program each
+# get_zig TARGET...: writes compilers for each target into $tools. Each is one program without arguments,
+# because CMake and ccache expect that.
 get_zig() {
   local zig name
   pip_venv "$cross/venv" "$project/packaging/ship/cross/requirements.txt" &&
@@ -31,7 +32,7 @@ get_zig() {
   export CCACHE_COMPILERTYPE=clang CCACHE_COMPILERCHECK
   CCACHE_COMPILERCHECK="string:$("$zig" version)"
 }
-# Of the machine that compiles: nothing else of it may be found.
+# Copies the headers from this machine into $prefix, so that builds find no other file of this machine.
 gather_headers() {
   mkdir -p "$prefix/include" "$prefix/lib" "$prefix/share/cmake" &&
     cp -rT /usr/include/nlohmann "$prefix/include/nlohmann" &&

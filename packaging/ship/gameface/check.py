@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""check.py FOLDER FACE.dna [TAKE.csv]: three.js in headless chromium against the file and the rig.
+"""check.py FOLDER FACE.dna [TAKE.csv]: compares three.js in chromium with the file and the rig.
 
-FOLDER has node_modules, page.html and combinations.js. Each target alone is where the file's own
-numbers say and where the rig has it; on frames of a take three.js has the sum of the file's
-numbers, and what it deviates from the rig is listed, with the combination driver and without.
+FOLDER has node_modules, page.html and combinations.js. For each single target, the vertices in
+three.js must equal the sum of the file's numbers and the rig's vertices. For frames of a take, the
+vertices must equal the sum of the file's numbers. The distance from the rig is printed with and
+without the combination driver; with it, the distance must be at most DRIVEN_MM.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ KINDS = {
     "sparse": Wishes(lod=LOD, within=0.5, sparse=True, skeleton=False),
     "packed": Wishes(lod=LOD, within=0.5, quantize=True, meshopt=True),
 }
-FITTED = "fitted"  # as packed, and its combinations know the first half of the take
+FITTED = "fitted"  # as packed, with combinations fitted to the first half of the take
 ALLOWED_MM = {
     "plain": CLIENT_MM, "sparse": CLIENT_MM, "packed": QUANTIZED_MM, FITTED: QUANTIZED_MM
 }  # fmt: skip
@@ -35,7 +36,13 @@ FRAMES = 12
 
 
 async def client(one: Browser, weights: Mapping[str, float], *, table: bool) -> dict[str, Any]:
-    """float64[V, 3] of each mesh, as three.js has it."""
+    """Mesh name -> vertex positions in three.js, float64[V, 3], metres.
+
+    Args:
+        one: the browser.
+        weights: target -> weight.
+        table: use the combination driver.
+    """
     found = await one.evaluate(f"at({json.dumps(dict(weights))}, {json.dumps(table)})")
     return places(found)
 
@@ -78,7 +85,15 @@ async def try_kind(one: Browser, folder: Path, face: Path, kind: str, take: Path
 
 
 async def try_take(one: Browser, posed: Any, take: Path, table: Any, kind: str) -> None:
-    """Frames of a take: the sum in three.js, and how far it is from the rig."""
+    """Compare frames of a take in three.js with the sum of the file's numbers and with the rig.
+
+    Args:
+        one: the browser.
+        posed: the face's poses.
+        take: the take, a Live Link Face CSV.
+        table: the combination table of the file.
+        kind: name of the file's kind, key of KINDS.
+    """
     units, raws = units_of(take), posed.raws_of(take)
     rows = []
     for frame in range(0, len(units), max(1, len(units) // FRAMES)):

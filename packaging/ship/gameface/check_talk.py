@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""check_talk.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: a face with a made-up body in TalkingHead.
+"""check_talk.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests a face with a body in TalkingHead.
 
-It plays frames of a real take as its face tracking gives them, and says a voice with the words of
-its transcript, each on a moving body; at each looked-at moment its vertices are where the file's
-numbers have them, on TalkingHead's joints and by its weights.
+TalkingHead plays frames of a real take as face tracking, and speaks a voice with its transcript,
+while the body moves. At each sampled moment, the vertices in TalkingHead must equal the positions
+computed from the file's numbers with TalkingHead's joints and weights.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FILES = {
 ALLOWED_MM = {"talk": CLIENT_MM, "talk_packed": QUANTIZED_MM}
 FRAMES = 8
 MOMENTS = 40
-# TalkingHead sets lids by the gaze, and the gaze by units of both eyes.
+# TalkingHead controls the lids and the gaze itself, so these units of a take are left out.
 OWN = ("eyeBlink", "eyeLook")
 
 
@@ -65,7 +65,15 @@ async def try_file(
 
 
 async def try_voice(one: Browser, folder: Path, found: GlbFile, kind: str, voice: Path) -> float:
-    """Millimetres from the file's numbers while it speaks."""
+    """Speak a voice. Returns the largest distance from the file's numbers in mm.
+
+    Args:
+        one: the browser.
+        folder: folder of the page; also gets a picture.
+        found: the file.
+        kind: key of FILES.
+        voice: the sound; its transcript is the file with the ending .txt.
+    """
     shutil.copy(voice, folder / "voice.wav")
     words = voice.with_suffix(".txt").read_text().split()
     mixes, heard, worst = await one.evaluate("mixes()"), set[str](), 0.0

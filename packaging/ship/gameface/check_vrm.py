@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: our VRM files in three-vrm, in chromium.
+"""check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests exported VRM files in three-vrm.
 
-Each expression alone is where the file's numbers say and where the rig has it; a real take plays
-by the 52 units, and a voice by the visemes; feelings hold back what they say; the head turns; eyes
-look where they are asked to, by the expressions.
+For each single expression, the vertices must equal the sum of the file's numbers and the rig's
+vertices. A real take plays by the 52 ARKit units, and a voice by the visemes. Also checks that
+emotions override blinks as the file says, that the head turns, and that the eyes look at a target
+by expressions.
 """
 
 from __future__ import annotations
@@ -54,12 +55,16 @@ FILES = {
 }
 ALLOWED_MM = {"new": CLIENT_MM, "packed": QUANTIZED_MM, "old": CLIENT_MM}
 FRAMES = 12
-LOOKED_AT = ((0.5, 0.2, 2.0), (-0.8, 0.1, 2.0), (0.3, -0.6, 2.0))  # metres from the eyes
+LOOKED_AT = ((0.5, 0.2, 2.0), (-0.8, 0.1, 2.0), (0.3, -0.6, 2.0))  # targets, metres from the eyes
 GAZE_DEGREES = 1.5
 
 
 class Shown:
-    """A file in three-vrm. Attributes: worst: millimetres from the file's numbers so far."""
+    """A file shown in three-vrm.
+
+    Attributes:
+        worst: largest distance in mm so far between three-vrm and the file's numbers.
+    """
 
     def __init__(self, one: Browser, found: GlbFile) -> None:
         self.one, self.found, self.worst = one, found, 0.0
@@ -75,7 +80,7 @@ class Shown:
 
 
 def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
-    """Target -> its weight, which all meshes agree on."""
+    """Target -> its weight. Asserts that all meshes have the same weights."""
     out: dict[str, float] = {}
     for weights in state["weights"].values():
         for name, weight in weights.items():
@@ -84,7 +89,7 @@ def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
 
 
 def expect(weights: Mapping[str, float], wanted: Mapping[str, float]) -> None:
-    """The targets that were asked for, and none besides."""
+    """Check that the wanted targets have their weights, clamped to 0..1, and all others have 0."""
     for name, weight in weights.items():
         asked = min(1.0, max(0.0, wanted.get(name, 0.0)))
         if abs(weight - asked) > 1e-3:
@@ -129,7 +134,7 @@ async def try_expressions(shown: Shown, folder: Path, dna: Any, rig: Any, kind: 
         on = weights_of(state)
         expect(on, {target.name: 1.0, target.needs: 1.0})
         at_rig = posed.rig_at(target.raw)
-        if kind == "old":  # three-vrm turns such a face about, to look along z
+        if kind == "old":  # three-vrm turns VRM 0.x files by 180 degrees, so that they face +z
             at_rig = {mesh: at * [-1, 1, -1] for mesh, at in at_rig.items()}
         away = apart(places(state["places"]), at_rig)
         listed(folder, f"three-vrm {kind}", target.name, away)
@@ -140,7 +145,7 @@ async def try_expressions(shown: Shown, folder: Path, dna: Any, rig: Any, kind: 
 
 
 def old_name(name: str) -> str:
-    """What three-vrm calls the expression of a target in VRM 0.x: as in 1.0 but for one."""
+    """The name of a target's expression in three-vrm for VRM 0.x. One name differs from 1.0."""
     return "Surprised" if name == "surprised" else name
 
 
@@ -170,7 +175,7 @@ async def try_clips(shown: Shown, take: Path | None, voice: Path | None) -> None
 
 
 async def try_gaze(shown: Shown, found: GlbFile) -> None:
-    """Eyes turn to a point by expressions; a feeling holds back the lids where it says it does."""
+    """Check that the eyes look at a target, and that emotions hold back blinks as the file says."""
     eyes = np.array(await shown.one.evaluate("eyes()"))
     sides = np.array([-1, 1, -1] if "VRM" in found.json["extensions"] else [1, 1, 1])
     front, worst = np.array([0.0, 0.0, 1.0]) * sides, 0.0
@@ -194,7 +199,12 @@ async def try_gaze(shown: Shown, found: GlbFile) -> None:
 
 
 def turned(rest: Any, at: Any) -> Any:
-    """float64[3, 3]: the rotation of an eye."""
+    """float64[3, 3]: the rotation that fits the posed vertices of an eye to the neutral ones.
+
+    Args:
+        rest: neutral vertices [V, 3].
+        at: posed vertices [V, 3].
+    """
     rest, at = rest - rest.mean(axis=0), at - at.mean(axis=0)
     left, _, right = np.linalg.svd(rest.T @ at)
     return (left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right).T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pages with clients in chromium, and the same face by the file's numbers alone."""
+"""Opens pages with three.js clients in chromium, and compares their vertices with the file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,13 @@ class _Quiet(http.server.SimpleHTTPRequestHandler):
 
 @contextlib.asynccontextmanager
 async def page(folder: Path, name: str, wide: int = 700, high: int = 800) -> AsyncIterator[Browser]:
-    """A page of a folder, ready; what it says of errors ends the check."""
+    """Serve a folder and open a page of it. An error of the page raises RuntimeError.
+
+    Args:
+        folder: the folder.
+        name: file name of the page.
+        wide, high: size of the window, CSS pixels.
+    """
     handler = functools.partial(_Quiet, directory=str(folder))
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -52,7 +58,7 @@ async def page(folder: Path, name: str, wide: int = 700, high: int = 800) -> Asy
 
 
 def places(found: Mapping[str, str]) -> dict[str, Any]:
-    """Mesh -> float64[V, 3], of what a page packed."""
+    """Mesh name -> positions float64[V, 3], from base64 of float32."""
     return {
         name: np.frombuffer(base64.b64decode(text), "<f4").reshape(-1, 3).astype(np.float64)
         for name, text in found.items()
@@ -60,7 +66,11 @@ def places(found: Mapping[str, str]) -> dict[str, Any]:
 
 
 def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
-    """Millimetres of the vertex that is farthest away."""
+    """The largest distance in mm between corresponding vertices.
+
+    Args:
+        a, b: mesh name -> positions [V, 3], metres.
+    """
     assert a.keys() == b.keys(), (sorted(a), sorted(b))
     return max(1000 * float(np.linalg.norm(a[n] - b[n], axis=1).max()) for n in a)
 
@@ -68,12 +78,12 @@ def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
 def from_the_file(
     found: GlbFile, state: Mapping[str, Any], mixes: Mapping[str, Mapping[str, float]]
 ) -> float:
-    """Millimetres between a client and the file at the client's weights and on its joints.
+    """The largest distance in mm between a client's vertices and those computed from the file.
 
     Args:
         found: the file.
-        state: of places.js.
-        mixes: targets that the client made itself -> those of the file that they are sums of.
+        state: the client's vertices, weights and joints, from places.js.
+        mixes: target that the client made itself -> targets of the file -> factors of their sum.
     """
     numbers = {node["name"]: i for i, node in enumerate(found.json["nodes"])}
     world = {
@@ -90,11 +100,11 @@ def from_the_file(
 
 
 def listed(folder: Path, client: str, target: str, away: float) -> None:
-    """A row of targets.tsv: client, target, millimetres from the rig at that pose alone."""
+    """Append a row to targets.tsv: client, target, distance in mm from the rig in this pose."""
     with (folder / "targets.tsv").open("a") as table:
         table.write(f"{client}\t{target}\t{away:.4f}\n")
 
 
 def say(value: object) -> str:
-    """As a page takes it."""
+    """The value as JSON, to insert it into a script."""
     return json.dumps(value)

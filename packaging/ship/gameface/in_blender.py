@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""in_blender.py MODULES FILES.vrm: our VRM files in the VRM reader of Blender (bpy-vrm-format).
+"""in_blender.py MODULES FILES.vrm: imports exported VRM files into Blender (bpy-vrm-format).
 
-MODULES is the folder that pip put that package in. Bones, expressions, licence and look-at are
-those of the file, and each shape key moves its vertices as the file's numbers say.
+MODULES is the folder into which pip installed bpy-vrm-format. Checks that Blender's bones,
+expressions, licence and look-at equal those of the file, and that each shape key moves the vertices
+by the file's numbers.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def try_file(path: Path) -> None:
 
 
 def try_new(read: Any, own: Any) -> tuple[int, int, str]:
-    """VRM 1.0: how many bones and expressions there are, and the name."""
+    """Check a VRM 1.0 file. Returns its numbers of bones and expressions, and its name."""
     bones = {
         str(name.value if hasattr(name, "value") else name): bone.node.bone_name
         for name, bone in read.humanoid.human_bones.human_bone_name_to_human_bone().items()
@@ -69,7 +70,7 @@ def try_new(read: Any, own: Any) -> tuple[int, int, str]:
 
 
 def try_old(read: Any, own: Any) -> tuple[int, int, str]:
-    """VRM 0.x: the same."""
+    """Check a VRM 0.x file. Returns its numbers of bones and expressions, and its title."""
     bones = {one.bone for one in read.humanoid.human_bones if one.node.bone_name}
     assert bones == {row["bone"] for row in own["humanoid"]["humanBones"]}, bones
     groups = read.blend_shape_master.blend_shape_groups
@@ -82,7 +83,7 @@ def try_old(read: Any, own: Any) -> tuple[int, int, str]:
 
 
 def moved(found: GlbFile, mesh: str) -> float:
-    """Millimetres that shape keys of a mesh move vertices otherwise than the file says."""
+    """The largest distance in mm between the shape keys of a mesh and the file's targets."""
     data: Any = bpy.data.objects[mesh].data
     if data.shape_keys is None:
         assert not found.names(mesh)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The parts of a release that release.sh puts together.
 
-    make.py check VERSION             whether VERSION can be made of this tree; says what is not so
+    make.py check VERSION             checks whether the tree can be released; prints the reasons if
+                                      not
     make.py notes VERSION             prints the section of CHANGELOG.md
     make.py zips OUT --wheels WHEEL... [--sample FOLDER] [--website URL]
-                                      a zip with every wheel and, by Blender's own tool, one for
-                                      each platform; prints their names
-    make.py repository OUT ZIP...     an extension repository with a page, by Blender's own tool
-    make.py sums OUT                  SHA256SUMS of all that lies there
+                                      makes a zip with all wheels and, with Blender's extension
+                                      tool, a zip for each platform; prints their paths
+    make.py repository OUT ZIP...     makes an extension repository with a page, with Blender's tool
+    make.py sums OUT                  writes SHA256SUMS of all files below OUT
 
-Equal sources give equal bytes: zips have one date, tables one order.
+Equal sources give equal bytes, because zips have a fixed date and tables a fixed order.
 """
 
 from __future__ import annotations
@@ -31,20 +32,21 @@ sys.path.insert(0, str(PROJECT / "packaging" / "ship"))
 
 import build_extension  # noqa: E402
 
-# Where the version is written. The words of the tag are not among them: git has those.
+# Files that contain the version -> the pattern that finds it.
 VERSIONS = {
     "pyproject.toml": r'^version = "([^"]+)"',
     "native/python/risorius/base/version.py": r'^__version__ = "([^"]+)"',
     "addon/risorius/blender_manifest.toml": r'^version = "([^"]+)"',
 }
-LARGEST = 24 << 20  # bytes of a zip for one platform: 3 wheels of 4 MB, the face of 8, the rest
+# Largest size of a zip for one platform, bytes: 3 wheels of 4 MB, the sample face of 8 MB and more.
+LARGEST = 24 << 20
 
 
 def troubles(version: str, project: Path = PROJECT) -> list[str]:
-    """Sentences on why this tree cannot be released as a version; none where it can.
+    """The reasons why this tree cannot be released as a version, one sentence each.
 
     Args:
-        version: as 1.2.3.
+        version: version such as 1.2.3.
         project: the folder of the clone.
     """
 
@@ -71,10 +73,10 @@ def troubles(version: str, project: Path = PROJECT) -> list[str]:
 
 
 def section(version: str, project: Path = PROJECT) -> str:
-    """What CHANGELOG.md says of a version, without its heading; empty where it says nothing.
+    """The section of CHANGELOG.md on a version without its heading; "" if there is none.
 
     Args:
-        version: as 1.2.3.
+        version: version such as 1.2.3.
         project: the folder of the clone.
     """
     text = (project / "CHANGELOG.md").read_text(encoding="utf-8")
@@ -83,7 +85,7 @@ def section(version: str, project: Path = PROJECT) -> str:
 
 
 def blender_tool() -> list[str]:
-    """The command line that Blender brings along for extensions, of the bpy that is installed."""
+    """The command that runs the extension tool of the installed bpy."""
     spec = find_spec("bpy")
     if spec is None or spec.origin is None:
         raise SystemExit("bpy is not installed: packaging/setup.sh, make_venv.")
@@ -92,7 +94,14 @@ def blender_tool() -> list[str]:
 
 
 def tool(*words: str | Path) -> None:
-    """Run Blender's tool; SystemExit with what it said where it fails."""
+    """Run Blender's extension tool.
+
+    Args:
+        words: subcommand and arguments.
+
+    Raises:
+        SystemExit: the tool fails or prints a warning; the message contains its output.
+    """
     command = [*blender_tool(), *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode or "WARN" in done.stdout + done.stderr:
@@ -100,7 +109,7 @@ def tool(*words: str | Path) -> None:
 
 
 def plain(package: Path) -> None:
-    """Write a zip again with what is in it and nothing of when and where it was made."""
+    """Rewrite a zip so that its bytes do not depend on time and machine."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         with zipfile.ZipFile(package) as archive:
@@ -109,16 +118,16 @@ def plain(package: Path) -> None:
 
 
 def make_zips(out: Path, wheels: list[Path], sample: Path | None, website: str = "") -> list[Path]:
-    """The zip with all wheels, then one for each platform.
+    """Make a zip with all wheels and a zip for each platform. Returns their paths in this order.
 
     Args:
         out: folder of the zips.
-        wheels: of ours, one for each Python and platform.
-        sample: a folder with the sample face, or None.
-        website: address of the documentation, which Blender's Online Manual leads to.
+        wheels: wheels of risorius, one for each Python and platform.
+        sample: folder with the sample face, or None.
+        website: address of the documentation, to which Blender's Online Manual links.
 
     Raises:
-        SystemExit: something does not fit together, or is larger than it may be.
+        SystemExit: versions differ, Blender's tool rejects a zip, or a zip is larger than LARGEST.
     """
     pure = [
         build_extension.people_wheel(wheels),
@@ -146,10 +155,10 @@ def make_zips(out: Path, wheels: list[Path], sample: Path | None, website: str =
 
 
 def make_repository(out: Path, packages: list[Path]) -> None:
-    """A folder that any web server can serve: zips, index.json, a page.
+    """Make an extension repository: a folder with zips, index.json and a page for a web server.
 
     Args:
-        out: the folder, emptied first.
+        out: the folder; its content is deleted first.
         packages: one zip for each platform.
     """
     shutil.rmtree(out, ignore_errors=True)
@@ -170,7 +179,7 @@ def make_repository(out: Path, packages: list[Path]) -> None:
 
 
 def make_sums(out: Path) -> None:
-    """SHA256SUMS, as `sha256sum -c` reads it, of every file below a folder."""
+    """Write SHA256SUMS of every file below a folder, in the format of `sha256sum -c`."""
     lines = []
     for path in sorted(out.rglob("*")):
         if path.is_file() and path.name != "SHA256SUMS":
@@ -180,7 +189,7 @@ def make_sums(out: Path) -> None:
 
 
 def parse() -> argparse.Namespace:
-    """What was typed."""
+    """The parsed command line arguments."""
     parser = argparse.ArgumentParser(description=__doc__)
     kinds = parser.add_subparsers(dest="kind", required=True)
     for kind in ("check", "notes"):
@@ -198,7 +207,7 @@ def parse() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Do one part; exit code 1 where the tree cannot be released."""
+    """Run one subcommand. `check` gives exit code 1 if the tree cannot be released."""
     args = parse()
     if args.kind == "check":
         found = troubles(args.version)

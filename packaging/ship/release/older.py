@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The same release under another version: what a trial updates from.
+"""Copies a release under another version number, so that a trial can update from it.
 
-older.py ZIP VERSION OUT    the extension ZIP as VERSION, into the folder OUT; prints its path
+older.py ZIP VERSION OUT    writes the extension ZIP as VERSION into the folder OUT; prints its path
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ import build_extension
 
 
 def wheel_as(wheel: Path, old: str, new: str) -> Path:
-    """Write a wheel of ours again under another version, beside it; the old one goes.
+    """Replace a wheel of risorius by a copy with another version. Returns the path of the copy.
 
     Args:
-        wheel: its path.
-        old, new: the versions.
+        wheel: path of the wheel, which is deleted.
+        old: its version.
+        new: version of the copy.
     """
     target = wheel.with_name(wheel.name.replace(f"-{old}-", f"-{new}-", 1))
     record = []
@@ -53,11 +54,11 @@ def wheel_as(wheel: Path, old: str, new: str) -> Path:
 
 
 def extension_as(package: Path, new: str, out: Path) -> Path:
-    """The extension under another version.
+    """Write the extension under another version. Returns the path of the new zip.
 
     Args:
-        package: the zip.
-        new: the version.
+        package: zip of the extension.
+        new: the new version.
         out: folder of the new zip.
     """
     with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What a release contains of others, as a CycloneDX SBOM on the standard output.
+"""Prints the SBOM of a release: third-party components and the files with their hashes.
 
-    sbom.py VERSION FOLDER    FOLDER: of the release, whose files are listed with their hashes
+    sbom.py VERSION FOLDER    FOLDER: the folder of the release
 
-Versions are read from where they are pinned or installed, never written here.
+The format is CycloneDX. Versions are read from the files that pin them or from the installed
+packages, so that this file contains none.
 """
 
 from __future__ import annotations
@@ -30,10 +31,14 @@ LICENCES = LicenseFactory()
 
 
 def pinned(name: str, file: str) -> tuple[str, str]:
-    """Version and SHA-256 (or "") of a package in a file of requirements.
+    """Version and SHA-256 of a pinned package; the hash is "" if the file has none.
+
+    Args:
+        name: name of the package.
+        file: path of the requirements file, relative to packaging/.
 
     Raises:
-        SystemExit: it is not pinned there.
+        SystemExit: the file does not pin the package.
     """
     text = (PROJECT / "packaging" / file).read_text(encoding="utf-8")
     found = re.search(rf"^{re.escape(name)}==(\S+)(?:.*--hash=sha256:(\w+))?", text, re.MULTILINE)
@@ -43,26 +48,27 @@ def pinned(name: str, file: str) -> tuple[str, str]:
 
 
 def installed(package: str) -> str:
-    """The version of a package of Debian, which the headers came from."""
+    """The version of an installed Debian package, whose headers are compiled in."""
     command = ["dpkg-query", "-W", "-f=${Version}", package]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def committed() -> datetime:
-    """When what is released was committed."""
+    """The time of the commit HEAD, in UTC."""
     command = ["git", "-C", str(PROJECT), "log", "-1", "--format=%cI"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return datetime.fromisoformat(done.stdout.strip()).astimezone(UTC)
 
 
 def component(name: str, version: str, licence: str, url: str, digest: str = "") -> Component:
-    """One component.
+    """Returns a component of the SBOM.
 
     Args:
-        name, version: of it.
-        licence: SPDX identifier.
-        url: package URL.
-        digest: SHA-256 in hexadecimal, where one is pinned.
+        name: name of the component.
+        version: version of the component.
+        licence: SPDX identifier of its licence.
+        url: its package URL.
+        digest: its SHA-256 in hexadecimal, or "".
     """
     return Component(
         name=name,
@@ -76,7 +82,7 @@ def component(name: str, version: str, licence: str, url: str, digest: str = "")
 
 
 def of_others() -> list[Component]:
-    """What is compiled in, carried along, or was made from."""
+    """Third-party components: compiled in, bundled, or the source of the sample face's data."""
     osc, osc_hash = pinned("python-osc", "ship/extension_wheels.txt")
     zig, _ = pinned("ziglang", "ship/cross/requirements.txt")
     binding, _ = pinned("pybind11", "requirements.txt")
@@ -113,7 +119,7 @@ def of_others() -> list[Component]:
 
 
 def files(folder: Path) -> list[Component]:
-    """The files of the release, with their hashes."""
+    """Wheels, zips and archives of the release, with their hashes."""
     out = []
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix in (".whl", ".zip", ".gz"):
@@ -125,12 +131,12 @@ def files(folder: Path) -> list[Component]:
 
 
 def main() -> int:
-    """Print the SBOM; exit code 1 where it does not fit CycloneDX's own schema."""
+    """Print the SBOM. Exit code 1 if it does not match the CycloneDX schema."""
     version, folder = sys.argv[1], Path(sys.argv[2])
     bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"risorius {version}"))
     ours = component("risorius", version, "MIT", f"pkg:pypi/risorius@{version}")
     bom.metadata.component = ours
-    bom.metadata.timestamp = committed()  # not now: the same sources give the same bytes
+    bom.metadata.timestamp = committed()  # so that the same sources give the same bytes
     others = of_others()
     for one in (*others, *files(folder)):
         bom.components.add(one)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a user who installs from the repository, in a Blender with a window; see trial.sh.
+"""Does what a user does who installs from the repository, in a Blender with a window; see trial.sh.
 
     blender --python trial.py -- STEP,STEP,... OUT URL
 
-Steps are generators that say how long Blender's window shall live before they go on. What they
-found is a line of JSON at the end of OUT/results.jsonl; OUT/*.png are pictures of the whole screen.
+Steps are generators. A step yields a float to let Blender's window run for that number of seconds,
+and at last a dictionary with its results. Results are appended to OUT/results.jsonl as one line of
+JSON. OUT/*.png are pictures of the whole screen.
 """
 
 import json
@@ -25,19 +26,19 @@ SLIDER = "CTRL_expressions.jawOpen"
 
 
 def shot(name):
-    """A picture of the screen, of this program's window and all that lies over it."""
+    """Take a picture of the whole screen, OUT/<name>.png."""
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
 def changed(one, other):
-    """Root mean square of what differs between two pictures of the screen, of black to white."""
+    """Root mean square difference of two pictures of the screen; 1 is black against white."""
     command = ["compare", "-metric", "RMSE", OUT / f"{one}.png", OUT / f"{other}.png", "null:"]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
     return float(done.stderr.split("(")[1].split(")")[0])
 
 
 def repository():
-    """Index of the repository of this trial, and its module."""
+    """Index and module name of the repository that this trial added to Blender."""
     for index, repo in enumerate(bpy.context.preferences.extensions.repos):
         if repo.name == NAME:
             return index, repo.module
@@ -49,7 +50,7 @@ def module():
 
 
 def window():
-    """What operators of the 3D view want to know, of the main window."""
+    """A context override for operators of the 3D view in the main window."""
     main = bpy.context.window_manager.windows[0]
     area = next(a for a in main.screen.areas if a.type == "VIEW_3D")
     region = next(r for r in area.regions if r.type == "WINDOW")
@@ -57,10 +58,10 @@ def window():
 
 
 def show_tab():
-    """The sidebar with our tab, in the view of `window`."""
+    """Open the sidebar with the Risorius tab. Call it inside the override of window()."""
     bpy.context.space_data.show_region_ui = True
     sidebar = next(r for r in bpy.context.area.regions if r.type == "UI")
-    with suppress(AttributeError, TypeError):  # before the sidebar was first drawn
+    with suppress(AttributeError, TypeError):  # raised until the sidebar is first drawn
         sidebar.active_panel_category = "Risorius"
 
 
@@ -78,7 +79,7 @@ def close_preferences():
 
 
 def said(call, **arguments):
-    """What an operator says where it refuses, else its result."""
+    """The sorted result of an operator, or the text of its error."""
     try:
         return sorted(call(**arguments))
     except RuntimeError as error:
@@ -91,7 +92,7 @@ def face():
 
 
 def chin(value):
-    """Height of the lowest vertex of the head that the jaw moves, at a value of its slider."""
+    """The evaluated vertex positions of the head, at a value of the slider jawOpen."""
     rig, bone = face()
     bone[SLIDER] = value
     rig["risorius_controls"].update_tag()
@@ -102,12 +103,12 @@ def chin(value):
 
 
 def moves():
-    """How many vertices the slider moves."""
+    """The number of the head's vertices that the slider jawOpen moves."""
     return sum(a != b for a, b in zip(chin(0.0), chin(1.0), strict=True))
 
 
 def ours():
-    """What of Risorius this process can see."""
+    """The classes, modules and enabled add-ons of Risorius in this process."""
     return {
         "classes": [n for n in dir(bpy.types) if n.startswith("RISORIUS_")],
         "modules": sorted(m for m in sys.modules if m.startswith("bl_ext.") and "risorius" in m),
@@ -120,7 +121,7 @@ def native():
 
 
 def install():
-    """Add the address, find, install, add a face, save."""
+    """Add the repository, find and install the extension, add a face, open its jaw, save."""
     bpy.context.preferences.system.use_online_access = True
     bpy.ops.preferences.extension_repo_add(name=NAME, remote_url=URL, type="REMOTE")
     index, _ = repository()
@@ -139,7 +140,7 @@ def install():
     bpy.ops.wm.save_userpref()
     close_preferences()
     yield 1.0
-    bpy.data.objects.remove(bpy.data.objects["Cube"])  # the face would be in it
+    bpy.data.objects.remove(bpy.data.objects["Cube"])  # because the cube would hide the face
     with window():
         added = said(bpy.ops.risorius.add_character)
         show_tab()
@@ -150,7 +151,7 @@ def install():
     shot("3-face")
     moved = moves()
     with window():
-        bpy.context.area.tag_redraw()  # as a slider that is dragged does
+        bpy.context.area.tag_redraw()  # dragging a slider redraws the view too
     yield 3.0
     shot("4-jaw-open")
     seen = changed("3-face", "4-jaw-open")
@@ -160,7 +161,7 @@ def install():
 
 
 def update():
-    """Open the face; update while it is open; save."""
+    """Open the saved face, update the extension while the face is open, and save."""
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "face.blend"))
     yield 2.0
     before, moved = native().addon_version(), moves()
@@ -185,7 +186,7 @@ def update():
 
 
 def after():
-    """The next start: the new version, the old face, the self-test."""
+    """After a restart: check the new version, the saved face and the self-test."""
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "face.blend"))
     yield 2.0
     found = {"version": native().addon_version(), "problem": native().problem(), "moved": moves()}
@@ -200,7 +201,7 @@ def after():
 
 
 def twice():
-    """The same add-on from a second place beside the first."""
+    """Install the same add-on a second time from a file, and uninstall it."""
     path = next((OUT / "twice").glob("*.zip"))
     found = {"install": said(
         bpy.ops.extensions.package_install_files,
@@ -223,7 +224,7 @@ def twice():
 
 
 def remove():
-    """Disable, remove, take the address away."""
+    """Disable and remove the extension, and remove the repository."""
     bpy.ops.preferences.addon_disable(module=module())
     disabled = ours()
     index, _ = repository()
@@ -237,7 +238,7 @@ def remove():
 
 
 def look():
-    """What a fresh start still sees."""
+    """After a restart: list what is left of Risorius."""
     addon_utils.modules_refresh()
     yield ours()
 
@@ -246,7 +247,10 @@ STEPS = {f.__name__: f for f in (install, update, after, twice, remove, look)}
 
 
 def run():
-    """Go on with the step, then with the next; the process ends with the last."""
+    """Continue the current step or start the next one. Ends the process after the last step.
+
+    Returns: seconds until the next call, for bpy.app.timers.
+    """
     try:
         given = next(steps[0])
     except BaseException:  # noqa: BLE001  printed, and the result says it
@@ -260,7 +264,7 @@ def run():
     steps.pop(0)
     if not steps:
         sys.stdout.flush()
-        os._exit(0)  # asks nothing about unsaved work
+        os._exit(0)  # because quitting normally would ask about unsaved changes
     return 1.0
 
 

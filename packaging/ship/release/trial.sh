@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# trial.sh: what a user does with a release, in real Blender programs with windows: adds the address of
-# the repository, finds, installs, adds a face, updates from the release before with the face open,
-# starts again, disables, removes; and faults: a file cut short, of another system or Python, a
-# repository that is gone, two of the same. A local server serves the release; nothing else is reached.
-# Screens are pictures below OUT, to be looked at. Prints rows `row<TAB>name<TAB>passed<TAB>failed`;
-# exit code 0 only if nothing failed. Needs Xvfb, xdotool and ImageMagick, the last in a chroot's own
-# system too.
+# trial.sh: tests a release as a user does, in real Blender programs with windows. It installs an older
+# release from a repository, adds a face, updates with the face open, restarts, disables and removes the
+# extension. It also tries faults: a truncated file, files for another system or Python, an unreachable
+# repository, and two installed copies. A local server serves the release; no other network is used.
+# Writes pictures of the screen below OUT for visual inspection. Prints rows
+# `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed. Needs Xvfb, xdotool and
+# ImageMagick; a chroot needs its own ImageMagick.
 #
-#   release/trial.sh RELEASE OUT BLENDER...   RELEASE: build/release/VERSION, of release.sh; BLENDER: as
-#                                             packaging/check/blender/blenders.sh printed them; OUT: below /tmp
+#   release/trial.sh RELEASE OUT BLENDER...   RELEASE: build/release/VERSION made by release.sh; OUT: a
+#                                             folder below /tmp; BLENDER: programs that
+#                                             packaging/check/blender/blenders.sh printed
 set -uo pipefail
 [ $# -ge 3 ] || { echo "trial.sh: trial.sh RELEASE OUT BLENDER..." >&2 && exit 2; }
 source "$(dirname "$0")/../../setup.sh"
@@ -19,7 +20,7 @@ top=$(realpath -m "$2")
 shift 2
 version=$(basename "$release")
 zip="$release/risorius-$version-linux-x64.zip"
-cd /tmp || exit 1 # a program in a chroot sees /tmp, and nothing of the project for certain
+cd /tmp || exit 1 # a program in a chroot sees /tmp, but may not see the project
 before=0.0.1
 export DISPLAY=:${TRIAL_DISPLAY:-77}
 port=${TRIAL_PORT:-8177}
@@ -32,7 +33,7 @@ row() { # row NAME GOOD(0 or 1)
 repository() { # repository FOLDER ZIP...
   "$python" "$here/make.py" repository "$@" || exit 1
 }
-prepare() { # the release before, a zip that is cut short, those of other machines
+prepare() { # makes the older release, a truncated zip, and the zips for other systems and Pythons
   mkdir -p "$top/before" "$out/faults" "$out/twice"
   cp "$here/trial.py" "$out/"
   "$python" "$here/older.py" "$zip" "$before" "$top/before" > /dev/null &&
@@ -48,17 +49,17 @@ prepare() { # the release before, a zip that is cut short, those of other machin
   head -c 900000 "$zip" > "$out/faults/cut-short.zip"
   cp "$zip" "$out/twice/"
 }
-in_blender() { # in_blender STEP,STEP,...: with a window, which Xvfb shows
+in_blender() { # in_blender STEP,STEP,...: runs steps of trial.py in Blender with a window in Xvfb
   BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" limited 1800 \
     "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$out/trial.py" -- \
     "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
 }
-in_blender_without_window() { # the one step that asks nothing of a window
+in_blender_without_window() { # runs a step that needs no window in Blender's background mode
   BLENDER_USER_RESOURCES="$user" HOME="$user/home" limited 900 "$blender" --background -noaudio \
     --python "$out/trial.py" -- "$1" "$out" none > "$out/$1.log" 2>&1
 }
-# command NAME ARGUMENT...: Blender's own command line; what it said and whether Risorius is there then,
-# in faults.tsv
+# command_of_blender NAME ARGUMENT...: runs Blender's command `extension`. Appends NAME, the number of
+# installed copies of Risorius and Blender's messages to faults.tsv
 command_of_blender() {
   local name=$1 said
   shift
@@ -67,7 +68,7 @@ command_of_blender() {
     sed "s|$top[^\" ]*/||g;s|$user[^\" ]*/||g" | paste -sd ' ')
   printf '%s\t%s\t%s\n' "$name" "$(ls -d "$user"/extensions/{user_default,cut,gone}/risorius 2> /dev/null | wc -l)" \
     "$said" >> "$out/faults.tsv"
-  rm -rf "$user"/extensions/{user_default,cut,gone}/risorius # the next fault begins without it
+  rm -rf "$user"/extensions/{user_default,cut,gone}/risorius # so that the next fault starts without a copy
 }
 make_faults() {
   local file url="http://127.0.0.1:$port"
@@ -80,7 +81,7 @@ make_faults() {
   command_of_blender "-" repo-add --url "http://127.0.0.1:9/index.json" gone
   command_of_blender "a repository that is gone" sync
   command_of_blender "-" repo-remove gone
-  rm -rf "$user"/extensions/{cut,gone} # Blender keeps half a download in its own cache
+  rm -rf "$user"/extensions/{cut,gone} # because Blender keeps the truncated download in its cache
 }
 left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
 
@@ -95,7 +96,7 @@ for blender; do
   prepare
   Xvfb "$DISPLAY" -screen 0 1280x800x24 > "$out/xvfb.log" 2>&1 &
   x=$!
-  # Without a window manager newer Blenders open their preferences half above the screen.
+  # Without a window manager, newer Blenders open their preferences partly above the screen.
   while sleep 1; do xdotool search --name Preferences windowmove 190 70; done > /dev/null 2>&1 &
   mover=$!
   python3 -m http.server "$port" --bind 127.0.0.1 --directory "$served" > "$out/server.log" 2>&1 &

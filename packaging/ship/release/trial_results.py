@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What a trial found, judged: a line `check<TAB>1 or 0` each.
+"""Judges the results of trial.sh. Prints a line `check<TAB>1` or `check<TAB>0` for each check.
 
-trial_results.py OUT BEFORE VERSION
+trial_results.py OUT BEFORE VERSION    OUT: folder of the results; BEFORE, VERSION: versions before
+                                       and after the update
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ Faults = dict[str, tuple[int, str]]
 def checks(
     found: dict[str, Any], faults: Faults, before: str, version: str, left: str
 ) -> Iterator[tuple[str, bool]]:
-    """(what is checked, whether it is so), whatever is missing.
+    """Yields (name of a check, whether it passed). Missing results fail a check and do not raise.
 
     Args:
-        found: result of each step by its name.
-        faults: of each fault how many copies were installed after it, and what Blender said.
-        before, version: the release that is updated, and the one that it is updated to.
-        left: files of ours that remain after all.
+        found: name of a step -> its results.
+        faults: name of a fault -> (number of installed copies after it, Blender's message).
+        before: version that is updated.
+        version: version after the update.
+        left: paths of the extension's files that remain after its removal, one per line.
     """
 
     def of(step: str, name: str) -> Any:
@@ -44,7 +46,7 @@ def checks(
     yield "self-test", of("after", "self_test") == done
     yield "faults were tried", len(faults) >= 4
     for name, (there, said) in faults.items():
-        # A file for another Python is taken and not enabled.
+        # Blender installs a file for another Python, but does not enable it.
         refused = there == 0 or "isn't compatible" in said
         yield f"refused with a sentence: {name}", refused and bool(said)
     yield "of two, one runs", (of("twice", "handlers") or 9) == 1
@@ -58,7 +60,7 @@ def checks(
 
 
 def main() -> int:
-    """Print the checks; exit code 0."""
+    """Print the checks. The exit code is 0 even if checks fail."""
     out, before, version = Path(sys.argv[1]), *sys.argv[2:4]
     file = out / "results.jsonl"
     text = file.read_text(encoding="utf-8") if file.exists() else ""

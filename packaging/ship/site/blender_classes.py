@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Every panel and operator that the add-on registers, as JSON; run with the bpy of .venv.
+"""Writes all panels and operators of the add-on as JSON. Runs with the bpy of .venv.
 
-blender_classes.py ZIP OUT.json    ZIP: the extension, installed into a throw-away user folder
+blender_classes.py ZIP OUT.json    ZIP: the extension, which is installed into a temporary folder
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from install_extension import install
 
 
 def options(rna: bpy.types.Struct) -> list[dict[str, Any]]:
-    """The properties that a user can set of an operator."""
+    """The visible properties of an operator, one dictionary for each."""
     out = []
     for one in rna.properties:
         if one.identifier == "rna_type" or one.is_hidden:
@@ -38,7 +38,7 @@ def options(rna: bpy.types.Struct) -> list[dict[str, Any]]:
 
 
 def buttons(cls: type) -> list[str]:
-    """What a panel's code names as operators, in its order."""
+    """Markdown links to the operators in a panel's source code, in order and without repeats."""
     text = inspect.getsource(cls)
     found = re.findall(r'operator\(\s*"risorius\.(\w+)"', text)
     known = [getattr(bpy.ops.risorius, name).get_rna_type() for name in dict.fromkeys(found)]
@@ -49,10 +49,10 @@ def buttons(cls: type) -> list[str]:
 
 
 def rows(module: str) -> list[dict[str, Any]]:
-    """A row for each class.
+    """A dictionary for each registered operator and panel.
 
     Args:
-        module: of the enabled add-on.
+        module: name of the enabled add-on's module.
     """
     registration = sys.modules[f"{module}.registration"]
     labels = {

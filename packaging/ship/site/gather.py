@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The pages of the site: those that are written, at their places in the project, and those of code.
+"""Gathers the pages of the site: copies written pages, and makes pages from code.
 
-gather.py PAGES CLASSES.json    PAGES: a folder, emptied first; CLASSES.json: of blender_classes.py
+gather.py PAGES CLASSES.json    PAGES: a folder whose content is deleted first; CLASSES.json: the
+                                output of blender_classes.py
 """
 
 from __future__ import annotations
@@ -23,22 +24,27 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
 def listed(nav: str) -> list[str]:
-    """Pages of the project that the navigation names, from the text of mkdocs.yml."""
+    """The pages in the navigation that exist in the project.
+
+    Args:
+        nav: text of mkdocs.yml.
+    """
     names = re.findall(r"- ([\w./-]+\.md)$", nav, re.MULTILINE)
     return [n for n in names if n != "index.md" and not n.startswith("reference/")]
 
 
 def copy_page(name: str, pages: Path) -> set[str]:
-    """Copy a page, and what it shows or links to in the project.
-
-    A link to a folder, or to a page that the site does not have, becomes plain text.
+    """Copy a page of the project to the site. A link to a folder becomes a link to its README.md.
 
     Args:
-        name: of the page, from the project's folder.
+        name: path of the page, relative to the project's folder.
         pages: the site's folder.
 
     Returns:
-        Names of files that it links to.
+        Paths of the project's files to which the page links, relative to the project's folder.
+
+    Raises:
+        SystemExit: a link leads to a folder without a README.md or to a missing file.
     """
     source, linked = PROJECT / name, set()
 
@@ -68,7 +74,7 @@ def copy_page(name: str, pages: Path) -> set[str]:
 
 
 def copy_pages(pages: Path, names: Iterable[str]) -> None:
-    """Copy pages and, again and again, what they link to."""
+    """Copy pages, and recursively all files to which they link."""
     wanted, done = set(names), set()
     while wanted - done:
         name = min(wanted - done)
@@ -81,7 +87,7 @@ def copy_pages(pages: Path, names: Iterable[str]) -> None:
 
 
 def commands() -> str:
-    """The command line, from what each command says with --help."""
+    """The page on the command line: the text of --help of each command."""
     from risorius import cli
 
     def said(*words: str) -> str:
@@ -109,11 +115,11 @@ def commands() -> str:
 
 
 def python_item(module: ModuleType, name: str) -> str:
-    """The entry of a public name: of a class or function where it is defined, of a value its value.
+    """The entry of a public name: a reference to a class or function, or the text of a value.
 
     Args:
-        module: that gives it.
-        name: of it.
+        module: the module that exports the name.
+        name: the name.
     """
     item = getattr(module, name)
     if hasattr(item, "__qualname__"):
@@ -122,7 +128,7 @@ def python_item(module: ModuleType, name: str) -> str:
 
 
 def python_api() -> str:
-    """What `import risorius` gives, and the modules that are used by name."""
+    """The page on the Python API: the names of `risorius`, then those of single modules."""
     import risorius
 
     parts = [
@@ -138,7 +144,7 @@ def python_api() -> str:
 
 
 def cpp_api() -> str:
-    """The headers of the libraries, folder by folder, with the comment that each begins with."""
+    """The page on the C++ API: the text of the headers, folder by folder."""
     parts = [
         "# C++\n\nThe headers themselves, from the ground up; what a folder is for: "
         "[native](../native/README.md).\n"
@@ -157,7 +163,7 @@ def cpp_api() -> str:
 
 
 def cell(text: str) -> str:
-    """Text of a table's cell."""
+    """Escape text for a cell of a Markdown table."""
     return text.replace("|", "\\|").replace("\n", " ")
 
 
@@ -165,7 +171,7 @@ def blender_page(row: dict[str, Any]) -> str:
     """The page of a panel or operator.
 
     Args:
-        row: of blender_classes.py.
+        row: dictionary of the panel or operator, from blender_classes.py.
     """
     lines = [f"# {row['label'] or row['id']}", ""]
     if row["description"]:
@@ -204,7 +210,7 @@ def blender_page(row: dict[str, Any]) -> str:
 def blender_pages(
     pages: Path, rows: list[dict[str, Any]]
 ) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Write the pages of panels and operators; gives (heading, (title, file) of each)."""
+    """Write the pages of panels and operators. Returns (heading, [(title, file) of each page])."""
     folder = pages / "reference" / "blender"
     folder.mkdir(parents=True)
     nav = []
@@ -226,7 +232,7 @@ def blender_pages(
 
 
 def write_nav(text: str, nav: list[tuple[str, list[tuple[str, str]]]]) -> str:
-    """mkdocs.yml with the pages of panels and operators in its navigation."""
+    """The text of mkdocs.yml, with the pages of panels and operators added to the navigation."""
     lines = ["      - reference/blender/index.md"]
     for heading, group in nav:
         lines.append(f"      - {heading}:")
@@ -236,7 +242,7 @@ def write_nav(text: str, nav: list[tuple[str, list[tuple[str, str]]]]) -> str:
 
 
 def main() -> int:
-    """Gather everything; prints how many pages there are."""
+    """Make all pages and the site's mkdocs.yml. Prints the number of pages."""
     pages, classes = Path(sys.argv[1]), Path(sys.argv[2])
     shutil.rmtree(pages, ignore_errors=True)
     pages.mkdir(parents=True)
@@ -251,7 +257,7 @@ def main() -> int:
         p.relative_to(pages).as_posix() for p in pages.rglob("*.md")
         if p.relative_to(pages).as_posix() not in text and "reference/blender" not in p.as_posix()
     )  # fmt: skip
-    if more:  # pages that others link to
+    if more:  # pages that are only linked from other pages
         text = text.rstrip("\n") + "\n" + "\n".join(f"      - {name}" for name in more) + "\n"
     text = (
         write_nav(text, nav)

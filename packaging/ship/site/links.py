@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Follows every link of the finished pages that stays on the site: the file and the place in it.
+"""Checks the internal links of the finished pages: the file and the anchor in it must exist.
 
-links.py HTML    prints what leads nowhere; exit code 1 if anything does
+links.py HTML    prints broken links; exit code 1 if there are any, or no links at all
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 
 class Page(HTMLParser):
-    """The links and the places of a page."""
+    """The links and the anchors (`places`) of a page."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -30,7 +30,7 @@ class Page(HTMLParser):
 
 
 def broken(root: Path) -> tuple[list[str], int]:
-    """Links that lead nowhere, and how many were followed.
+    """Returns sentences on the broken links, and the number of checked links.
 
     Args:
         root: folder of the site.
@@ -54,7 +54,7 @@ def broken(root: Path) -> tuple[list[str], int]:
 
 
 def main() -> int:
-    """Print what is broken."""
+    """Print the broken links."""
     bad, count = broken(Path(sys.argv[1]).resolve())
     print("\n".join([*bad, f"{count} links followed, {len(bad)} lead nowhere"]))
     return 1 if bad or not count else 0

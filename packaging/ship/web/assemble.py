@@ -10,7 +10,7 @@ sources, built = Path(sys.argv[1]), Path(sys.argv[2])
 
 
 def packed(name: str, data: bytes) -> str:
-    """An element that holds a file."""
+    """A script element that contains a file, compressed with gzip and encoded as base64."""
     text = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
     return f'<script type="application/octet-stream" id="{name}">{text}</script>'
 

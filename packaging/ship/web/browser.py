@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Debian's chromium without a window, by its DevTools protocol."""
+"""Controls Debian's chromium in headless mode through its DevTools protocol."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ SECONDS = 240
 
 
 class Browser:
-    """One page of it. Errors that the page says are in `said`."""
+    """One page of the browser. `said` contains the texts of the page's uncaught exceptions."""
 
     def __init__(self, socket: WebSocketClientConnection) -> None:
         self._socket = socket
         self._number = 0
         self.said: list[str] = []
-        self.asked: list[str] = []  # addresses that the page asked for
+        self.asked: list[str] = []  # addresses that the page requested
 
     async def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._number += 1
@@ -45,7 +45,7 @@ class Browser:
                 return dict(answer["result"])
 
     async def evaluate(self, script: str) -> Any:
-        """The value of an expression; a promise is waited for."""
+        """The value of a JavaScript expression. Waits if the value is a promise."""
         result = await self.call(
             "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True
         )
@@ -54,11 +54,19 @@ class Browser:
         return result["result"].get("value")
 
     async def open(self, page: Path, width: int, height: int, phone: bool = False) -> str:
-        """Opens a file and waits until it is ready or says an error. Returns: the page's state."""
+        """Open a file and wait until it is ready or reports an error.
+
+        Args:
+            page: path of the HTML file.
+            width, height: size of the window in CSS pixels.
+            phone: emulate a phone with a touch screen.
+
+        Returns: the page's state, body.dataset.state.
+        """
         return await self.open_address(page.resolve().as_uri(), width, height, phone)
 
     async def open_address(self, address: str, width: int, height: int, phone: bool = False) -> str:
-        """As open, of what a server gives."""
+        """Open a URL, as open() opens a file."""
         await self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,
@@ -73,7 +81,7 @@ class Browser:
         raise RuntimeError("the page never became ready")
 
     async def picture(self, file: Path) -> None:
-        # A frame that was asked for is drawn before the picture is taken.
+        # Wait until the browser has drawn the requested frame.
         await self.evaluate("new Promise(f => requestAnimationFrame(() => setTimeout(f, 300)))")
         result = await self.call("Page.captureScreenshot", format="png")
         file.write_bytes(base64.b64decode(result["data"]))

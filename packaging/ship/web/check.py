@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The page in a real browser: its numbers against the scalar path, what it says of a bad face, and
-pictures of it, wide and as on a phone, to be looked at.
+"""Checks the web page in a real browser.
 
-check.py BUILT [FACE.dna]: BUILT/page.html is the empty page, pictures go to BUILT/pictures.
-Without a face a sample person is built. Exit code 1 if a number differs or the page says an error.
+    check.py BUILT [FACE.dna]
+
+Compares the page's numbers with the scalar path of the package, checks the error message for a
+truncated face, and takes pictures of the page in desktop and phone sizes for visual inspection.
+BUILT/page.html is the empty page; the pictures are in BUILT/pictures. If no face is given, a sample
+person is built. Exit code 1 if a number differs or the page reports an error.
 """
 
 from __future__ import annotations
@@ -28,9 +31,10 @@ from risorius.web import page as pages
 ROOT = Path(__file__).resolve().parents[3]
 GOLDEN = ROOT / "tests" / "data" / "golden"
 POSES = 12
-# Of the head's size: a page holds weights in steps of 1/1024 and shapes in steps of 1/16384 of it.
+# Largest deviation as a fraction of the head's size. It is not 0, because a page rounds weights to
+# 1/1024 and shapes to 1/16384 of the head's size.
 TURNED = 2e-4
-MOST_BYTES = 4_000_000  # of the sample person's page
+MOST_BYTES = 4_000_000  # largest size of the sample person's page
 EVALUATE = """(rows => {
   const floats = [];
   for (const [lod, raw] of rows) {
@@ -46,12 +50,13 @@ EVALUATE = """(rows => {
 })(%s)"""
 
 
-# float32[positions, 4] of the first mesh, in the scene.
+# Script: the posed vertices of the first mesh in scene space, float32[positions, 4].
 PLACED = (
     "risorius.library.numbers(Float32Array, risorius.parts.get(0).skin.placed,"
     " 4 * risorius.parts.get(0).skin.count)"
 )
-# Five poses of eighty controls, as captures have: milliseconds of the middle one, by their use.
+# Script: draws five poses in which a third of the controls is active. Returns the milliseconds of
+# the median pose: [evaluation, moving the vertices, upload, drawing].
 COST = """(async () => {
   const gl = risorius.canvas.getContext("webgl2");
   const own = gl.bufferSubData.bind(gl);
@@ -89,7 +94,7 @@ def written(built: Path, name: str, page: bytes) -> Path:
 
 
 def poses(rig: risorius.Rig) -> list[tuple[int, list[float]]]:
-    """Controls by a seed, a third of them at rest, at every LOD."""
+    """(LOD, random raw controls) of POSES poses; a third of the controls is 0."""
     random = np.random.default_rng(7)
     out = []
     for turn in range(POSES):
@@ -100,13 +105,20 @@ def poses(rig: risorius.Rig) -> list[tuple[int, list[float]]]:
 
 
 async def same_numbers(one: Browser, path: Path, page: Path, places: int = 0) -> str:
-    """Compares bits.
+    """Compare the page's outputs with the scalar path of the package, bit by bit.
 
     Args:
-        places: how many floats may lie between two numbers: sines and exponentials (swing, RBF
-            solvers, networks) come from the system's library, and each has its own last bit.
+        one: the browser.
+        path: the DNA file.
+        page: the page with this face.
+        places: largest allowed difference in units of the last place. Sines and exponentials
+            (swing, RBF solvers, networks) come from the system's library, so the last bit may
+            differ.
 
-    Returns: a sentence. Raises: RuntimeError: they differ.
+    Returns: a sentence.
+
+    Raises:
+        RuntimeError: the numbers differ.
     """
     state = await one.open(page, 1440, 900)
     if state != "ready":
@@ -134,7 +146,7 @@ async def same_numbers(one: Browser, path: Path, page: Path, places: int = 0) ->
 
 
 async def says_error(one: Browser, built: Path, face: Path) -> None:
-    """A face that is cut short: the page says so, with the place."""
+    """Check that the page names the byte of the fault if its face is truncated."""
     text = pages.render(risorius.load(face), "cut").decode()
     begin = text.index('id="face">') + len('id="face">')
     end = text.index("</script>", begin)
@@ -149,16 +161,21 @@ async def says_error(one: Browser, built: Path, face: Path) -> None:
 
 
 def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
-    """float64[3, 3]: a turn by the right hand."""
+    """float64[3, 3]: rotation about a unit axis by the right-hand rule, radians."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 async def same_turned_head(one: Browser, built: Path) -> str:
-    """A clip that turns neck and head, on a face with neck poses: vertices against NumPy.
+    """Compare the vertices of a clip that turns neck and head with a NumPy implementation.
 
-    Returns: a sentence. Raises: RuntimeError: they differ.
+    The face has neck poses.
+
+    Returns: a sentence.
+
+    Raises:
+        RuntimeError: the vertices differ by TURNED or more.
     """
     sys.path.append(str(ROOT / "blender_tests"))
     faces, oracle = (importlib.import_module(f"support.{name}") for name in ("faces", "oracle"))
@@ -197,7 +214,11 @@ async def same_turned_head(one: Browser, built: Path) -> str:
 
 
 def smile(names: list[str]) -> risorius.Clip:
-    """Two seconds of a smile with an open mouth."""
+    """A clip of two seconds with a smile and an open mouth.
+
+    Args:
+        names: the face's raw controls.
+    """
     t = np.linspace(0, 2, 61)
     wave = (0.5 - 0.5 * np.cos(np.pi * t)).astype(np.float32)
     strong = {

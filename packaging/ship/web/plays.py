@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What people do with a page: they drop takes and sounds on it, touch it, and put it into pages of
-their own. No page may ask for anything from outside."""
+"""Checks how people use a page: drop takes and sounds on it, touch it, embed it in other pages.
+
+Also checks that no page requests an address outside.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ from risorius.baking.face import load_face
 from risorius.importing.tables import LIVE_LINK_FACE
 from risorius.web import page as pages
 
-_ALIKE = 2e-3  # of a control: the page mixes between frames where Python has none
+_ALIKE = 2e-3  # largest difference of a control, because the page interpolates between frames
 _OWN = ("file:", "data:", "blob:", "about:")
 DROP = """(async () => {
   const [name, text] = %s;
@@ -76,7 +78,16 @@ TOUCH = """JSON.stringify([risorius.stage.camera.position.toArray(),
 
 
 async def all_of(one: Browser, built: Path, face: Path) -> AsyncIterator[str]:
-    """A sentence of each thing that works. Raises: RuntimeError: one does not."""
+    """Run all checks. Yields a sentence for each one that passes.
+
+    Args:
+        one: the browser.
+        built: folder of the built page.
+        face: the DNA file.
+
+    Raises:
+        RuntimeError: a check fails.
+    """
     dna = risorius.load(face)
     looks = web.find_looks(dna, face)
     page = built / "pages" / "plain.html"
@@ -96,13 +107,13 @@ async def all_of(one: Browser, built: Path, face: Path) -> AsyncIterator[str]:
 
 
 async def _open(one: Browser, page: Path, width: int, height: int, phone: bool = False) -> None:
-    """Opens a page that draws coarsely: nobody looks here, and a processor draws slowly."""
+    """Open a page at a low resolution, because drawing without a GPU is slow."""
     await one.open(page, width, height, phone)
     await one.evaluate("risorius.stage.renderer.setPixelRatio(0.2), risorius.stage.resize()")
 
 
 async def _eye(one: Browser, page: Path, how: str) -> str:
-    """A white ball has few colours and nothing dark in its middle."""
+    """Check that an eye has an iris: many colours, and a dark part in the middle of the picture."""
     await one.open(page, 400 + 350, 400)
     colors, dark = await one.evaluate(EYE)
     if colors < 40 or not 0.01 < dark < 0.2:
@@ -157,7 +168,7 @@ async def _drop(one: Browser, name: str, data: bytes) -> str:
 
 
 async def _dropped(one: Browser, file: Path, clip: risorius.Clip, face: Path) -> str:
-    """The page's values of a dropped take against Python's."""
+    """Compare the controls of a take dropped on the page with the clip that Python makes of it."""
     played = await _drop(one, file.name, file.read_bytes())
     if played != "played":
         raise RuntimeError(f"{file.name}: {played}")
@@ -175,7 +186,7 @@ async def _dropped(one: Browser, file: Path, clip: risorius.Clip, face: Path) ->
 
 
 async def _touch(one: Browser, page: Path) -> str:
-    """One finger turns the face, two come nearer, a tap moves a slider: an emulated phone."""
+    """Check touch in an emulated phone: turn by one finger, zoom by two, drag a slider."""
     await _open(one, page, 390, 844, phone=True)
 
     async def strokes(*fingers: tuple[tuple[int, int], tuple[int, int]]) -> None:
@@ -215,7 +226,7 @@ async def _touch(one: Browser, page: Path) -> str:
 
 
 async def _embedded(one: Browser, built: Path, dna: risorius.Dna, looks: web.looks.Looks) -> str:
-    """Three lines on a page of somebody else's."""
+    """Check the element <risorius-face> on a page of another author."""
     script = built / "pages" / "sample.js"
     script.write_bytes(pages.render_script(dna, "sample", looks=looks))
     page = built / "pages" / "embedded.html"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A clip as a value: accepted and refused input, and values between its frames."""
+"""Clip objects: valid and refused arguments, and interpolation between frames."""
 
 from __future__ import annotations
 

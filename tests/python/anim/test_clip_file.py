@@ -10,7 +10,7 @@ from risorius import Clip, ClipError, ClipReader, ClipWriter, Event
 
 
 def make_clip(frames=1300, times=True):
-    """Any bits, NaN payloads, -0 and denormals among them; one control at rest, one repeated."""
+    """A clip of random bits with NaN payloads, -0 and denormals; one curve rests, one repeats."""
     rng = np.random.default_rng(1)
     bits = rng.integers(0, 2**32, (7, frames), np.uint64).astype(np.uint32)
     bits[3] = 0x7FC12345
@@ -210,7 +210,7 @@ def test_a_name_that_cannot_be_taken_is_said_each_time(tmp_path):
     path = tmp_path / "take.rzc"
     writer = ClipWriter(path, ["a"], 60.0)
     writer.append(np.ones((3, 1), np.float32))
-    path.mkdir()  # while it records; a folder that is there already is refused at once
+    path.mkdir()  # the folder appears while recording; an existing folder would be refused at once
     with pytest.raises(ClipError, match="Is a directory"):
         ClipWriter(path, ["a"], 60.0)
     for _ in range(2):

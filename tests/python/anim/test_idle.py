@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Idle life: the same from a seed, in range, and as fast, as often and as even as faces are."""
+"""Idle movement: equal for equal seeds, in range, with measured speeds and frequencies."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ def blinks_and_saccades(seed, length=600.0, life=None, loop=False):
 
 
 def angles(clip, side="L"):
-    """Degrees to the own left and up."""
+    """Rotation of an eye in degrees to the face's left and up."""
     look = {d: clip.curve(f"{P}eyeLook{d}{side}") for d in ("Left", "Right", "Up", "Down")}
     return (look["Left"] - look["Right"]) * 35.0, (look["Up"] - look["Down"]) * 30.0
 
 
 def test_a_seed_gives_the_same_everywhere():
-    # From one run; elsewhere a difference would be one of NumPy's bits or of the arithmetic.
+    # Recorded in one run. On another machine, a difference would come from NumPy's random bits or
+    # from arithmetic.
     clip = idle(7, 20.0)
     assert [round(e.time, 6) for e in clip.events] == EVENTS
     np.testing.assert_allclose(clip.curve(P + "browRaiseInL")[::300], BROW, atol=1e-6)
@@ -50,14 +51,14 @@ def test_is_in_range_and_of_standard_controls(seed, standard_controls):
 def test_blinks_come_as_often_and_last_as_long_as_peoples():
     everything = [blinks_and_saccades(seed)[0] for seed in range(8)]
     blinks = [b for some in everything for b in some]
-    assert 14.0 < len(blinks) / 80.0 < 22.0  # a minute
+    assert 14.0 < len(blinks) / 80.0 < 22.0  # blinks per minute
     lengths = np.array([b.close + b.hold + b.open for b in blinks])
     assert lengths.min() > 0.15
     assert lengths.max() < 0.33
     assert all(b.open > 2.2 * b.close for b in blinks)
     gaps = np.concatenate([np.diff([b.start for b in some]) for some in everything])
-    assert np.mean(gaps) > 1.15 * np.median(gaps)  # long tails: log-normal and not even
-    assert 0.02 < (gaps < 0.6).mean() < 0.25  # doubles
+    assert np.mean(gaps) > 1.15 * np.median(gaps)  # long tails, as in log-normal intervals
+    assert 0.02 < (gaps < 0.6).mean() < 0.25  # share of double blinks
     for some in everything:
         assert all(b.start >= a.end for a, b in pairwise(some))
 
@@ -78,9 +79,9 @@ def test_saccades_follow_the_main_sequence_and_come_back():
     sizes = np.array([np.hypot(*np.subtract(s.after, s.before)) for s in saccades])
     durations = np.array([s.duration for s in saccades])
     np.testing.assert_allclose(durations, 0.021 + 0.0022 * sizes, atol=1e-9)
-    speed = 1.875 * sizes / durations  # the peak of least jerk
+    speed = 1.875 * sizes / durations  # peak speed of a minimum-jerk movement
     assert speed[sizes > 10].min() > 350
-    assert speed.max() < 900  # degrees a second
+    assert speed.max() < 900  # degrees per second
     for before, after in pairwise(saccades):
         assert before.after == after.before
         assert after.start >= before.start + before.duration + 0.13
@@ -115,7 +116,7 @@ def test_movement_at_rest_is_slow_small_and_never_repeats():
         assert power[band > 4.0].sum() < 0.002 * power.sum()
         part = curve - curve.mean()
         again = np.correlate(part, part, "full")[curve.size :] / (part @ part)
-        assert again[300:].max() < 0.6  # alike after 5 s or more
+        assert again[300:].max() < 0.6  # correlation of the curve with itself after 5 s or more
     left, right = clip.curve(P + "browRaiseInL"), clip.curve(P + "browRaiseInR")
     assert 0.6 < np.corrcoef(left, right)[0, 1] < 0.999
 

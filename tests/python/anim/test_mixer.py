@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mixer against a second one in NumPy, written from the comment in clip/mixer/mixer.h."""
+"""The mixer, compared with a NumPy version written from the comment in clip/mixer/mixer.h."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ JAW, BROW_L, BROW_R, LEFT, RIGHT, SPARE = range(6)
 def noise(names=tuple(NAMES[:5]), frames=25, seed=3, **settings):
     rng = np.random.default_rng(seed)
     curves = rng.uniform(0, 0.4, (len(names), frames))
-    curves[-1] = 0.25  # one that never changes
+    curves[-1] = 0.25  # a curve that never changes
     return Clip(names, curves, 24.0, **settings)
 
 
-# -- the second implementation ---------------------------------------------------------------------
+# -- the NumPy version of the mixer
+# -----------------------------------------------------------------
 
 
 def clip_time(layer, clip, t):
-    """Clip time of a scene time within the layer's range."""
+    """The clip time at a scene time within the layer's range."""
     if layer.warp is not None:
-        assert not layer.reverse  # refused: a warp that falls is the way to play backwards
+        assert not layer.reverse  # refused: a descending warp plays backwards
         return float(np.interp(t, *layer.warp))
     first, last = layer.clip_range or (clip.frame_times()[0], clip.frame_times()[-1])
     start = first if layer.start is None else layer.start
@@ -57,7 +58,7 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The scene time that counts, or None."""
+    """The scene time at which the layer is evaluated, or None if it has no effect."""
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time
@@ -82,7 +83,7 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """Steps 1, 2 and 5."""
+    """Steps 1, 2 and 5 of the comment in mixer.h."""
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
     for layer in layers:
@@ -209,7 +210,7 @@ def test_bakes_what_it_evaluates():
 
 
 def test_a_warp_that_falls_plays_backwards():
-    """A clip whose value is its time gives the line of the warp: 0.75 - t / 2."""
+    """For a clip whose value is its time, the result is the line of the warp: 0.75 - t / 2."""
     ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
     mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
     times = np.linspace(0.25, 1.25, 11)
@@ -217,7 +218,7 @@ def test_a_warp_that_falls_plays_backwards():
     np.testing.assert_allclose(shown, 0.75 - times / 2, rtol=0, atol=1e-6)
 
 
-# Settings that a warp replaces; they would be ignored.
+# Settings that a warp replaces, and that are refused with a warp.
 BESIDE_A_WARP = (
     {"start": 0.5}, {"end": 3.0}, {"clip_range": (0.25, 0.5)}, {"scale": 2.0}, {"repeat": 2.0},
     {"reverse": True},
@@ -249,7 +250,7 @@ def test_refuses(settings, sentence):
     mixer = Mixer(NAMES, STACKS["one"])
     with pytest.raises(ValueError, match=sentence):
         mixer.layers = [replace(Layer(noise()), **settings)]
-    assert mixer.layers == tuple(STACKS["one"])  # what was there is still there
+    assert mixer.layers == tuple(STACKS["one"])  # the earlier layers are still there
 
 
 def test_refuses_what_does_not_fit():
@@ -304,7 +305,7 @@ def test_firing_again_makes_no_step_and_never_goes_beyond_one():
         mixer.fire("two", when)
     curve = mixer.evaluate_batch(times)[:, 0]
     assert curve.max() <= 1.0
-    # The steepest of x * x * (3 - 2 * x) is 1.5 / attack; sixteen may overlap.
+    # The largest slope of x * x * (3 - 2 * x) is 1.5 / attack; sixteen attacks may overlap.
     assert np.abs(np.diff(curve)).max() < 16 * 0.8 * 1.5 / 0.3 * (times[1] - times[0])
 
 
@@ -313,7 +314,7 @@ def test_no_more_than_the_limit_sound_at_once():
     assert mixer.fire("two", 0.0)
     assert mixer.fire("two", 0.1)
     assert not mixer.fire("two", 0.2)
-    assert mixer.fire("two", 0.6)  # the first has ended
+    assert mixer.fire("two", 0.6)  # the first firing has ended
     mixer.clear_fired()
     assert mixer.evaluate(0.7).tolist() == [0.0]
 
@@ -360,8 +361,10 @@ def test_yields_see_values_before_any_of_them():
 
 
 def test_the_seal_of_an_open_jaw_stills_the_lips():
-    """The lips-together controls have no effect with a shut jaw: they hide no teeth and hold no
-    jaw."""
+    """The lips-together controls have no effect with a shut jaw.
+
+    Then they neither hide teeth nor hold the jaw.
+    """
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
     names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]
     for jaw, left in ((0.8, 1 - 0.7 * 0.8), (0.0, 1.0)):
@@ -402,7 +405,7 @@ def test_files_of_rules_and_reactions(tmp_path):
 
 
 def test_every_region_has_standard_controls_and_a_title(standard_controls):
-    """The add-on stores chosen regions by their place: the order stays."""
+    """The order of the regions must stay, because the add-on stores their indices."""
     assert " ".join(REGIONS) == "brow eye nose cheek mouth jaw tongue teeth neck ear other"
     assert {region_of(name) for name in standard_controls} == set(REGIONS) - {"other"}
     assert TITLES["brow"] == "Brows"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Textures of eyes and lashes that a head gets from a template come along; its own stay its own."""
+"""Parts from a template get the template's textures; the head's own parts keep their textures."""
 
 from risorius import Dna
 from risorius.anyhead.borrowing import lend_materials
@@ -27,7 +27,7 @@ def test_what_is_the_templates_gets_the_templates_textures(tmp_path):
     for path in (tmp_path / "skin.png", tmp_path / "man_textures" / "secret.png"):
         path.write_bytes(b"skin")
     hers = Material("Hers")
-    face = _part("head", "head_lod0_mesh")  # her head, which is called so as well
+    face = _part("head", "head_lod0_mesh")  # the head's own mesh, with a name of the template
     eye, lash = _part("eyeLeft", "eyeLeft_lod0_mesh"), _part("lash", "lash_lod0_mesh")
     teeth, tongue = _part("teeth", "teeth_lod0_mesh"), _part("tongue", "Tongue", hers)
     parts = [face, eye, lash, teeth, tongue]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A DNA file's own topology takes the form of another head."""
+"""Tests of conform: a face takes the form of another head and keeps its topology."""
 
 import copy
 import json
@@ -24,12 +24,12 @@ from risorius.cli import main
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*several axes")
 SKIN = "head_lod0_mesh"
-LID = 12  # a joint of the skin
+LID = 12  # a joint of the skin that `face` turns into the joint of the left lid
 EYES = {"eyeLeft_lod0_mesh": (6, (3, 3, 6)), "eyeRight_lod0_mesh": (7, (-3, 3, 6))}
 
 
 def ball(middle, joint, radius=1.3, rings=8, around=12):
-    """A sphere of quads and two fans of triangles, which hangs on one joint."""
+    """A sphere of quads and two fans of triangles, skinned to one joint."""
     up = np.linspace(0, np.pi, rings + 1)[1:-1]
     turn = np.arange(around) * 2 * np.pi / around
     ring = np.stack(
@@ -57,7 +57,7 @@ def ball(middle, joint, radius=1.3, rings=8, around=12):
 
 
 def with_lid(mesh):
-    """A skin whose left lid has a joint at the centre of the eye, so that it slides on the eye."""
+    """A skin whose left lid is skinned to a joint at the centre of the eye, so that it slides."""
     lid = (np.abs(mesh.positions[:, :2] - 3.0) < 1.7).all(axis=1)
     joints = np.array(mesh.skin_joint_indices).reshape(-1, 4)
     weights = np.array(mesh.skin_weights).reshape(-1, 4)
@@ -68,7 +68,7 @@ def with_lid(mesh):
 
 @pytest.fixture(scope="module")
 def face():
-    """Joints with directions of their own, eyes, three levels."""
+    """A face with rotated joints, two eyeballs and three LODs."""
     dna = jointed_face.build()
     eyes = [ball(middle, joint) for joint, middle in EYES.values()]
     dna.meshes = [*map(with_lid, dna.meshes), *eyes]
@@ -90,7 +90,7 @@ def skin_points(dna):
 
 
 def stretched(points):
-    """Another form: wider above, a longer chin."""
+    """Points of another head, wider at the top, with a longer chin."""
     out = points * [1.1, 1.0, 0.95]
     out[:, 0] *= 1 + 0.01 * points[:, 1]
     out[:, 1] -= 0.02 * np.clip(-points[:, 1], 0, None) ** 1.5
@@ -98,7 +98,7 @@ def stretched(points):
 
 
 def posed(dna, mesh, **raw):
-    """float64[V, 3] by the tests' own evaluator and skinning."""
+    """float64[V, 3]: posed vertices, computed by the evaluator and skinning of the tests."""
     rig = risorius.Rig(dna)
     values = np.array(rig.initial_raw_controls, np.float64)
     for name, value in raw.items():
@@ -206,12 +206,13 @@ def test_eyes_stay_spheres_about_their_joints_and_turn_in_place(face):
 
 
 COLUMNS = np.radians(np.linspace(-60, 60, 13))
-ROWS = [(60, 1.1), (45, 1.1), (30, 1.1), (20, 1.1), (10, 1.1), (10, 1.0)]  # degrees, radius
+# Rows of a lid: elevation in degrees, distance from the eye's centre in cm.
+ROWS = [(60, 1.1), (45, 1.1), (30, 1.1), (20, 1.1), (10, 1.1), (10, 1.0)]
 
 
 def face_with_lids(shape):
-    """Two lids before an eye of 1 cm at the origin; a control turns the upper one by 20 degrees
-    until its rim lies on the other. shape: whether it has a blend shape too, which does nothing."""
+    """Two lids in front of an eye of radius 1 cm at the origin. A control turns the upper lid by 20
+    degrees, so that its rim meets the lower lid. shape: adds a blend shape without motion."""
     upper = np.array([
         [r * np.sin(a), r * np.cos(a) * np.sin(e), r * np.cos(a) * np.cos(e)]
         for e, r in ((np.radians(e), r) for e, r in ROWS) for a in COLUMNS
@@ -278,7 +279,7 @@ def test_lids_close_on_an_eye_that_is_wider_open(shape, left):
     wide[:, 1] += 0.05 * (points[:, 1] > 0) * np.cos(points[:, 0])
     other = conform(face, {SKIN: wide})
     assert np.abs(skin_points(other) - wide).max() < 1e-5
-    # With the angle that it turned by before, the lid stops halfway.
+    # With the unchanged angle the lid stops halfway.
     was = copy.copy(other)
     was.joint_groups = face.joint_groups
     if shape:
@@ -299,8 +300,8 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
     found = conform(there, {SKIN: np.stack([z, -x, -y], axis=1)})
     for a, b in zip(found.meshes, wanted.meshes, strict=True):
         assert np.abs(a.positions - b.positions).max() < 1e-5
-        assert np.abs(a.normals - b.normals).max() < 0.05  # polygons are cut another way
-    # Vertices are grouped in cells along the axes, which affects a root far below most.
+        assert np.abs(a.normals - b.normals).max() < 0.05  # polygons have other triangulations
+    # Grid cells of the smoothing depend on the axes; the root joint, far below, differs most.
     off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
     assert off.max() < 3e-3
     assert np.median(off) < 1e-4
@@ -310,7 +311,7 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
 
 
 def as_part(dna, points, cut=False, name="sculpt"):
-    """The skin as a mesh of another program."""
+    """The skin as a HeadPart. cut: the polygons are triangulated."""
     mesh = dna.meshes[0]
     faces = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)].reshape(-1, 4).tolist()
     if cut:
@@ -337,7 +338,7 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
 
 
 def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
-    """Other tests cover the earlier steps, so these are replaced by exact results here."""
+    """Exact results replace the earlier steps, which other tests cover."""
     system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
     mirrored = face.convert(**system, face_winding_order="ccw")
     points = stretched(skin_points(face))  # cm, standing
@@ -345,7 +346,7 @@ def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeyp
     given = 1.0 * points @ lean.T + [40, -3, 7]
     part = as_part(face, given)
     part.mesh.faces.reverse()
-    part.mesh.faces[0] = [0, 30, 77]  # no polygon of the face
+    part.mesh.faces[0] = [0, 30, 77]  # not a polygon of the face, so the topology differs
     standing = SimpleNamespace(parts=[part], found=None, notes=["as it is"])
     monkeypatch.setattr(head, "stand", lambda *_: standing)
     seen = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From the file of a head without expressions to a rig, by the command line."""
+"""Tests of `risorius author --onto`: from the file of a head without expressions to a rig."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def template(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
-    """Another head: z up, in metres, its triangles in another order; and its points in cm."""
+    """The OBJ file of another head (z up, metres, triangles in another order); its points in cm."""
     form = head_form()
     parts = np.zeros(len(form.parts))
     parts[[1, 3, 5]] = 1.0, -1.0, 0.7
@@ -63,7 +63,7 @@ def test_a_head_without_expressions_becomes_a_rig(template, head, tmp_path) -> N
     mesh = dna.mesh_names.index("anna_lod0_mesh")
     rest, open_ = (posed.positions(raw, mesh) for raw in
                    (np.zeros(len(names)), np.eye(len(names))[names.index("jawOpen")]))  # fmt: skip
-    assert np.abs(rest - points).max() < 0.01  # it stands, in cm
+    assert np.abs(rest - points).max() < 0.01  # converted to y up and cm
     place = dna.neutral_joint_translations[dna.joint_names.index("head")]
     assert abs(place[0]) < 1  # between the ears
     assert points[:, 1].min() < place[1] < points[:, 1].max()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A template laid onto heads of other vertices: the places of a formula are known on both."""
+"""Tests of the registration on heads of a formula, whose corresponding points are known exactly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from risorius.anyhead.registration import (
 from risorius.anyhead.surface import Surface
 
 OPTIONS = RegisterOptions(nodes=300)
-MM = any_heads.HEAD_MM / 24  # of the template's unit
+MM = any_heads.HEAD_MM / 24  # mm per unit of the template
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def found(heads):
 
 
 def _mm(template, found, true):
-    """Errors along the surface in millimetres of a head of 240 mm."""
+    """Errors along the surface, in mm of a head of 240 mm."""
     return any_heads.errors(template, found, true) * any_heads.HEAD_MM / np.ptp(true[:, 1])
 
 
@@ -162,7 +162,7 @@ def test_bad_input_is_one_sentence(heads, change, sentence) -> None:
 
 def test_triangles_without_an_area_and_seams_are_no_obstacle(heads, found) -> None:
     template, target, true = heads
-    doubled = np.concatenate([target.points, target.points])  # each vertex twice, as at a seam
+    doubled = np.concatenate([target.points, target.points])  # duplicate vertices, as at a seam
     half = len(target.triangles) // 2
     corners = target.triangles.copy()
     corners[half:] += len(target.points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lids close on an eye, lips meet, and neither is changed where nothing is wrong."""
+"""Tests of repair: lids and lips close, and expressions without faults stay unchanged."""
 
 import copy
 import sys
@@ -60,8 +60,8 @@ def mended(head, skin, fitted):
 
 
 def seen(skin, points, ball):
-    """How many rays from in front end at the eye, and the most above each other, by a grid of
-    0.2 mm; no code of the repair."""
+    """The number of parallel rays from the front that hit the eye, in a grid of 0.2 mm, and the
+    largest number in one column. Independent of the code under test."""
     at = np.arange(-RADIUS, RADIUS, 0.02)
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
     begin = ball.middle + np.stack([x, y, np.full(len(x), 9.0)], axis=1)
@@ -97,7 +97,7 @@ def test_lids_that_close_already_stay_as_they_are(skin, fitted, mended):
 
 
 def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
-    """A lid that is pressed 1 mm into the eye while that looks down."""
+    """A lid is pressed 1 mm into the eye while the eye looks down."""
     lids = find_eyelids(skin, fitted.eyes["L"])
     arm = skin.points - EYE
     inwards = np.where(
@@ -119,7 +119,7 @@ def test_lips_meet_where_an_open_jaw_is_closed(head, skin, mended):
     assert before.lip_gap > 1.5
     assert after.lip_gap <= 0.3
     assert after.lip_cut <= 0.15
-    # By a measure of its own: the lower line below the upper one, where both were one line.
+    # Measured independently: distances between lower and upper lip line, which coincide at rest.
     points = skin.points + mended.combinations[CLOSED]
     line = np.flatnonzero(np.abs(skin.points[:, 1] - MOUTH) < 0.01)
     middle = line[np.abs(skin.points[line, 0]) < 0.6 * HALF]
@@ -143,7 +143,7 @@ def test_what_works_only_together_with_others_is_an_expression_that_moves_nothin
 
 def test_lips_that_are_far_apart_are_not_torn(head, skin):
     bare = sort_parts([part("face", head.points, head.faces)])
-    jaw = head.ways["jawOpen"]  # and nothing closes the lips
+    jaw = head.ways["jawOpen"]  # the lip controls add nothing, so the mouth stays open
     out = repair(skin, head.faces, bare, Corners(), None, head.ways, {CLOSED: jaw})
     assert np.array_equal(out.combinations[CLOSED], jaw)
     assert "too far to be brought together: is the mouth open at rest?" in out.report.notes[-1]
@@ -152,7 +152,7 @@ def test_lips_that_are_far_apart_are_not_torn(head, skin):
 
 def test_skin_that_is_pressed_into_teeth_comes_out(head, skin, fitted):
     flat = type(fitted)(fitted.face, copy.deepcopy(fitted.of("teeth")))
-    for row in flat.rows:  # nearer to the lips
+    for row in flat.rows:  # move the teeth towards the lips
         row.part.mesh.positions[:, 2] += 1.4
     bodies = Bodies(flat, skin, head.ways)
     contacts = Contacts(skin, head.faces, bodies)

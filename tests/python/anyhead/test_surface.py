@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A surface of triangles, and the native queries of one."""
+"""Tests of Surface, of closest points and of sparse systems."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_a_cube_of_polygons() -> None:
     cube = Surface.of_polygons(CUBE, SIDES)
     assert cube.triangles.shape == (12, 3)
     assert np.linalg.norm(cube.face_normals(), axis=1).sum() == pytest.approx(12)  # twice the area
-    assert ((cube.normals() * (CUBE - 0.5)).sum(axis=1) > 0.5).all()  # they look outside
+    assert ((cube.normals() * (CUBE - 0.5)).sum(axis=1) > 0.5).all()  # normals point outward
     assert len(cube.edges()) == 18
     assert not cube.border().any()
     assert Surface(CUBE, cube.triangles[2:]).border()[[0, 1, 2, 3]].all()

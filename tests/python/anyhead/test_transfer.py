@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions of a template on other heads, of which the right ones are known by formula."""
+"""Tests of the transfer of expressions to heads on which a formula gives the right result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMES = {"mouthSmileLeft": SMILE, "eyeBlinkLeft": BLINK, "jawOpen": "jawOpen"}
 
 
 def face(unit="cm", scale=1.0):
-    """A face of three expressions and a corrective, in one of the units."""
+    """A face with three expressions and a corrective, in a given unit."""
     points, faces = face_shapes.head()
     ways = {NAMES[n]: d for n, d in face_shapes.expressions(points).items() if n in NAMES}
     mesh = ObjMesh(scale * points, np.zeros((0, 2)), faces.tolist(), [[]] * len(faces))
@@ -40,7 +40,7 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """The transfer to a head with the template's vertices at given points."""
+    """Transfer to a head; points: positions of the template's vertices on it."""
     target = target or Surface(points, template.surface.triangles)
     return transfer(
         template, target, points, np.ones(len(points)), TransferOptions(threads=1, **options)
@@ -61,7 +61,7 @@ def test_a_template_has_its_controls_and_what_is_left_over_in_cm(template) -> No
 
 def test_a_file_with_other_axes_stands_as_any_other(template) -> None:
     dna = face()[0]
-    dna.coordinate_system = ("left", "up", "front")  # what was the left is the right
+    dna.coordinate_system = ("left", "up", "front")  # mirrors the x axis
     turned = read_template(dna)
     assert np.abs(turned.surface.points - template.surface.points * [-1, 1, 1]).max() < 1e-6
     assert (turned.surface.normals()[:, 2] > 0).mean() > 0.9
@@ -96,7 +96,7 @@ def test_a_wider_head_has_a_wider_smile_and_no_longer_one(template) -> None:
 
 
 def finer(points, triangles):
-    """Each triangle as four; the new vertices with the two ends of each."""
+    """The surface with each triangle split into four; also both end vertices of each new vertex."""
     edges, rows = np.unique(
         np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1),
         axis=0, return_inverse=True,
@@ -136,8 +136,8 @@ def test_a_hole_of_the_template_is_filled_from_around_it(template) -> None:
 
 
 def slit():
-    """Two plates, edge to edge with a tiny gap; the lower one moves down. Also the vertex indices
-    of the upper one."""
+    """Two plates, edge to edge with a tiny gap, of which the lower one moves down; also the vertex
+    indices of the upper plate."""
     x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(0.01, 4, 21))
     up = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
     corner = np.arange(21 * 21).reshape(21, 21)
@@ -157,7 +157,7 @@ def test_no_vertex_is_torn_across_a_slit_that_the_template_misses_by_two_millime
     template = read_template(make_shape_face(shapes, names))
     got = on(template, points + np.array([0, 0.2, 0]), Surface(points, template.surface.triangles))
     ((_, way),) = got.items()
-    assert np.abs(way[:half, 1]).max() < 0.4  # the upper lip rests
+    assert np.abs(way[:half, 1]).max() < 0.4  # the upper plate does not move
     assert np.abs(way[half:, 1] + 2).max() < 0.4
 
 

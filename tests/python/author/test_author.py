@@ -68,12 +68,12 @@ def made(folder):
 
 
 def tolerated(times=1.0):
-    """How far a vertex may be off by default, cm: a share of the head's height."""
+    """The default tolerance of a vertex in cm, a fraction of the head's height, times a factor."""
     return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
 def posed(dna, controls):
-    """Vertices in metres with raw controls, by name without prefix, at their values."""
+    """Posed vertices in metres. Args: controls  raw control without prefix -> value."""
     rig = risorius.Rig(dna)
     names = list(dna.raw_control_names)
     values = np.zeros(len(names), np.float32)
@@ -119,7 +119,7 @@ def test_the_file_is_sound_and_says_what_moves(made):
 
 @pytest.fixture(scope="module")
 def read(folder, made):
-    """The written file in an independent reader of bytes."""
+    """The written file, parsed by an independent reader."""
     return dna_bytes.Face((folder / "egg.dna").read_bytes())
 
 
@@ -136,7 +136,7 @@ def test_another_reader_gets_the_same_expression(read, name):
 
 
 def test_eight_levels_by_another_reader(read, made):
-    """Each level has fewer joints and vertices, all from the finer level, and stays near it."""
+    """Each level has a subset of the finer level's joints and vertices, and stays near it."""
     _, said = made
     assert read.lod_count == 8
     counts = [len(read.geometry[m[0]]["positions"]) for m in read.lod_meshes]
@@ -190,7 +190,7 @@ def test_levels_end_before_the_picture_breaks(folder, tmp_path):
 
 
 def test_hair_of_more_vertices_than_the_skin_ends_no_level():
-    """A head whose hair is a mesh of cards: the levels are those of the head alone."""
+    """A head with hair cards gets the same levels as without hair."""
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     shapes = shape_face.ShapeSet(
@@ -221,7 +221,7 @@ def test_hair_of_more_vertices_than_the_skin_ends_no_level():
 
 
 def test_pieces_of_a_mesh_stay_whole_or_go_together():
-    """Two eyes and forty lashes in the mesh of a head: no eye is lost, and all lashes or none."""
+    """A head mesh with two eyes and forty lashes keeps both eyes, and all lashes or none."""
     positions, faces = face_shapes.head()
     eye = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], float)
     box = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2],
@@ -251,7 +251,7 @@ def test_pieces_of_a_mesh_stay_whole_or_go_together():
 
 
 def test_a_coarser_level_keeps_the_rim_and_is_no_fold(read):
-    """The face is open: its rim is still the rim, and no triangle looks the other way."""
+    """The open rim of the face keeps its extent, and no triangle is flipped."""
     positions, _ = face_shapes.head()
     for lod in range(1, 5):
         mesh = read.geometry[read.lod_meshes[lod][0]]
@@ -292,7 +292,7 @@ def test_budgets_are_kept(folder, tmp_path):
 
 
 def test_a_seam_of_the_texture_stays_closed():
-    """Two halves of a sheet with a seam between them: fewer triangles, no gap, the same corners."""
+    """A simplified sheet of two halves with a texture seam has no gap and the same corners."""
     n = 12
     x, y = np.meshgrid(np.arange(2 * n + 1), np.arange(n + 1))
     positions = np.stack([x.ravel(), y.ravel(), 0.01 * (x * y).ravel()], axis=1).astype(float)
@@ -472,7 +472,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
 
 
 def test_joints_that_are_there_stay(folder):
-    """A neck that has half of the lower vertices still carries them, a jaw keeps its motion."""
+    """A neck still carries its half of the lower vertices, and a jaw keeps its motion."""
     read = spec.read_spec(folder / "spec.toml")
     dna = spec.read_face(read).dna
     positions, _ = face_shapes.head()
@@ -516,7 +516,7 @@ def test_joints_that_are_there_stay(folder):
 
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
-    """Half the way and with other expressions the skin is where jaw, skin and shapes had it."""
+    """At 0.5 and with other expressions, the skin is where jaw and shapes of the source put it."""
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     hinge = np.array([0, 0, -2.0])
@@ -585,7 +585,7 @@ def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
 
 
 def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
-    """The mesh of LOD 1 has every second row and column, and shapes of its own."""
+    """The source's LOD 1 has every third row and second column of vertices, and its own shapes."""
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     grid = np.arange(len(positions)).reshape(face_shapes.DOWN, face_shapes.ACROSS)[::3, ::2]

@@ -143,7 +143,8 @@ def test_a_wrong_table_is_one_sentence(tmp_path, table, sentence):
 
 
 # A sheet of 40 x 40 mm, 1 mm above a ball of 40 mm, at two levels, with lashes above it. Two
-# controls push it down, softly, each less than 1 mm in the middle; a third far away.
+# controls push the middle of the sheet down softly, each by less than 1 mm. A third control pushes
+# a place far away.
 SIDE = 41
 BALL = np.array([0.0, -21.0, 0.0])
 RADIUS = 20.0
@@ -189,8 +190,13 @@ def mesh_of(positions, faces):
 
 
 def make_face(pushes, turning=None, first="head_lod0_mesh"):
-    """A face of these pushes; `turning` also turns everything about x, by 25 degrees; `first` is
-    the first mesh of its file."""
+    """A face whose controls push the sheet.
+
+    Args:
+        pushes: pushes of the controls.
+        turning: control that also turns everything about x by 25 degrees, or None.
+        first: name of the file's first mesh.
+    """
     count = len(pushes)
     parts = {
         "head_lod0_mesh": sheet(SIDE),
@@ -258,13 +264,13 @@ def corrected(face):
 
 
 def skin_of(read, controls, lod=0):
-    """float64[V, 3] of the sheet, mm; other meshes of a level come after it."""
+    """float64[V, 3]: posed vertices of the sheet in mm; it is the first mesh of a level."""
     side = SIDE if lod == 0 else 21
     return 10 * read.vertices(controls, lod)[: side * side]
 
 
 def depth(positions):
-    """mm inside of the ball, by its formula; positions in mm."""
+    """Depth inside the ball in mm. Args: positions  float64[V, 3], mm."""
     return RADIUS - np.linalg.norm(positions - BALL, axis=1)
 
 

@@ -24,7 +24,7 @@ ORDER, ORDERS = 4, ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")
 
 
 def turned(points, degrees, order="XYZ", back=False):
-    """Points about one axis after another, by the formula of Rodrigues."""
+    """Points rotated about one axis after another by Rodrigues' formula."""
     for letter in reversed(order) if back else order:
         axis = "XYZ".index(letter)
         angle = np.radians(degrees[axis]) * (-1 if back else 1)
@@ -38,7 +38,7 @@ def turned(points, degrees, order="XYZ", back=False):
 
 
 def placed(points):
-    """The transform of a node's properties by FbxNode's manual, step by step."""
+    """Points transformed by a node's properties, step by step as in FbxNode's manual."""
     p = {name: np.array(value) for name, value in PLACE.items()}
     points = (points - p["ScalingPivot"]) * p["Lcl Scaling"] + p["ScalingPivot"]
     points = points + p["ScalingOffset"] - p["RotationPivot"]
@@ -80,7 +80,7 @@ class Egg:
         self.node = [row(name, *value) for name, value in PLACE.items()]
         self.node.append(row("RotationOrder", ORDER))
         self.settings = [row("UnitScaleFactor", 1.0)]
-        self.shape = {}  # what the first target has instead
+        self.shape = {}  # replaced fields of the first target
         self.extra, self.links = [], []
 
     def save(self, path, version=7400):

@@ -30,7 +30,7 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
 
 
 def outward(mesh):
-    """The share of triangles that face the viewer in front of the head."""
+    """The fraction of triangles that face away from the mesh' middle."""
     points = mesh.positions[np.array(mesh.faces)]
     normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     return (
@@ -53,8 +53,10 @@ def test_a_mirror_shows_the_backs_of_no_polygons(tmp_path):
 
 
 def skinned(path, change=None):
-    """A skinned head as quantizers write it: the scale to metres is in the skin, the neck is posed,
-    and the node of the mesh is far away."""
+    """Write a skinned head like quantizers do.
+
+    The scale to metres is in the skin, the neck is posed, and the mesh' node is far away.
+    """
 
     def posed(document):
         document["nodes"] = [
@@ -134,7 +136,7 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     )
 
     def crowd(document):
-        """Primitives that share all their vertices and have no indices."""
+        """Give the mesh 20,000 primitives that share all vertices and have no indices."""
         shape = {"POSITION": 0}
         document["meshes"][0]["primitives"] = [{"attributes": shape, "targets": [shape]}] * 20_000
 

@@ -30,7 +30,7 @@ MESHES = {
 }
 EYES = ["FACIAL_L_Eye", "FACIAL_R_Eye"]
 JOINTS = {"Ready Player Me": EYES, "VRoid": [], "ICT": EYES, "Face Cap": ["FACIAL_C_Jaw", *EYES]}
-HEIGHT_CM = 25.05  # of the formula's face
+HEIGHT_CM = 25.05  # height of the face of face_shapes.py
 
 
 @cache
@@ -39,7 +39,7 @@ def made(name):
 
 
 def read(path, text=""):
-    """Read a head's file, or a spec that names it."""
+    """Read a head's file, or a spec for it. Args: text  lines of the spec's table [source]."""
     if text:
         toml = path.with_suffix(".toml")
         toml.write_text(f'[source]\nneutral = "{path.name}"\n{text}', encoding="utf-8")
@@ -56,7 +56,7 @@ def centimetres(dna, mesh=0):
 
 
 def target(dna, control, mesh=0):
-    """Vertices and displacements in cm of a control's shape."""
+    """Vertex indices and displacements in cm of a control's blend shape."""
     channel = list(dna.blend_shape_channel_names).index(control)
     for found in dna.meshes[mesh].blend_shape_targets:
         if found.blend_shape_channel_index == channel:
@@ -111,7 +111,7 @@ def test_every_likeness_stands_and_has_its_size(name, stand, scale, tmp_path):
 
 
 def moved(dna, mesh, control):
-    """Vertices of a mesh at rest and moved by a control, cm."""
+    """Neutral vertices of a mesh and their displacements by a control, cm."""
     face = work.begin(dna)
     row = face.names.index(f"CTRL_expressions.{control}")
     index = [n.removesuffix("_lod0_mesh") for n in dna.mesh_names].index(mesh)

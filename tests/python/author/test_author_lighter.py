@@ -40,7 +40,7 @@ def face_of(shapes):
 
 
 def deltas(dna):
-    """Vertices that targets of the first level move, counted in the file."""
+    """The number of nonzero deltas of LOD 0, counted in the file."""
     read = dna_bytes.Face(dna.to_bytes())
     meshes = [dna.meshes[m] for m in read.lod_meshes[0]]
     return sum(int(np.asarray(t.deltas).any(axis=1).sum()) for m in meshes

@@ -30,7 +30,7 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=6), 0.05, lighter=False, lods=
 
 
 def other_person(dna):
-    """The face, narrower and with a longer chin; its expressions in its own proportions."""
+    """The face made narrower and with a longer chin; its expressions are scaled alike."""
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -48,7 +48,7 @@ def other_person(dna):
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory):
-    """(face of shapes, joint rig) of one, and of another that takes the joints over."""
+    """Face of shapes and joint rig of a person, and of another who reuses the joints."""
     folder = tmp_path_factory.mktemp("like")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna

@@ -22,13 +22,13 @@ def triangles():
 
 
 def rows(array, stride):
-    """Bytes of an array with rows padded to a stride."""
+    """Bytes of an array whose rows are padded to `stride` bytes."""
     array = np.ascontiguousarray(array)
     return b"".join(row.tobytes().ljust(stride, b"\0") for row in array)
 
 
 def numbers():
-    """Positions, changes and texture coordinates of the formula's head as whole numbers."""
+    """Quantized positions, displacements and texture coordinates of the head of face_shapes.py."""
     positions, _ = face_shapes.head()
     low = positions.min(axis=0) / 100
     whole = np.round((positions / 100 - low) / STEP).astype("<u2")
@@ -41,8 +41,11 @@ def numbers():
 
 
 def head(path, *, packed, change=None):
-    """As gltfpack writes a head: whole numbers, a node that scales them back, packed views, normals
-    in eight bits, and texture coordinates that the material scales."""
+    """Write a head like gltfpack.
+
+    It has quantized numbers, a node that scales them back, packed views, normals of eight bits, and
+    texture coordinates that the material scales.
+    """
     low, whole, moved, uvs = numbers()
     glb = Glb()
 

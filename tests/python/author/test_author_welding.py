@@ -11,8 +11,10 @@ from risorius.author.input.welding import welded
 
 
 def parted(column=11):
-    """The formula's head cut along a column: vertices once for each side, as exporters write a
-    seam of the texture. Gives positions in cm, polygons, expressions, and which vertex each was."""
+    """The head of face_shapes.py with duplicated vertices along a column, like a texture seam.
+
+    Returns: positions in cm, polygons, expressions, and the original index of each vertex.
+    """
     positions, faces = face_shapes.head()
     number = np.arange(len(positions)).reshape(face_shapes.DOWN, -1)
     seam = number[:, column]

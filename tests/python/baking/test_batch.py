@@ -41,13 +41,13 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def curves_of(clip, count, frames):
-    """A clip by formula: float32[count, frames] in 0..1, another for each number."""
+    """The curves of clip number `clip`: float32[count, frames] in 0 to 1, by formula."""
     t = np.arange(frames) / RATE
     return (0.5 + 0.5 * np.sin(np.outer(1 + np.arange(count) % 5, t) + clip)).astype(np.float32)
 
 
 def make(folder, clips=3, frames=12, faces=FACES, table="", top='output = "out"\n'):
-    """A folder with clips, faces and a jobs.toml; its path."""
+    """Make a folder with clips, faces and a jobs.toml. Returns the path of jobs.toml."""
     (folder / "clips").mkdir(parents=True)
     (folder / "faces").mkdir()
     names = risorius.load(GOLDEN / "core.dna").raw_control_names
@@ -89,7 +89,7 @@ def files_of(jobs):
     return {p: p.stat().st_mtime_ns for p in (jobs.parent / "out").rglob("*.npz")}
 
 
-# ---- what it makes
+# ---- outputs
 
 
 def test_every_job_is_done_and_the_summary_says_so(tmp_path, capsys):
@@ -121,7 +121,7 @@ def test_statistics_alone(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["frames"] == 3
     (job,) = json.loads((jobs.parent / "out" / "summary.json").read_text())["jobs"]
     rig = risorius.Rig(risorius.load(GOLDEN / "medium.dna"))
-    raw = curves[:, [2, 4, 6]].T.copy()  # every other frame of 30 a second
+    raw = curves[:, [2, 4, 6]].T.copy()  # every second frame at 30 frames per second
     raw[:, 0] = 0
     poses = [rig.evaluate(row) for row in raw]
     moves = np.linalg.norm(np.stack([p.joints for p in poses])[:, :, :3].astype(float), axis=2)
@@ -176,12 +176,12 @@ def test_clips_are_mapped_and_resampled_to_clips(tmp_path, monkeypatch):
     before = stamp(plan.jobs[0])
     (tmp_path / "j" / "own.toml").write_text(own.replace("0.5", "0.25"))
     after = stamp(plan.jobs[0])
-    assert after != before  # another mapping is another output
+    assert after != before  # another mapping gives another output
     monkeypatch.setattr("risorius.batch.work.compile_version", lambda: 1)
-    assert stamp(plan.jobs[0]) != after  # and so is another evaluator
+    assert stamp(plan.jobs[0]) != after  # and so does another compiler version
 
 
-# ---- what is done again, and what not
+# ---- finished jobs are skipped, others run again
 
 
 def test_only_what_changed_is_done_again(tmp_path, capsys):
@@ -192,10 +192,10 @@ def test_only_what_changed_is_done_again(tmp_path, capsys):
     assert main(["batch", str(jobs), "--dry-run"]) == 0
     assert "12 jobs, 0 to do" in capsys.readouterr().out
     out = jobs.parent / "out"
-    (out / "core" / "lod0" / "take1.npz").unlink()  # one is gone,
-    with open(out / "core" / "lod1" / "take1.npz", "r+b") as file:  # one is cut,
+    (out / "core" / "lod0" / "take1.npz").unlink()  # one output is deleted,
+    with open(out / "core" / "lod1" / "take1.npz", "r+b") as file:  # one is truncated,
         file.truncate(100)
-    clip = jobs.parent / "clips" / "take2.csv"  # and a clip is another one
+    clip = jobs.parent / "clips" / "take2.csv"  # and one clip has changed
     clip.write_text(clip.read_text().replace("0.5", "0.25"))
     assert main([*run, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
@@ -236,7 +236,7 @@ def test_a_journal_that_is_cut_or_is_none_is_no_trouble(tmp_path, capsys):
 
 
 def start(jobs, *options):
-    """The command as a process of its own group, as a shell starts it."""
+    """Start the command in its own process group, as a shell does."""
     command = [sys.executable, "-m", "risorius", "batch", str(jobs), "--workers", "2", *options]
     return subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
@@ -244,7 +244,7 @@ def start(jobs, *options):
 
 
 def wait_for_outputs(jobs, process):
-    """Until two jobs are done, and the batch has much to do yet."""
+    """Wait until two jobs are done; the batch must still have jobs to do."""
     journal = jobs.parent / "out" / ".jobs.journal"
     while not journal.exists() or journal.read_bytes().count(b"\n") < 3:
         assert process.poll() is None, "the batch has ended already"
@@ -256,7 +256,7 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     jobs = make(tmp_path / "j", clips=8, frames=1500, table='write = ["npz", "csv"]\n')
     process = start(jobs)
     wait_for_outputs(jobs, process)
-    # A terminal's Ctrl-C reaches every process, and so does a machine that fails.
+    # A terminal's Ctrl-C reaches every process; SIGKILL stands for a machine that fails.
     os.killpg(process.pid, signal.SIGINT if how == "interrupt" else signal.SIGKILL)
     error = process.communicate()[1].decode()
     out = jobs.parent / "out"
@@ -267,7 +267,7 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
         assert not list(out.rglob("*.part"))
         states = [row["state"] for row in table_of(jobs)]
         assert states.count("not done") == 16 - states.count("done")
-    for path in out.rglob("take*.npz"):  # whole or not there
+    for path in out.rglob("take*.npz"):  # complete or missing
         with np.load(path) as arrays:
             assert len(arrays["joints"]) == 1500
     first = files_of(jobs)
@@ -276,7 +276,7 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     assert 0 < facts["kept"] < 16
     assert facts["done"] == 16 - facts["kept"]
     again = [p for p, t in files_of(jobs).items() if first.get(p, t) != t]
-    assert len(again) <= 2  # whole, but killed before the journal said so: one a worker
+    assert len(again) <= 2  # one per worker was not in the journal
     assert len(files_of(jobs)) == 16
     assert not list(out.rglob("*.part"))
 
@@ -300,7 +300,7 @@ def test_a_second_batch_in_a_folder_is_told_who_works_there(tmp_path):
     first = start(jobs)
     wait_for_outputs(jobs, first)
     if os.name != "nt":
-        first.send_signal(signal.SIGSTOP)  # or it may end while the second still begins
+        first.send_signal(signal.SIGSTOP)  # it must not end before the second starts
     second = start(jobs)
     error = second.communicate()[1].decode()
     if os.name != "nt":
@@ -351,7 +351,7 @@ def test_a_folder_that_cannot_be_is_said_before_any_job(tmp_path, capsys):
     assert not (tmp_path / "cache").exists()
 
 
-# ---- workers that die
+# ---- death of workers
 
 
 def test_a_killed_worker_costs_an_attempt_only(tmp_path):
@@ -416,7 +416,7 @@ def test_workers_that_cannot_start_are_no_endless_loop(tmp_path):
 
 
 class Unloadable:
-    """Work that a worker cannot load."""
+    """Work that a worker process cannot unpickle."""
 
     def __reduce__(self):
         return (int, ("no number",))
@@ -442,11 +442,11 @@ def test_failed_jobs_are_named_and_the_others_done(tmp_path, capsys):
     assert "found 2" in rows["core/lod2/take0"]["error"]
 
 
-# ---- a cluster
+# ---- a Dask cluster
 
 
 class Dask:
-    """A scheduler and two workers as processes on this machine."""
+    """A Dask scheduler and two workers, as processes on this machine."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -480,7 +480,7 @@ class Dask:
 
 
 def lose_the_first(cluster, monkeypatch):
-    """The first result is lost with its worker before it was fetched, so its job runs again."""
+    """Lose the first result together with its worker, so that the job runs again."""
     distributed = pytest.importorskip("distributed")
     lost = []
 
@@ -501,7 +501,7 @@ def lose_the_first(cluster, monkeypatch):
 
 def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
     version = risorius.__version__
-    monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 30.0)  # of a busy machine
+    monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 30.0)  # for a busy machine
     jobs = make(tmp_path / "j", clips=5)
     plan, outcomes = read_jobs(jobs), []
     with Dask(tmp_path) as dask:
@@ -520,7 +520,7 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
         assert [o.error for o in outcomes] == [""] * 20
         fileio.sweep({path.parent for job in plan.jobs for _, path in job.outputs})
         check_outputs(jobs, clips=5)
-        shutil.rmtree(jobs.parent / "out")  # the one that is left does it again, by the command
+        shutil.rmtree(jobs.parent / "out")  # the other worker makes it again
         assert main(["batch", str(jobs), "--scheduler", dask.address, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["done"] == 20
         check_outputs(jobs, clips=5)
@@ -674,7 +674,7 @@ def test_bad_command_lines_are_exit_code_2(tmp_path, capsys):
     assert main(["batch", "x.toml", "--workers", "2", "--scheduler", "tcp://h:1"]) == 2
 
 
-# ---- what is shown
+# ---- progress
 
 
 class Terminal:
@@ -699,7 +699,7 @@ def test_progress(monkeypatch):
         shown = Terminal(terminal)
         progress = Progress(40, "jobs", before=5, stream=shown)
         progress.update(6, 100)
-        assert shown.text == ""  # what is done at once needs no bar
+        assert shown.text == ""  # no bar before the first interval
         now[0] = 20.0
         progress.update(15, 3000, "1 failed")
         line = "[#######.............] 15 of 40 jobs, 150 frames/s, 0:50 left, 1 failed"

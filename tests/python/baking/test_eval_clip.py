@@ -29,7 +29,7 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def write_clip(path, names, curves, rate=30.0, start=0.0):
-    """A CSV of curves[names, frames], digits enough to give every float32 back."""
+    """Write curves[names, frames] as CSV, with enough digits to restore every float32."""
     curves = np.asarray(curves, float)
     times = start + np.arange(curves.shape[1]) / rate
     table, digits = np.column_stack([times, curves.T]), ["%.17g", *["%.9g"] * len(names)]
@@ -39,7 +39,10 @@ def write_clip(path, names, curves, rate=30.0, start=0.0):
 
 
 def random_clip(path, name="medium", frames=50, seed=1):
-    """A clip of half the controls of a golden face; its DNA; float32[frames, R] as a rig reads."""
+    """Write a random clip of half the controls of a golden face.
+
+    Returns the DNA file, the rig, and its raw controls, float32[frames, R].
+    """
     dna = risorius.load(GOLDEN / f"{name}.dna")
     rig = risorius.Rig(dna)
     rng = np.random.default_rng(seed)
@@ -58,7 +61,7 @@ def expected(rig, raw, lod):
 @pytest.mark.parametrize("extra", [[], ["--compress"]])
 @pytest.mark.parametrize(("name", "lod"), [("medium", 0), ("medium", 2), ("rbf", 1), ("ml", 0)])
 def test_npz_is_every_frame(tmp_path, name, lod, extra, monkeypatch):
-    monkeypatch.setattr(faces, "_CHUNK_BYTES", 1)  # 16 frames a chunk: several, the last not full
+    monkeypatch.setattr(faces, "_CHUNK_BYTES", 1)  # 16 frames per chunk, several chunks
     dna, rig, raw = random_clip(tmp_path / "clip.csv", name)
     out = tmp_path / "new" / "out.npz"
     arguments = ["eval", tmp_path / "clip.csv", dna, "-o", out, "--lod", lod, *extra]
@@ -157,7 +160,7 @@ def test_frames_and_rate(tmp_path):
     out = tmp_path / "out.npz"
     jaw = risorius.load(core).raw_control_names.index("CTRL_expressions.jawOpen")
     arguments = ["eval", str(ramp), core, "-o", str(out), "--what", "controls"]
-    # 10 fps to 20: the frames between are half way.
+    # Resampled from 10 to 20 frames per second: every second frame is in the middle of two.
     assert main([*arguments, "--rate", "20", "--frames", "1:6"]) == 0
     with np.load(out) as arrays:
         np.testing.assert_array_equal(
@@ -209,7 +212,7 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
 
 
 def test_a_capture_is_mapped(tmp_path, capsys):
-    """Live Link Face's names: the mapping that fits, and one of the user's own."""
+    """Names of Live Link Face, with the mapping that is found and with a mapping of the user."""
     dna = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(dna))
     jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")
@@ -283,7 +286,7 @@ def test_bad_command_line_is_exit_code_2(tmp_path, monkeypatch, capsys, argument
     before = set(tmp_path.iterdir())
     try:
         code = main(["eval", "clip.csv", str(GOLDEN / "core.dna"), *arguments])
-    except SystemExit as error:  # argparse's own
+    except SystemExit as error:  # raised by argparse
         code = error.code
     assert code == 2
     assert message is None or message in capsys.readouterr().err

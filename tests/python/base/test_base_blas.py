@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limiting linear algebra to one thread, where possible."""
+"""Limits linear algebra to one thread, if threadpoolctl is installed."""
 
 import sys
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Readers use memory in proportion to their input: small files that demand much are refused.
+"""Readers use memory in proportion to their input, and refuse small files that demand much more.
 
-Every bomb is made here and read through the public readers. Its peak memory is measured by Python's
-own count of allocations, which is the same on every machine.
+Each test makes such a file and reads it through the public readers. Its peak memory is measured by
+Python's count of allocations, which is the same on every machine.
 """
 
 import json
@@ -24,7 +24,7 @@ MB = 1 << 20
 
 
 def peak_of(work):
-    """The peak of additional bytes while work() runs, and its error."""
+    """Run work(). Returns the peak of additional bytes, and the error or None."""
     error = None
     tracemalloc.start()
     try:
@@ -38,7 +38,7 @@ def peak_of(work):
 
 
 def refused(path, words):
-    """Read a file that must be refused with these words. Returns: the peak of memory."""
+    """Read a file that must be refused with a text. Returns the peak of additional bytes."""
     peak, error = peak_of(lambda: importing.read(path))
     assert isinstance(error, AnimationFileError), path
     assert str(error).startswith(str(path))
@@ -54,7 +54,7 @@ def zeros_array(letter, count, size):
 
 
 class Raw:
-    """A value with given bytes."""
+    """A value of an FBX property that is written as the given bytes."""
 
     def __init__(self, data):
         self.data = data
@@ -62,7 +62,7 @@ class Raw:
 
 @pytest.fixture
 def raw_values(monkeypatch):
-    """Lets fbx_files write a Raw as it is."""
+    """Make fbx_files write the bytes of a Raw unchanged."""
     plain = fbx_files.value
     monkeypatch.setattr(fbx_files, "value", lambda v: v.data if isinstance(v, Raw) else plain(v))
 
@@ -87,7 +87,7 @@ def test_arrays_of_an_fbx_that_nobody_asks_for_stay_folded(tmp_path, raw_values)
                                [("Stuff", (bomb,))]) for i in range(20)])]  # fmt: skip
     path.write_bytes(fbx_files.fbx(extra))
     peak = refused(path, "expected, found none")
-    assert peak < 4 * MB  # 320 MB unfolded
+    assert peak < 4 * MB  # it would unpack to 320 MB
 
 
 def test_curves_of_an_fbx_that_unfold_without_end_are_refused(tmp_path, raw_values):
@@ -113,7 +113,7 @@ def test_curves_of_an_fbx_that_unfold_without_end_are_refused(tmp_path, raw_valu
 
 
 def gltf_bomb(channels, keys):
-    """A GLB of channels that all move a target of their own, on one accessor."""
+    """A GLB with many channels, each for its own target, that share one accessor."""
     times = np.arange(keys, dtype="<f4")
     body = times.tobytes() + np.zeros(keys, "<f4").tobytes()
     document = {
@@ -153,7 +153,7 @@ def test_many_channels_on_one_accessor_of_a_gltf_are_refused(tmp_path):
     path = tmp_path / "channels.glb"
     path.write_bytes(gltf_bomb(300, 60_000))
     peak = refused(path, "300 curves of 60000 frames, from a key at 0 s to one at 59999 s")
-    assert peak < 32 * MB  # the accessor once, not 300 times
+    assert peak < 32 * MB  # the accessor is read once, not 300 times
     few = tmp_path / "few.glb"
     few.write_bytes(gltf_bomb(3, 100))
     assert importing.read(few).clip.frame_count == 100
@@ -283,7 +283,7 @@ def test_reading_an_fbx_needs_nothing_from_elsewhere(tmp_path, monkeypatch):
 def test_toml_as_people_write_it_is_not_deep(tmp_path):
     path = tmp_path / "m.toml"
     rows = "\n".join(f'"a.b.c.{i}" = {{ jawOpen = 1.0 }}' for i in range(200))
-    text = "1." * 63  # a text may have points
+    text = "1." * 63  # a string may contain many dots
     path.write_text(f'description = "{text}"\n[rows]\n{rows}\n')
     assert len(importing.load_mapping(path).rows) == 200
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One family of errors, printed in one place by the command line."""
+"""All errors derive from one class, and the command line prints each once."""
 
 import importlib
 import inspect
@@ -32,7 +32,7 @@ OLD_BASES = {
 
 
 def error_classes():
-    """Every class of errors that a module of the packages makes, by name."""
+    """All error classes that a module of the packages defines, by name."""
     found = {}
     modules = [
         module

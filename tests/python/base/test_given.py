@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers and files from users: of any size, of a wrong kind, without an end."""
+"""Numbers and files from users: of any size or kind, or without an end."""
 
 import os
 import threading
@@ -71,7 +71,7 @@ def test_a_budget_says_what_no_float_holds():
         Budget.of(1).hold(HUGE, "place")
 
 
-# ---- where they enter
+# ---- places where numbers enter
 
 
 def refused(code, *arguments):
@@ -136,7 +136,7 @@ def test_tables_of_a_spec_are_tables(top, words, tmp_path):
 
 
 def _moved(positions, faces, folder, deltas):
-    """The egg's files with other positions."""
+    """Write the egg's files with other positions."""
     face_shapes.write_obj(folder / "neutral.obj", positions, faces)
     for name, delta in deltas.items():
         face_shapes.write_obj(folder / "shapes" / f"{name}.obj", positions + delta, faces)
@@ -152,7 +152,7 @@ def test_heads_of_no_size_or_of_any(tmp_path):
     _moved(1e30 * positions, faces, path.parent, {k: 1e30 * d for k, d in deltas.items()})
     assert "coordinates up to 1e+09 were expected" in refused(1, "author", path, "-o", out)
     assert not out.exists()
-    _moved([1, 0, 1] * positions, faces, path.parent, deltas)  # without height: a face all the same
+    _moved([1, 0, 1] * positions, faces, path.parent, deltas)  # without height: still a face
     done = command_line.run("author", path, "-o", out, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     for file in (path.parent / "shapes").iterdir():
@@ -253,9 +253,9 @@ LARGE = [
 @pytest.mark.parametrize(("name", "words"), LARGE)
 def test_a_file_that_is_too_large_or_has_no_end_is_not_read(name, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    if name != "data.whl":  # whose hash says what it is
+    if name != "data.whl":  # the hash in its name identifies it
         with open(name, "wb") as file:
-            file.truncate(5 << 30)  # a hole, and no place on the disk
+            file.truncate(5 << 30)  # a sparse file, which takes no disk space
         said = refused(1, *[word.format(name) for word in words])
         assert "were expected, found 5,368,709,120" in said
         os.unlink(name)

@@ -64,7 +64,7 @@ KINDS = {
 
 
 READERS = {
-    # reader; its suffix; kinds that it reads or describes in more detail
+    # reader, its suffix, kinds that it reads or reports in more detail
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The names of `from risorius import *`: each native class in the public API."""
+"""`from risorius import *` imports each native class of the public API."""
 
 import inspect
 

@@ -10,13 +10,13 @@ import risorius._native as native
 from conftest import PROJECT
 
 STUB = PROJECT / "native" / "python" / "risorius" / "_native.pyi"
-# Python gives these to every class or module; pybind11 the conduit.
+# Attributes that Python adds to every class or module; the last one comes from pybind11.
 GIVEN = {"__module__", "__doc__", "__weakref__", "__init__", "_pybind11_conduit_v1_"}
-ERROR = {"code", "offset", "where"}  # set on each DnaError, not on the class
+ERROR = {"code", "offset", "where"}  # set on each DnaError object, not on the class
 
 
 def names_of(body: list[ast.stmt]) -> dict[str, ast.stmt]:
-    """Public names that statements bind, with special methods."""
+    """Public names and special methods that statements define."""
     found = {}
     for node in body:
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
@@ -27,7 +27,7 @@ def names_of(body: list[ast.stmt]) -> dict[str, ast.stmt]:
 
 
 def settable_of(body: list[ast.stmt]) -> set[str]:
-    """Attributes that may be assigned: plain ones and properties with a setter."""
+    """Attributes that may be assigned: annotated names and properties with a setter."""
     found = set()
     for node in body:
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
@@ -40,7 +40,7 @@ def settable_of(body: list[ast.stmt]) -> set[str]:
 
 
 def differences(stub: str, module) -> list[str]:
-    """Missing and superfluous names of the stub, one in each line."""
+    """Names that the stub lacks or has in excess, one sentence each."""
     top = names_of(ast.parse(stub).body)
     real = {n: v for n, v in vars(module).items() if not n.startswith("_")}
     out = [f"the stub lacks {n}" for n in real.keys() - top.keys()]

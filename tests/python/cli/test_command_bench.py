@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius bench through the front door. Its measurements are not checked here."""
+"""The command `risorius bench`; its measured times are not checked here."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def number_of(text: str, name: str) -> float:
 def test_the_table_has_every_row_that_was_asked_for(capfd: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bench", str(MEDIUM), "--quick"]) == 0
     text, errors = capfd.readouterr()
-    assert "\r" not in text + errors  # progress is for a terminal
+    assert "\r" not in text + errors  # progress is only shown on a terminal
     for word in ("us", "csr", "times csr", "active", "cold"):
-        assert f"\n{word:<9}  " in text.partition("two cores:")[2], word  # what it means
+        assert f"\n{word:<9}  " in text.partition("two cores:")[2], word  # its meaning
     for row in (
         "one face, 20 active",
         "one face, 60 active",

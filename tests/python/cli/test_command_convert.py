@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def convert(*arguments, stdin=b"", script=None):
-    """Run the command; with a script, in a separate process after the script."""
+    """Run the command; with a script, run it after the script in a separate process."""
     if script is None:
         return command_line.run("convert", *arguments, stdin=stdin)
     begin = f"{script}\nfrom risorius.cli import main; import sys; sys.exit(main())"
@@ -85,14 +85,14 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     lines = words(done).splitlines()
     assert done.returncode == 0
     assert all(line.startswith("risorius: warning: ") for line in lines)
-    # The layers after 2.3 in the format's table that are not empty in this file.
+    # Layers that came after 2.3 in the format's table and that are not empty in this file.
     named = [line.split("has no layer ")[1].split(";")[0] for line in lines]
     assert named == ["rbfb", "rbfe", "jbmd", "twsw", "mlbe"]
     assert "twsw" in risorius.load(out).layers
 
 
 def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
-    """Joint groups of this file read controls of networks, which 2.1 does not have."""
+    """Joint groups of this file read controls of networks, which version 2.1 lacks."""
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)
@@ -182,7 +182,7 @@ def test_coordinates_are_those_asked_for(tmp_path):
     arguments = "--axes right front up --translation-unit m --rotation-unit radians --winding cw"
     done = convert(GOLDEN / "tiny_v22.dna", out, *arguments.split())
     assert done.returncode == 0
-    assert "risorius: 2.2 becomes 2.8" in words(done).splitlines()  # 2.2 cannot say the winding
+    assert "risorius: 2.2 becomes 2.8" in words(done).splitlines()  # 2.2 lacks the winding
     old, new = risorius.load(GOLDEN / "tiny_v22.dna"), risorius.load(out)
     assert old.coordinate_system == ("right", "up", "front")
     assert new.coordinate_system == ("right", "front", "up")
@@ -238,7 +238,7 @@ def test_the_input_is_only_replaced_by_force(tmp_path):
     assert risorius.load(path).lod_count == 1
     other = tmp_path / "other.dna"
     other.write_bytes(b"anything")
-    assert convert(path, other).returncode == 0  # another file is replaced as users expect
+    assert convert(path, other).returncode == 0  # other existing files are replaced
 
 
 FULL = (
@@ -365,7 +365,7 @@ def test_malformed_golden_files(name, said, tmp_path):
         return
     assert (done.returncode, words(done)) == (0, "")
     assert convert(text, tmp_path / "again.dna").returncode == 0
-    length = 4330  # of core.dna; what follows the layers is no content
+    length = 4330  # bytes of core.dna's layers; bytes after them are not read
     assert (tmp_path / "again.dna").read_bytes() == source.read_bytes()[:length]
 
 

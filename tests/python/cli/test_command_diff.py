@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius info --diff`: everything that differs is said, in words, and only that."""
+"""The command `risorius info --diff` describes every difference in words, and nothing else."""
 
 import copy
 import json
@@ -36,9 +36,9 @@ def texts(a, b):
     return [d.text for d in compare(a, b)]
 
 
-# ---- the property: what differs is never called the same
+# ---- files that differ are never reported as equal
 
-# Word that the description of each property must contain; otherwise the last word of its name.
+# A word that the description of each property must contain; default: last word of its name.
 WORDS = {
     "archetype": "archetype",
     "metadata": r"metadata key",
@@ -118,7 +118,7 @@ for kind in ("twist", "swing"):
 
 
 def words_for(name):
-    """The longest entry that begins the name; a field of its own words otherwise."""
+    """The word of the longest entry that fits; otherwise the last word of the name."""
     fitting = [key for key in WORDS if name == key or (name.startswith(key) and key in name)]
     if fitting:
         return WORDS[max(fitting, key=len)]
@@ -126,8 +126,8 @@ def words_for(name):
 
 
 def tells(difference, name):
-    """Whether a difference names a property, its parent or its content."""
-    # Where the lists begin that the joints and weights of the vertices are.
+    """Whether a difference names a property, its parent or a part of it."""
+    # Joints and weights of vertices are reported at skin_offsets.
     field = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", difference.field)
     name = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", name)
     related = field == name or name.startswith(field + ".") or field.startswith(name + ".")
@@ -135,26 +135,26 @@ def tells(difference, name):
 
 
 def every_change(dna):
-    """Each change of one field that gives another file: (path, changed rig)."""
+    """Every change of one field that changes the file: (path of the field, changed rig)."""
     base = dna.to_bytes()
     for path, value in fields(dna):
         for other in others(value):
             try:
                 out = changed(dna, path, other)
                 data = out.to_bytes()
-            except (ValueError, TypeError):  # of another length, or it fits nothing
+            except (ValueError, TypeError):  # a wrong length, or an impossible value
                 continue
             if data != base:
                 yield path, risorius.load(data)
 
 
 RIGS = {"full": full, "tiny": lambda: risorius.load(GOLDEN / "tiny_v28.dna")}
-# The small golden has the fields of `full` in more structs: four changes of each field will do.
+# The small golden file has the fields of `full` in more structs, so four changes per field suffice.
 MOST = {"full": sys.maxsize, "tiny": 4}
 
 
 def spread_changes(dna, most):
-    """A limited number of changes of each field, spread over the field: (name, changed rig)."""
+    """Up to `most` changes of each field, spread over its values: (name, changed rig)."""
     changes = {}
     for path, other in every_change(dna):
         changes.setdefault(name_of(path), []).append(other)
@@ -175,7 +175,7 @@ def test_every_change_of_every_field_is_said(which):
             missed.append(name)
     assert missed == []
     names = {name_of(path) for path, value in fields(dna)}
-    # Structs have no words of their own: their fields have.
+    # Structs have no text of their own; their fields have.
     structs = {name for name in names if any(other.startswith(name + ".") for other in names)}
     empty = {name_of(path) for path, value in fields(dna) if hasattr(value, "__len__")
              and not len(value)}  # fmt: skip
@@ -187,7 +187,7 @@ def test_every_change_of_every_field_is_said(which):
 
 @pytest.mark.filterwarnings("ignore")
 def test_changes_go_through_the_front_door(tmp_path, capsys):
-    """One change of each layer as files, as JSON and with the exit code of diff."""
+    """One change per layer, through files, JSON and the exit code of diff."""
     dna, seen = full(), set()
     a = saved(dna, tmp_path / "a.dna")
     for path, other in every_change(dna):
@@ -217,11 +217,14 @@ def test_any_two_files_of_the_collection_differ():
             assert bool(compare(a, b)) == (i != j), (FILES[i], FILES[j])
 
 
-# ---- matching by name
+# ---- matches by name
 
 
 def reordered(dna, order):
-    """The same rig with its joints in another order."""
+    """The same rig with its joints in another order.
+
+    Args: order  index of each new joint in the old list.
+    """
     out = copy.deepcopy(dna)
     new = np.argsort(order)
     out.joint_names = [dna.joint_names[i] for i in order]
@@ -260,7 +263,7 @@ def test_another_order_of_joints_is_one_line():
 
 def test_an_inserted_control_shifts_nothing():
     dna = risorius.load(GOLDEN / "medium.dna", layers=["behavior", "geometry"])
-    dna = risorius.load(dna.to_bytes())  # controls of other layers are gone with what they drove
+    dna = risorius.load(dna.to_bytes())  # without controls of other layers
     other = copy.deepcopy(dna)
     other.raw_control_names = ["CTRL_new", *dna.raw_control_names]
     other.gui_to_raw.output_indices = dna.gui_to_raw.output_indices + 1
@@ -304,7 +307,7 @@ def test_rows_and_columns_of_a_group_are_known_by_name():
     ]
 
 
-# ---- words
+# ---- texts
 
 
 def edited(**values):
@@ -315,11 +318,11 @@ def edited(**values):
 
 
 def test_joints_are_renamed_moved_and_given_other_parents():
-    # A renamed parent is still the parent.
+    # A renamed parent counts as the same parent.
     assert texts(full(), edited(joint_names=["root", "chin", "lip"])) == [
         "joint jaw_joint renamed to chin"
     ]
-    # Another place as well: known by its parent and neutral pose.
+    # The renamed joint is also moved in the list: parent and neutral pose identify it.
     swapped = reordered(edited(joint_names=["root", "chin", "lip"]), [0, 2, 1])
     assert texts(full(), swapped) == [
         "joint jaw_joint renamed to chin",
@@ -384,7 +387,7 @@ def test_deltas_are_known_by_their_vertex():
     target = other.meshes[0].blend_shape_targets[0]
     deltas = target.deltas.copy()
     deltas[1] += np.float32([0, 0.03, 0.04])
-    deltas[0] += 1  # of another vertex now: added, not changed
+    deltas[0] += 1  # a different vertex: added, not changed
     target.deltas, target.vertex_indices = deltas, [2, 1, 3]
     assert texts(full(), other) == [
         "mesh head: 1 delta of channel open changed by 0.5 mm, 1 added, 1 removed"
@@ -462,7 +465,7 @@ def test_bytes_that_no_layer_reads_are_not_passed_over(tmp_path):
 
 
 def test_what_words_miss_is_said_all_the_same():
-    """The dictionary of metadata hides a duplicate key."""
+    """The dictionary of metadata hides a duplicate key, so no property differs."""
     facts = json.loads(full().to_json())
     facts["desc1.1"]["metadata"].insert(0, ["a", "hidden"])
     twice = risorius.Dna.from_json(json.dumps(facts))
@@ -470,7 +473,7 @@ def test_what_words_miss_is_said_all_the_same():
     assert texts(full(), twice) == ["something differs that has no words here"]
 
 
-# ---- the command
+# ---- the command itself
 
 
 def test_lists_are_shortened_unless_all_is_asked_for(tmp_path):
@@ -525,7 +528,7 @@ def test_the_help_says_what_the_exit_codes_mean():
 
 
 def test_random_bytes_that_can_still_be_read_are_never_the_same(tmp_path):
-    """A patched byte that changes the result of reading is always reported."""
+    """A changed byte that changes the content is always reported."""
     data = saved(full(), tmp_path / "a.dna").read_bytes()
     base = risorius.load(data)
     random = np.random.default_rng(7)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options named in messages of commands exist."""
+"""All options that messages of commands name exist."""
 
 import argparse
 import ast
@@ -11,7 +11,7 @@ import risorius.cli
 
 ROOT = Path(risorius.cli.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
-# Modules that are a part of a command of another name.
+# Modules that belong to commands of other names.
 PARTS = {
     "eval_clip": ["eval"],
     "diff": ["info"],
@@ -19,12 +19,13 @@ PARTS = {
     "ranges": ["clip"],
     "files": ["convert", "edit"],
     "onto": ["author"],
+    "conform": ["author"],
 }
 
 
 @pytest.fixture(scope="module")
 def options(monkeypatch_module):
-    """Command -> the options that it and its parts have."""
+    """Command -> its options, including options of its subcommands."""
     parsers = []
     monkeypatch_module.setattr(
         argparse.ArgumentParser, "parse_known_args", lambda self, _: parsers.append(self)
@@ -54,7 +55,7 @@ def _options(parser):
 
 
 def _named(path):
-    """Options that the error sentences of a module name."""
+    """Options in the texts of a module's raise statements."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Raise):
             for text in ast.walk(node):

@@ -24,7 +24,7 @@ from risorius.plot.drawing import shade, skeleton
 FILES = sorted(path for path in GOLDEN.glob("*.dna"))
 NAMES = [path.stem for path in FILES]
 
-# Joint names in files of MetaHumans.
+# Joint names of MetaHuman files -> their regions.
 JOINTS = {
     "FACIAL_C_ForeheadSkin": "forehead, brow",
     "FACIAL_R_12IPV_ForeheadOut31": "forehead, brow",
@@ -82,7 +82,7 @@ def test_majority_of_a_group():
 
 
 def chain(**changes) -> risorius.Dna:
-    """Two joints one above the other, and a third that hangs from the second; children first."""
+    """A chain of three joints, children first: root, middle above it, tip on the middle."""
     dna = risorius.Dna()
     dna.rotation_unit, dna.coordinate_system = "degrees", ("right", "up", "front")
     dna.joint_names = ["tip", "middle", "root"]
@@ -95,7 +95,7 @@ def chain(**changes) -> risorius.Dna:
 
 
 def test_world_positions_of_a_known_chain():
-    # A quarter turn about z takes the root's x to y; one about x leaves x where it is.
+    # A quarter turn about z maps the root's x to y; a quarter turn about x keeps x.
     expected = [[10, 25, 30], [10, 22, 30], [10, 20, 30]]
     np.testing.assert_allclose(skeleton.world_positions(chain()), expected, atol=1e-5)
 
@@ -112,7 +112,7 @@ def test_world_positions_honour_the_unit_and_the_signs():
     [("xyz", [0, 0, -1]), ("yxz", [0, 0, -1]), ("zxy", [0, 1, 0]), ("xzy", [0, 1, 0])],
 )
 def test_world_positions_honour_the_sequence(sequence, place):
-    # x turned about y goes to -z, about z to y, about x stays: by hand, z after y and y after z.
+    # Calculated by hand: rotation about y maps x to -z, about z to y, and about x keeps it.
     dna = chain(
         rotation_sequence=sequence,
         neutral_joint_translations=np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0]], np.float32),
@@ -172,7 +172,7 @@ def test_networks_and_poses_are_counted_from_the_bytes():
     whole = head + index + mlbh + rbfe
     assert layers.read_extras(whole) == layers.Extras(2, 1, 3)
     for cut in range(at, len(whole)):
-        layers.read_extras(whole[:cut])  # a damaged layer counts less, and nothing is raised
+        layers.read_extras(whole[:cut])  # a truncated layer counts fewer bytes, without an error
 
 
 @pytest.mark.parametrize("name", ["core", "medium", "tiny_v22", "units"])
@@ -218,7 +218,7 @@ def test_the_nearer_triangle_hides_the_farther():
         shade.Surface(points, normals, triangles[1:], paint), (0, 4, 0, 4), 40, smooth=1
     )
     assert picture[35, 5, 0] > 3 * back[35, 5, 0] > 0
-    # The lower left half is covered, the rest is void.
+    # The lower left half is covered by the triangle, the rest is transparent.
     covered = picture[..., 3] == 255
     assert abs(covered.mean() - 0.5) < 0.03
     assert covered[38, 1]

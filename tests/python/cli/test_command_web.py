@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius web`: content of the page, and refusals.
+"""The command `risorius web`: contents of the page, and refusals.
 
 packaging/ship/web.sh --check tests the page in a browser."""
 
@@ -40,7 +40,7 @@ def _empty_page(monkeypatch):
 
 
 def parts(page):
-    """Content of a page: the table, and the bytes of its elements by name."""
+    """The parts of a page: the face table, and the bytes of the other elements by name."""
     found = {}
     for name, text in ELEMENT.findall(page.decode()):
         found[name] = text
@@ -50,7 +50,7 @@ def parts(page):
 
 
 def unpacked(table, data):
-    """The lists of each mesh, as native/web/geometry.js reads them."""
+    """The arrays of each mesh, decoded as in native/web/geometry.js."""
     meshes, at = [], 0
     for about in table["meshes"]:
         own = dict(about)
@@ -72,7 +72,10 @@ def unpacked(table, data):
 
 
 def same_mesh(own, mesh, size):
-    """To the steps that the page writes; the order of corners and weights is the page's."""
+    """Check a mesh of the page against the DNA file's, within the page's quantisation.
+
+    The order of corners and weights may differ.
+    """
     positions = own["positions"].reshape(3, -1).T
     np.testing.assert_allclose(positions, mesh.positions, atol=size * 2**-17)
     corners = own["source"][own["corners"]]
@@ -105,7 +108,7 @@ def test_the_page_holds_the_face_and_each_raw_control_once(tmp_path, capsys):
     page = out.read_bytes()
     table, inside = parts(page)
     dna = risorius.load(MEDIUM)
-    # The page evaluates the file without its meshes, which are stored separately in fewer bytes.
+    # The page contains the DNA file without meshes; meshes are stored separately, in fewer bytes.
     rig_alone = risorius.load(MEDIUM, layers=pages.RIG)
     assert risorius.load(inside["face"]).to_json() == rig_alone.to_json()
     packed = unpacked(table, inside["geometry"])
@@ -151,7 +154,7 @@ def test_a_clip_and_its_sound_come_along(tmp_path):
 
 
 def painted(folder):
-    """A face with pictures: skin, an eye, hair with opacity, a wrinkle with its mask, odd names."""
+    """A face with textures: skin, eye, hair with opacity, a wrinkle map, its mask, odd names."""
     dna = risorius.load(MEDIUM)
     head, eye, hair = (f"{part}_lod0_mesh" for part in ("head", "eyeLeft", "hair"))
     dna.mesh_names = [head, eye, hair, *(f"other{i}" for i in range(3, len(dna.mesh_names)))]

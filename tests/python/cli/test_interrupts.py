@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Ctrl-C, a full disk and a closed pipe end a command with a sentence and leave no file.
+"""Ctrl-C, a full disk and a closed pipe end a command with one sentence and leave no file.
 
-Each command reads a named pipe instead of an input file. When the other end opens, the command is
-at work, on a busy machine too.
+Each command reads a named pipe instead of an input file. When the pipe's other end can be opened,
+the command has started its work, even on a busy machine.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with n
 
 
 def started(arguments, folder):
-    """A command in a folder, waiting for the pipe among its arguments; the pipe's other end."""
+    """Start a command that reads a pipe. Returns the process, the pipe's open end, and its path."""
     name = next(a for a in arguments if a.startswith("in."))
     os.mkfifo(folder / name)
     process = subprocess.Popen(
@@ -39,7 +39,7 @@ def started(arguments, folder):
     )  # fmt: skip
     while True:
         assert process.poll() is None, process.communicate()[1]
-        with contextlib.suppress(OSError):  # nobody reads yet
+        with contextlib.suppress(OSError):  # the command has not opened the pipe
             pipe = os.open(folder / name, os.O_WRONLY | os.O_NONBLOCK)
             return process, open(pipe, "wb", buffering=0), folder / name
         time.sleep(0.01)

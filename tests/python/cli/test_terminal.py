@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every command shows names of a file without control sequences for the terminal."""
+"""All commands print names from files without control sequences of the terminal."""
 
 import io
 import json
@@ -17,7 +17,7 @@ SPELLED = "\\x1b[2J\\x1b]0;title\\x07\\x9b31m\\u202egnp.exe\\x0d"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A face, a clip, a table and a mapping with terminal escape sequences in names."""
+    """A folder with a face, a clip, a table and a mapping whose names contain escape sequences."""
     folder = tmp_path_factory.mktemp("evil")
     facts = json.loads(risorius.load(GOLDEN / "core.dna").to_json())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of shapes: known names of each vocabulary, and their meaning."""
+"""Vocabularies of shape names: which names each one contains, and their meanings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LISTS = tomllib.loads(
 
 
 def spelled(kind):
-    """The names of a list, written in full."""
+    """All names of a list, with alternatives in braces expanded."""
     out = []
     for word in LISTS[kind]["names"].split():
         parts = re.split(r"\{([^}]*)\}", word)
@@ -31,7 +31,8 @@ def spelled(kind):
     return out
 
 
-# Number of names; names known to `author` by words alone, and to clips by their best mapping.
+# Numbers of all names; of names that `author` recognises by words alone; of names that the best
+# mapping for clips contains.
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),
@@ -85,7 +86,7 @@ def test_arkit_is_known_in_all_spellings(spelling, before):
 
 def test_the_names_beside_it_say_what_a_name_means():
     alone = vocabulary.find("BrowDownLeft")
-    assert set(alone.controls) == {"CTRL_expressions.browDownL"}  # ARKit's, as Unreal spells it
+    assert set(alone.controls) == {"CTRL_expressions.browDownL"}  # ARKit's in Unreal's spelling
     unified = vocabulary.leading(spelled("unified"))
     beside = vocabulary.find("BrowDownLeft", unified)
     assert set(beside.controls) == {"CTRL_expressions.browDownL", "CTRL_expressions.browLateralL"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conversion of coordinate systems and units against matrices, the reference, and evaluation."""
+"""Conversion of axes and units, compared with matrices, the reference and evaluated poses."""
 
 import gzip
 import itertools
@@ -16,8 +16,8 @@ from coordinates_oracle import System
 
 EPS = float(np.finfo(np.float32).eps)
 FILES = ["tiny_v28", "units", "quatjoints", "medium"]
-# Bound of the rotation error from rounding Euler angles to float32; chains of joints add up to
-# DEPTH errors.
+# Bound of the rotation error from rounding Euler angles to float32; a chain of joints sums DEPTH
+# errors.
 ANGLE = 180 * EPS * np.pi / 180
 DEPTH = 40
 
@@ -34,7 +34,7 @@ def targets(count, seed):
 
 
 def keeping_order(source, count, seed):
-    """Random targets whose sequence turns the same axes in the same order."""
+    """Random target systems whose rotation sequence keeps the order of the axes."""
     rng = np.random.default_rng(seed)
     out = []
     while len(out) < count:
@@ -109,7 +109,7 @@ def test_positions_normals_and_deltas_map(name):
 
 
 def signed_faces(mesh):
-    """Per face the sign of its normal by cross product along the mean of its corners' normals."""
+    """For each face the sign of its winding relative to the mean of its corner normals."""
     out = []
     offsets = mesh.face_offsets.tolist()
     for begin, end in itertools.pairwise(offsets):
@@ -138,11 +138,11 @@ def test_faces_turn_with_handedness_and_winding(name):
             assert kept == (mirrored == (same == -1))
 
 
-# ---- poses
+# ---- evaluated poses
 
 
 def raw_controls(dna, rng):
-    """Random, but rotations at rest: converted files mean them in the new axes."""
+    """Random raw controls; rotations are at rest, because their axes depend on the system."""
     raw = rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
     for i, name in enumerate(dna.raw_control_names):
         part = name.rpartition(".")[2]
@@ -152,20 +152,22 @@ def raw_controls(dna, rng):
 
 
 def assert_pose_maps(dna, converted, raw, lod):
-    """Compare world matrices of posed joints, and all other outputs bit for bit except those of
-    solvers."""
+    """Compare the world matrices of posed joints and all other outputs of two rigs.
+
+    Without solvers, other outputs must be equal bit for bit.
+    """
     source, target = oracle.system_of(dna), oracle.system_of(converted)
     before = risorius.Rig(dna).evaluate(raw, lod=lod)
     after = risorius.Rig(converted).evaluate(raw, lod=lod)
     for field in ("blend_shapes", "animated_maps", "controls"):
-        tolerance = 1e-5 if dna.rbf_behavior.solvers else 0  # dot products in another order
+        tolerance = 1e-5 if dna.rbf_behavior.solvers else 0  # other order of sums
         assert np.abs(getattr(before, field) - getattr(after, field)).max(initial=0) <= tolerance, (
             field
         )
     world = oracle.world_matrices(dna, before.joints)
     expected = oracle.mapped_world(source, target, world)
     result = oracle.world_matrices(converted, after.joints)
-    # Angles of up to MANY degrees are float32 sums of some hundred products.
+    # Angles of up to MANY degrees are float32 sums of about a hundred products.
     size = max(180.0, float(np.abs(before.joints).max())) / 180
     assert np.abs(result - expected).max() <= 100 * size * ANGLE * size_of(expected)
 
@@ -175,7 +177,7 @@ def test_every_pose_maps_where_the_order_of_rotation_stays(name):
     dna = load(name)
     dna.joint_behavior_metadata.joint_representations = np.zeros((0, 3), np.uint16)
     for solver in dna.rbf_behavior.solvers:
-        solver.solver_type = 0  # of two equal targets interpolation has no answer
+        solver.solver_type = 0  # interpolation between two equal targets is undefined
     rng = np.random.default_rng(5)
     for target in keeping_order(oracle.system_of(dna), 6, 6):
         converted, found = caught(dna, **target.arguments())
@@ -185,7 +187,7 @@ def test_every_pose_maps_where_the_order_of_rotation_stays(name):
 
 
 def random_rig(seed, joints=7, raw=5):
-    """Joints with bent neutral poses in a chain; every control drives all attributes of one."""
+    """A chain of joints with rotated neutral poses; controls drive all attributes of one."""
     rng = np.random.default_rng(seed)
     dna = risorius.Dna(
         lod_count=1,
@@ -203,7 +205,7 @@ def random_rig(seed, joints=7, raw=5):
 
 
 def with_group(dna, rng, joints):
-    """One group: the nine rows of each joint in a random order, one column per raw control."""
+    """Add one joint group: nine rows per joint in random order, one column per raw control."""
     raw = len(dna.raw_control_names)
     outputs = rng.permutation(np.concatenate([np.arange(9) + 9 * j for j in joints]))
     values = rng.uniform(-1, 1, (len(outputs), raw))
@@ -253,7 +255,7 @@ def test_quaternion_joints_map_for_all_controls_at_once(seed):
     c = oracle.change(source, target)
     expected = oracle.mapped_rotation(c, oracle.rotation(source, before[:, 3:6]))
     result = oracle.rotation(target, after[:, 3:6])
-    # The evaluator's own arc sine costs the root of eps near the pole.
+    # The evaluator's arc sine has an error of about sqrt(EPS) near the pole.
     assert np.abs(result - expected).max() <= 4 * np.sqrt(EPS)
     np.testing.assert_allclose(
         after[:, :3],
@@ -264,7 +266,7 @@ def test_quaternion_joints_map_for_all_controls_at_once(seed):
 
 
 def converted_columns(dna, target):
-    """{(group, output, input): value} of joint matrices converted column by column."""
+    """Joint matrices converted column by column: {(group, output, input): value}."""
     source = oracle.system_of(dna)
     c, unit = oracle.change(source, target), oracle.scale_of_unit(source, target)
     out = []
@@ -306,11 +308,11 @@ def test_joint_matrices_convert_column_by_column(name):
                 np.testing.assert_allclose(result, rotations, rtol=0, atol=4 * size * EPS)
 
 
-# ---- rotations that controls carry
+# ---- rotations in raw controls
 
 
 def matrix_of(q):
-    """Row-vector matrix of a quaternion by turning the axes: v' = q v conjugate(q)."""
+    """The row-vector matrix of a quaternion, from rotated axes: v' = q v conjugate(q)."""
     q = np.asarray(q, float)
     conjugate = q * (-1, -1, -1, 1)
     product = oracle_behavior.multiply
@@ -336,7 +338,7 @@ def test_targets_and_twist_axes_of_controls_map(axes):
         for q, mapped in zip(old, new, strict=True):
             expected = oracle.mapped_rotation(c, matrix_of(q))
             assert np.abs(matrix_of(mapped) - expected).max() <= 4 * EPS
-            assert mapped[3] == q[3]  # the same of the two quaternions, for Euclidean distances
+            assert mapped[3] == q[3]  # of q and -q the same one
             expected = oracle.mapped_rotation(c, matrix_of(twist_of(q, before.twist_axis)))
             twist = matrix_of(twist_of(mapped, after.twist_axis))
             assert np.abs(twist - expected).max() <= 8 * EPS
@@ -362,7 +364,7 @@ def test_radii_follow_the_rotation_unit():
         assert after.radius == pytest.approx(np.radians(before.radius), rel=EPS)
 
 
-# ---- identity, there and back, errors
+# ---- unchanged systems, round trips, errors
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -378,7 +380,7 @@ def test_its_own_system_changes_no_bit(name):
 def test_places_and_signs_come_back_exactly(name):
     dna = load(name)
     source = oracle.system_of(dna)
-    # Bytes, and -0 is written as 0.
+    # The same file, with -0 written as 0.
     fresh = json.loads(dna.to_json().replace("-0.0,", "0.0,"))
     for target in keeping_order(source, 12, 8):
         arguments = target.arguments()
@@ -471,7 +473,7 @@ def test_the_source_is_left_alone_and_the_result_can_be_saved():
     assert np.array_equal(again.meshes[0].positions, converted.meshes[0].positions)
 
 
-# ---- the reference
+# ---- comparison with the reference
 
 
 def golden(folder, name, tag):
@@ -491,10 +493,10 @@ def close_angles(system, actual, expected):
 
 
 def check_groups(system, groups, expected):
-    """The same numbers per output and input, where the reference keeps them.
+    """Check that joint matrices equal the reference's where the reference keeps the numbers.
 
-    The reference spreads a joint over nine rows in all LODs that used any of it, and loses the
-    signs of scales; here a row stays in its LODs.
+    The reference spreads a joint over nine rows in all LODs that use any of them, and loses the
+    signs of scales. Here each row keeps its LODs.
     """
     assert len(groups) == len(expected)
     for group, wanted in zip(groups, expected, strict=True):
@@ -533,7 +535,7 @@ def check_meshes(meshes, expected):
 
 
 def check_solvers(dna, converted, expected):
-    """Targets up to the quaternion's sign. Twist axes stay in the reference; here they turn."""
+    """Compare targets up to the quaternion's sign. The reference does not convert twist axes."""
     c = oracle.change(oracle.system_of(dna), oracle.system_of(converted))
     for before, solver, wanted in zip(
         dna.rbf_behavior.solvers, converted.rbf_behavior.solvers, expected, strict=True

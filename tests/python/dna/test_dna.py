@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading, checking and writing DNA files."""
+"""DNA files: reading, checking and writing."""
 
 import copy
 import json
@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def small():
-    """A hand-made file with every typed layer, built through the public classes."""
+    """A face with every typed layer, built by hand through the public classes."""
     dna = risorius.Dna(name="small", lod_count=1, gender="female", age=30)
     dna.coordinate_system = ("right", "up", "front")
     dna.metadata = {"licence": "CC0-1.0"}
@@ -174,7 +174,7 @@ def test_wrong_shapes_and_ranges_name_the_field():
 def test_every_prefix_is_an_error_with_an_offset():
     for minor in (1, 8):
         data = small().to_bytes(version=f"2.{minor}")
-        whole = len(data) - (3 if minor == 1 else 0)  # the end mark is only missed with a warning
+        whole = len(data) - (3 if minor == 1 else 0)  # a missing end mark gives only a warning
         for length in range(whole):
             with pytest.raises(risorius.DnaError) as caught:
                 risorius.load(data[:length])
@@ -183,7 +183,7 @@ def test_every_prefix_is_an_error_with_an_offset():
 
 
 def test_every_patched_byte_is_read_or_refused():
-    """No crash; every accepted file can be written and evaluated."""
+    """No byte causes a crash; every accepted file can be written and evaluated."""
     data = small().to_bytes()
     refused = 0
     for at in range(len(data)):
@@ -257,7 +257,7 @@ def test_info_prints_for_people_and_programs(tmp_path):
         np.diff(m.face_offsets).size for m in dna.meshes
     ]
     cut = tmp_path / "cut.dna"
-    cut.write_bytes(dna.to_bytes(version="2.1", unknown_layers="ignore")[:-1])  # of the end's mark
+    cut.write_bytes(dna.to_bytes(version="2.1", unknown_layers="ignore")[:-1])  # end mark cut
     facts = json.loads(run("info", "--json", cut).stdout)
     assert facts["warnings"] == risorius.load(cut).warnings != []
     bad = tmp_path / "bad.dna"
@@ -269,9 +269,9 @@ def test_info_prints_for_people_and_programs(tmp_path):
     assert run("info").returncode == 2
 
 
-# ---- extras: the reference's own fixtures, where they are
+# ---- the reference's fixtures, if they are present
 
-FIELDS = {  # of raw_v28.decoded.json -> ours
+FIELDS = {  # field of raw_v28.decoded.json -> attribute of Dna
     "desc1.1": {"name": "name", "age": "age", "lodCount": "lod_count", "dbName": "db_name"},
     "defn1.1": {
         "guiControlNames": "gui_control_names",

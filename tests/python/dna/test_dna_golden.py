@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every layer, partial load and LOD filter against the values of the reference's reader."""
+"""Complete, partial and LOD-filtered loads, compared with values of the reference's reader."""
 
 import copy
 import zlib
@@ -23,7 +23,7 @@ MASKS = {
     131: ["joint_behavior_metadata"],
     259: ["twist_swing_behavior"],
 }
-# Long lists may be given as digests. They have no names, which a filtered load is compared by.
+# Files without digests: filtered loads are compared by name, which digests lack.
 FILES = sorted(
     p.name
     for p in GOLDEN_SET.glob("*.decode.*")
@@ -48,7 +48,7 @@ def load(folder, golden, name):
 
 
 def comparable(view, dna):
-    """Remove values that the reference derives or makes up for older files."""
+    """Remove values that the reference computes, or invents for older files."""
     view = copy.deepcopy(view)
     view.pop("load", None)
     view.pop("ok", None)
@@ -59,9 +59,9 @@ def comparable(view, dna):
         for derived in ("blendShapeChannelOutputIndices", "animatedMapOutputIndices"):
             pose.pop(derived, None)
     if dna.version < 6 or not dna.machine_learned_behavior_ext.types:
-        # The reference makes operations up from the networks.
+        # The reference derives operations from the networks.
         view["machineLearnedBehaviorExt"]["types"] = []
-    if dna.version < 5:  # so are pose controls from the poses
+    if dna.version < 5:  # and pose controls from the poses
         view["rbfBehavior"]["poseControlNames"] = []
         for pose in view["rbfBehavior"]["poses"]:
             for made_up in [k for k in pose if "Control" in k]:
@@ -70,7 +70,7 @@ def comparable(view, dna):
 
 
 def is_digest_of(digest, values):
-    """The number, the checksum as one of the format's types, and the first four of a list."""
+    """Whether a digest fits a list: length, checksum in a type of the format, first values."""
     found = np.asarray(values).ravel()
     sums = {zlib.crc32(found.astype(kind).tobytes()) for kind in ("<f4", "<u2", "<u4", "u1")}
     head = np.float32(digest["head"])
@@ -121,11 +121,10 @@ def check(folder, name):
 
 
 def without_kept_ancestors(expected, found):
-    """Remove ancestors of kept joints, which Risorius keeps while the reference uses joint 0 as the
-    parent.
+    """Remove parents of kept joints, which Risorius keeps.
 
-    Vertices of such joints are left out, because the reference assigns their weights to other
-    joints.
+    The reference uses joint 0 as the parent instead and assigns weights of such joints to other
+    joints, so their vertices are not compared.
     """
     joints = found["joints"]
     extra = [name for name in joints if name not in expected["joints"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A Dna as JSON: the format's own names, and no bit lost."""
+"""Dna as JSON: the names of the format, and no loss of bits."""
 
 import json
 
@@ -35,21 +35,21 @@ def test_the_standard_library_reads_the_numbers_of_the_file():
         np.float32([mesh["positions"][axis] for axis in ("xs", "ys", "zs")]).T,
         dna.meshes[0].positions,
     )
-    # A file written by the standard library in another order loses nothing either.
+    # A file that the standard library wrote in another order loses nothing either.
     shuffled = json.dumps(facts, sort_keys=True, separators=(",", ":"))
     assert risorius.Dna.from_json(shuffled).to_bytes() == dna.to_bytes()
 
 
 @pytest.mark.parametrize("minor", range(1, 9))
 def test_extra_the_names_are_those_of_the_format(minor):
-    """Against an independent parser's decode; it has no index, and writes floats in full."""
+    """Compared with an independent parser, which has no index and writes all digits."""
     require_extra(FIXTURES, "the reference's fixtures")
     facts = json.loads((FIXTURES / f"raw_v2{minor}.decoded.json").read_text())
     ours = json.loads(risorius.load(FIXTURES / f"raw_v2{minor}.dna").to_json())
     for key, layer in facts.items():
         if key[:4] in ("desc", "defn", "bhvr", "geom", "mlbh", "mlbe", "rbfb", "rbfe", "jbmd",
                        "twsw", "dsce"):  # fmt: skip
-            if minor == 7:  # the layer's second version brings it
+            if minor == 7:  # this field came with the layer's second version
                 ours[key].pop("faceWindingOrder", None)
             assert as_floats(ours[key]) == as_floats(layer), key
 

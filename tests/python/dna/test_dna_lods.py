@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""LOD filters: the result is a complete file that looks and moves like the original."""
+"""LOD filters: the result is a complete file with the meshes and motion of the original."""
 
 import numpy as np
 import pytest
@@ -14,9 +14,9 @@ def mapping(rows):
 
 
 def many_lods(count):
-    """A face with one joint, channel, map and mesh for each LOD, and their controls.
+    """A face with one joint, channel, map and mesh per LOD, and their controls.
 
-    LOD l lists the joints l and up, the channel and map l, and mesh l.
+    LOD l lists the joints from l on, channel l, map l and mesh l.
     """
     import json
 
@@ -33,7 +33,7 @@ def many_lods(count):
     dna.mesh_names = [f"mesh{i}" for i in range(count)]
     dna.mesh_blend_shape_channel_mapping = [[i, i] for i in range(count)]
     dna.joint_row_count, dna.joint_column_count = 9 * count, 1
-    # The rows of LOD l come first in the order of the highest LOD that needs them.
+    # The highest LOD's rows come first, because each LOD uses the leading rows.
     order = list(range(count))[::-1]
     dna.joint_groups = [
         risorius.JointGroup(
@@ -131,7 +131,7 @@ def test_any_number_of_lods(count):
     last = count - 1
     part = risorius.load(data, lods=[last])
     assert (part.lod_count, part.max_lod) == (1, last)
-    # The root stays, or the last joint would hang in the air.
+    # The root stays as the parent of the last joint.
     assert part.joint_names == [f"joint{i}" for i in sorted({0, last})]
     assert part.joint_parents.tolist() == [0] * len(part.joint_names)
     assert part.blend_shape_channel_names == [f"channel{last}"]
@@ -172,13 +172,13 @@ def test_a_selection_that_makes_no_sense_is_refused(lods):
 
 
 def test_lods_past_the_last_are_passed_over_and_repeats_count_once():
-    """As in the format's own filter; repeats there count too much."""
+    """As in the reference's filter, which however counts repeated LODs several times."""
     whole = risorius.load(GOLDEN / "core.dna")
     assert whole.filter_lods((1, 65535)).to_bytes() == whole.filter_lods([1, 1]).to_bytes()
     assert whole.filter_lods([1, 0]).to_bytes() == whole.to_bytes()
 
 
-# ---- extras: what the reference says of its own fixture, as facts (the fixtures' README)
+# ---- facts about the reference's fixture (see the fixtures' README)
 
 
 def test_extra_the_references_fixture_by_lod_1():
@@ -206,8 +206,8 @@ def test_extra_the_references_fixture_by_lod_1():
         dna.joint_groups[1].values.ravel(), np.float32(np.arange(1, 11) / 100)
     )
     maps = dna.animated_maps
-    # Its first six entries drive AA AB AB AC AD AD, of which AC is left: the reference keeps the
-    # old numbers 0 1 1 2 3 3, which now name other maps.
+    # The first six entries drive AA AB AB AC AD AD; only AC remains. The reference keeps the old
+    # indices 0 1 1 2 3 3, which now mean other maps.
     assert maps.lods.tolist() == [1]
     assert maps.conditionals.output_indices.tolist() == [0]
     (mesh,) = dna.meshes
@@ -215,7 +215,7 @@ def test_extra_the_references_fixture_by_lod_1():
     np.testing.assert_allclose(mesh.skin_weights, [0.1, 0.3, 0.6, 1, 1], rtol=1e-6)
     (target,) = mesh.blend_shape_targets
     assert len(target.vertex_indices) == 3
-    assert target.blend_shape_channel_index == 0  # BC; the reference leaves the old number 2
+    assert target.blend_shape_channel_index == 0  # BC; the reference keeps the old index 2
     ml = dna.machine_learned_behavior
     assert [n.input_indices.tolist() for n in ml.neural_networks] == [[8, 0], [4, 7]]
     assert [n.output_indices.tolist() for n in ml.neural_networks] == [[13], [14]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Saving: whatever goes wrong, the file is the whole old one or the whole new one."""
+"""Saving: after any failure the file is either the complete old one or the complete new one."""
 
 import os
 import stat
@@ -46,14 +46,14 @@ def test_a_read_only_folder_leaves_the_old_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
     tmp_path.chmod(0o555)
-    # Root can write everywhere, so run the child as the user nobody if possible.
+    # Root may write everywhere, so the child runs as the user nobody if possible.
     script = (
         "import os, sys, risorius\n"
         "dna = risorius.load(sys.argv[1]); dna.name = 'new'\n"
         "if os.getuid() == 0: os.setgid(65534); os.setuid(65534)\n"
         "try:\n    dna.save(sys.argv[1])\nexcept risorius.DnaError as e:\n    print(e.code, e)\n"
     )
-    # The user nobody must be able to reach the folder.
+    # The user nobody needs access to the folder.
     for folder in tmp_path.parents:
         if folder.stat().st_uid == os.getuid() and folder.name.startswith("pytest-"):
             folder.chmod(folder.stat().st_mode | 0o055)
@@ -70,7 +70,7 @@ def test_a_read_only_folder_leaves_the_old_file(tmp_path):
 def test_a_kill_in_the_middle_leaves_one_whole_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
-    # Two files of some megabytes in turn, until the process is killed.
+    # The child alternates between two files of some megabytes until it is killed.
     script = (
         "import sys, risorius\n"
         "faces = []\n"
@@ -87,13 +87,13 @@ def test_a_kill_in_the_middle_leaves_one_whole_file(tmp_path):
             [sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, text=True
         )
         assert child.stdout.readline() == "ready\n"
-        if round_ % 2:  # also after the first whole file, however long that takes
+        if round_ % 2:  # in every second round, after the first complete file
             assert child.stdout.readline() == "saved\n"
         time.sleep(0.005 + 0.011 * round_)
         child.kill()
         child.wait()
         child.stdout.close()
-        dna = risorius.load(path)  # whole, or this raises
+        dna = risorius.load(path)  # an incomplete file would raise an error
         assert len(dna.metadata.get("k", "")) in (0, 4000000)
         seen.add(dna.metadata.get("k", "-")[0])
     assert seen & {"a", "b"}

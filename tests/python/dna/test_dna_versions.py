@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Converting every version to every version: kept layers, and warnings about others."""
+"""Conversion from every version to every version: layers that stay, warnings about the others."""
 
 import json
 import warnings
@@ -10,7 +10,7 @@ import risorius
 from conftest import GOLDEN, SHARED, require_extra
 
 FIXTURES = SHARED / "data" / "fixtures"
-# The version that brought each layer (dna-format: versions).
+# The minor version in which each layer appeared (docs: dna-format, versions).
 SINCE = {
     "desc": 1, "defn": 1, "bhvr": 1, "geom": 1, "mlbh": 3, "rbfb": 4, "jbmd": 4, "twsw": 4,
     "rbfe": 5, "mlbe": 6, "dsce": 7,
@@ -19,7 +19,7 @@ VERSIONS = range(1, 9)
 
 
 def known(minor):
-    """Layers of a version; 2.1 has four sections instead."""
+    """The layers of a version; 2.1 has four sections instead."""
     return {name for name, since in SINCE.items() if since <= max(minor, 2)}
 
 
@@ -38,7 +38,7 @@ def test_between_all_versions(source, target):
     data, words = written(dna, target)
     again = risorius.load(data)
     assert again.version == target
-    # 2.1 has four layers, other versions have all: newer layers are written for readers that know
+    # 2.1 stores four layers, other versions all: newer layers are written for readers that know
     # them.
     kept = set(dna.layers) | known(source)
     expected = known(1) if target == 1 else kept | known(target)
@@ -57,7 +57,7 @@ def test_between_all_versions(source, target):
 
 @pytest.mark.parametrize("source", range(3, 9))
 def test_what_a_lost_layer_drove_goes_with_it(source):
-    """A file of 2.1 evaluates as one whose networks and poses are at rest."""
+    """A file converted to 2.1 evaluates like its source with networks and poses at rest."""
     dna = risorius.load(GOLDEN / f"tiny_v2{source}.dna")
     data, words = written(dna, 1)
     again = risorius.load(data)
@@ -88,7 +88,7 @@ def test_what_was_not_loaded_is_not_missed_by_the_written_file(layers):
     names += len(again.rbf_behavior_ext.pose_control_names)
     for group in again.joint_groups:
         assert all(i < names for i in group.input_indices)
-    # Pose controls keep their poses: their numbers begin where the correctives end.
+    # Pose controls keep their poses: their indices start after the correctives.
     first = len(again.raw_control_names) + again.psd_count
     for old, new in zip(dna.rbf_behavior_ext.poses, again.rbf_behavior_ext.poses, strict=True):
         shift = old.output_control_indices - new.output_control_indices
@@ -101,7 +101,7 @@ def test_a_winding_that_a_version_cannot_hold_is_named(target):
     dna = risorius.load(GOLDEN / "tiny_v28.dna")
     dna.face_winding_order = "cw"
     data, words = written(dna, target)
-    if target == 7:  # the layer is known, its last field is not
+    if target == 7:  # version 7 has the layer, but not its last field
         assert risorius.load(data).face_winding_order == "ccw"
         assert [w for w in words if "dsce" in w and "winding" in w]
     else:
@@ -109,7 +109,7 @@ def test_a_winding_that_a_version_cannot_hold_is_named(target):
 
 
 def holds_something(path, name):
-    """Whether the file has more in a layer than an empty file of the newest version."""
+    """Whether a layer of the file differs from an empty file of the newest version."""
     if name == "dsce":
         dna = risorius.load(path)
         default = risorius.Dna()
@@ -119,7 +119,7 @@ def holds_something(path, name):
 
 
 def layer_bytes(data, name):
-    """A layer's bytes by the file's index (dna-format: container)."""
+    """The bytes of a layer, found through the file's index (docs: dna-format, container)."""
     count = int.from_bytes(data[7:11], "big")
     for i in range(count):
         at = 11 + 16 * i
@@ -136,7 +136,7 @@ def test_newer_layers_can_be_left_out(target):
     data, words = written(dna, target, unknown_layers="ignore")
     assert set(risorius.load(data).layers) == known(target)
     named = {w.split(":")[0] for w in words}
-    missing = set(SINCE) - known(target) - {"dsce"}  # which says nothing that is not the default
+    missing = set(SINCE) - known(target) - {"dsce"}  # the layer has only default values
     assert missing | {"abcd"} <= named <= missing | {"abcd", "behavior"}
 
 
@@ -160,7 +160,7 @@ def test_unknown_layers_are_kept_or_dropped_by_choice():
     assert risorius.load(data).unknown_layers == dna.unknown_layers
     assert risorius.load(data, unknown_layers="ignore").unknown_layers == []
     assert risorius.load(data).to_bytes() == data
-    # A newer version of a layer that is known is no error and does not replace the known one.
+    # A newer version of a known layer is accepted and does not replace the known one.
     assert len(risorius.load(data).machine_learned_behavior.neural_networks) > 0
 
 
@@ -174,7 +174,7 @@ def test_a_newer_minor_is_read_by_the_rules_of_the_newest(minor):
 
 
 def test_extra_downgraded_fixtures_hold_every_layer():
-    """Files of a newer version whose version number was lowered: no layer may get lost."""
+    """No layer gets lost in files of a newer version whose version number was lowered."""
     require_extra(FIXTURES / "raw_v28.dna", "the reference's fixtures")
     names = [f"RawV2{n}DowngradedFromV2{n + 1}" for n in range(2, 8)]
     for name in names:
@@ -185,13 +185,13 @@ def test_extra_downgraded_fixtures_hold_every_layer():
         again, words = written(dna, dna.version)
         assert again == data
         assert len(words) == len(set(newer.layers) - known(dna.version))
-        if dna.version == 7:  # whose dsce ends before the winding
+        if dna.version == 7:  # in version 7 dsce ends before the winding order
             newer.face_winding_order = "ccw"
         assert parts(dna) == parts(newer)
 
 
 def parts(dna):
-    """Everything of a file but its version and the order of its layers."""
+    """The content of a file without its version and the order of its layers."""
     facts = json.loads(dna.to_json())
     return {k: v for k, v in facts.items() if k not in ("version", "index")}
 

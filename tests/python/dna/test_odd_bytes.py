@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names in a file may be any bytes: they come out as text that goes back to the same bytes."""
+"""Names with any bytes are read as text that is written back as the same bytes."""
 
 import pytest
 import risorius

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""README's commands run as written: the test reads its blocks and runs the quick ones."""
+"""The commands in README.md: all are parsed, and the quick ones are run."""
 
 import re
 import shlex
@@ -22,12 +22,12 @@ SLOW = (
     "sample",
     "bench",
     "mix",
-)  # parsed, and tested elsewhere
+)  # only parsed here, because they are slow; other tests run them
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", (PROJECT / "README.md").read_text(), re.M | re.S)
 
 
 def lines():
-    """Commands of the shell blocks, one in each line, including continued lines."""
+    """The command lines of the README's shell blocks, with continued lines joined."""
     out = []
     for kind, text in BLOCKS:
         if kind == "bash":
@@ -39,7 +39,7 @@ def lines():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A clone after the demo, with .venv and build/demo as the working folder."""
+    """A folder like a clone after the demo: .venv, and build/demo as the working folder."""
     place = tmp_path / "build" / "demo"
     place.mkdir(parents=True)
     dna = risorius.load(GOLDEN / "core.dna")
@@ -55,7 +55,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def command(line):
-    """The words of a line without its comment, None if it is no command of Risorius."""
+    """The arguments of a command line without its comment; None if it does not call risorius."""
     words = shlex.split(line.partition("<<")[0], comments=True)
     words = words[: words.index("||")] if "||" in words else words
     return words[1:] if words[0] == "risorius" else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius.explain against the evaluator, the oracle and faces made by hand."""
+"""risorius.explain, compared with the evaluator, the oracle and faces made by hand."""
 
 import json
 
@@ -17,7 +17,7 @@ SEEDS = (1, 2)
 
 
 def some_controls(dna, rig, seed):
-    """A third of the controls on; rotations are unit quaternions."""
+    """Raw controls with about a third of them active; rotations are unit quaternions."""
     random = np.random.default_rng(seed)
     raw = np.where(random.random(len(rig.raw_control_names)) < 0.35, random.random(), 0)
     raw = (raw * random.random(len(raw))).astype(np.float32)
@@ -34,14 +34,16 @@ def some_controls(dna, rig, seed):
 
 
 def tolerance(dna, sizes):
-    """float32: 2e-5 of the summands, of a unit, and of a radian for values converted through
-    quaternions."""
+    """Allowed float32 error: 2e-5 times the sum of the parts plus one unit.
+
+    For rotations the unit is a radian, because values may be converted through quaternions.
+    """
     turn = 1.0 if dna.rotation_unit == "radians" else 57.3
     return 2e-5 * np.add(sizes, [1, 1, 1, turn, turn, turn, 1, 1, 1])
 
 
 def check_sums(dna, rig, raw, lod):
-    """Contributions add up to the pose; shares to 1; no joint that moves is left out."""
+    """Contributions sum to the pose and shares to 1; all moving joints are listed."""
     facts = explain(dna, rig, raw, lod=lod)
     pose = rig.evaluate(raw, lod=lod)
     moving = set(np.flatnonzero(np.any(pose.joints != 0, axis=1)).tolist())
@@ -88,7 +90,7 @@ def test_extra_full_scale():
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 def test_what_fires_is_what_the_oracle_says(file):
-    """Correctives, channels and maps that are on, by an evaluator that shares no code."""
+    """Active correctives, channels and maps equal those of an evaluator that shares no code."""
     dna = risorius.load(file)
     rig = risorius.Rig(dna)
     raw = some_controls(dna, rig, 1)
@@ -135,7 +137,7 @@ def test_weights_of_poses_give_what_the_evaluator_writes(name, seed):
                 for o in p["outputs"]:
                     value = p["weight"] * o["weight"] * factor
                     fresh[o["control"]] = fresh.get(o["control"], 0.0) + value
-            written |= fresh  # of two solvers that write a control the later one wins
+            written |= fresh  # if two solvers write a control, the later one is used
         for control, value in written.items():
             assert pose.controls[control] == pytest.approx(value, abs=1e-4), control
             checked += value != 0
@@ -143,7 +145,7 @@ def test_weights_of_poses_give_what_the_evaluator_writes(name, seed):
 
 
 def hand_made():
-    """Two controls and a corrective move one joint; LOD 1 has its translation only."""
+    """Two controls and a corrective move one joint; LOD 1 has only its translation."""
     dna = risorius.load(GOLDEN / "core.dna")
     group = dna.joint_groups[0].__copy__()
     group.input_indices = [0, 2, 4]
@@ -182,7 +184,7 @@ def test_the_parts_of_a_joint_made_by_hand():
 def test_correctives_that_fire_lack_one_and_rest():
     dna = hand_made()
     group = dna.joint_groups[0].__copy__()
-    group.input_indices = [0, 2, 5]  # nothing reads corrective 4 now
+    group.input_indices = [0, 2, 5]  # nothing reads corrective 4
     dna.joint_groups = [group]
     shapes, maps = dna.blend_shape_channels.__copy__(), dna.animated_maps.__copy__()
     shapes.lods, maps.lods = [0, 0], [0, 0]
@@ -240,7 +242,7 @@ def test_of_a_run_only_the_first_interval_that_holds_counts():
     for value, slopes in ((0.5, [0.25, 0.5, 0.5]), (0.875, [1, 0.5, 0.5])):
         (row,) = explain(dna, rig, [value, 0, 0.25, 0])["animated_maps"]
         assert [by["slope"] for by in row["by"]] == slopes
-        assert row["by"][-1]["from"] == 0  # bounds that are given the wrong way round
+        assert row["by"][-1]["from"] == 0  # the file has these bounds in the wrong order
         gives = sum(by["gives"] for by in row["by"])
         assert row["value"] == pytest.approx(min(1, gives))
         assert row["at_rest"] == 0.125
@@ -301,7 +303,7 @@ def test_a_pose_that_is_not_finite_is_one_sentence(name, capsys):
     assert error.count("\n") == 1
 
 
-# ---- names
+# ---- names of controls
 
 NAMES = [
     "CTRL_expressions.jawOpen",
@@ -337,7 +339,7 @@ def test_a_part_of_a_name_means_one_control_or_its_two_sides(text, controls, exa
         ("jaw", ["any of", "jawOpen", "jawOpenExtreme"]),
         ("l", ["any of", "mouthCornerPull", "eyeBlink"]),
         ("jawOpn", ["no control", "near", "jawOpen"]),
-        ("mouthFrown", ["no control"]),  # of ARKit, but the file has none of its controls
+        ("mouthFrown", ["no control"]),  # an ARKit unit, but the file lacks its controls
     ],
 )
 def test_a_name_of_several_or_no_meanings_is_refused(text, words):
@@ -347,7 +349,7 @@ def test_a_name_of_several_or_no_meanings_is_refused(text, words):
         assert word in str(caught.value)
 
 
-# ---- the command
+# ---- the command `risorius eval --explain`
 
 CORE = str(GOLDEN / "core.dna")
 
@@ -359,7 +361,7 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "CTRL_expressions.browRaiseInnerL=0.5, CTRL_expressions.browRaiseInnerR=0.5" in (
         captured.err
     )
-    # Expected by hand: 1.5 * 0.5 * 0.75 for the file's corrective 6, and the missing factor of 5.
+    # Calculated by hand: 1.5 * 0.5 * 0.75 for corrective 6, and the missing factor of corrective 5.
     assert "corrective 6 = 0.5625: browRaiseInnerR 0.5 * jawOpen 0.75, weight 1.5" in captured.out
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 
@@ -416,7 +418,7 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
 
 @pytest.mark.parametrize("name", ["quatjoints", "mlquat"])
 def test_a_rotation_order_that_nobody_knows_is_that_of_the_evaluator(name):
-    """Numbers that the format has no word for are read, and taken as x y z, right, up, front."""
+    """Numbers that the format does not define are read, and evaluated as xyz, right, up, front."""
     dna = risorius.load(GOLDEN / f"{name}.dna")
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
     dna.coordinate_system = ("#7", "up", "#9")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: those of Risorius fit the standard controls; errors are reported."""
+"""Expressions: Risorius' own fit the standard controls; errors in files are reported."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def test_expressions_differ(standard_controls):
 
 
 def test_no_two_are_mistaken_for_each_other(standard_controls):
-    """As directions they differ, because the same face at two strengths is one expression."""
+    """Directions are compared, because one expression at two strengths is the same expression."""
     shown = [e for e in expressions.load().values() if e.weights]
     vectors = np.array([expressions.pose_vector(e, standard_controls) for e in shown])
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     alike = vectors @ vectors.T - np.eye(len(shown))
     first, second = divmod(int(alike.argmax()), len(shown))
-    # The nearest are two sounds of the tongue that look alike on people too.
+    # The nearest two are sounds of the tongue, which also look alike on people.
     assert alike.max() < 0.91, (shown[first].name, shown[second].name)
 
 
@@ -191,7 +191,7 @@ def test_what_is_written_is_read_again(tmp_path):
     (tmp_path / "grin.toml").write_text(text, encoding="utf-8")
     assert expressions.load(tmp_path / "grin.toml") == {"big_grin": SAVED}
     assert expressions.of_text(text) == {"big_grin": SAVED}
-    table = tomllib.loads(text)  # by a reader that is not ours
+    table = tomllib.loads(text)  # an independent reader
     assert table["format"] == expressions.FORMAT == 1
     row = table["expressions"]["big_grin"]
     assert row["weights"] == dict(SAVED.weights)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names from files become file names and never paths."""
+"""Names inside files become valid file names, never paths."""
 
 import re
 import unicodedata

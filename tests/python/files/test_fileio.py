@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The writer of complete files: the state after every kind of failure."""
+"""Atomic writing: the state of files after each kind of failure."""
 
 import contextlib
 import errno
@@ -111,7 +111,7 @@ def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(
 
 
 def _staged(target, files):
-    """Write a file and others beside it like a foreign writer; without a file it fails."""
+    """Write files like an external writer with `staging`; without the target's name it raises."""
     with fileio.staging(target) as made:
         for name, data in files.items():
             path = made.with_name(name) if "/" not in name else made.parent / name
@@ -158,7 +158,7 @@ def test_what_a_killed_process_staged_goes_also_where_nobody_waits_for_its_end(t
             os.kill(os.getpid(), signal.SIGKILL)
         """
     program = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path / "a")]
-    with subprocess.Popen(program) as process:  # a zombie until somebody waits for it
+    with subprocess.Popen(program) as process:  # dead, but not waited for
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
         assert len(os.listdir(tmp_path)) == 1
         fileio.write_bytes(tmp_path / "b", b"b")
@@ -229,7 +229,7 @@ def test_a_folder_that_may_not_be_written_is_known_before(tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "a").write_text("old")
-    # Root can write everywhere, so run the child as the user nobody if possible.
+    # Root may write everywhere, so the child runs as the user nobody if possible.
     for above in tmp_path.parents:
         if above.stat().st_uid == os.getuid() and above.name.startswith("pytest-"):
             above.chmod(above.stat().st_mode | 0o055)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""JPEG files that files.jpeg writes, as another reader reads them."""
+"""JPEG files of files.jpeg, read by Pillow."""
 
 import io
 
@@ -9,7 +9,7 @@ from risorius.files.jpeg import jpeg
 
 
 def read(data):
-    """uint8 of a file, row 0 is the bottom."""
+    """Read a JPEG with Pillow as uint8; row 0 is the bottom."""
     image = pytest.importorskip("PIL.Image", reason="NOT RUN: no Pillow, which reads the files")
     return np.array(image.open(io.BytesIO(data)))[::-1]
 
@@ -37,7 +37,7 @@ def test_noise_single_pixels_and_one_colour_are_files_too(quality):
 
 
 def test_a_code_longer_than_files_allow_is_shortened():
-    # Sizes of differences by powers of two, the frequencies of Fibonacci: the tree is a comb.
+    # Frequencies from the Fibonacci numbers give a Huffman tree of the greatest depth.
     counts = [1, 1]
     while len(counts) < 22:
         counts.append(counts[-1] + counts[-2])

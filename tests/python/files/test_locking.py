@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A folder in which one process works at a time."""
+"""Locks of folders: only one process at a time holds one."""
 
 import errno
 import json
@@ -70,7 +70,7 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
                         done[0] += 1
             except LockedError:
                 refused[0] += 1
-            except OSError as error:  # it would end the thread without a word
+            except OSError as error:  # otherwise it would end the thread silently
                 broken.append(error)
                 return
 
@@ -81,7 +81,7 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
         thread.join()
     assert broken == []
     assert most[0] == 1
-    # Windows does not remove a file that is open elsewhere, so an unused empty file may stay.
+    # Windows does not remove a file that another process has open, so an empty file may stay.
     assert os.listdir(tmp_path) in ([], [NAME] if os.name == "nt" else [])
 
 
@@ -114,7 +114,7 @@ def test_without_the_systems_locks_the_file_says_who_has_it(tmp_path, monkeypatc
     finally:
         process.send_signal(signal.SIGKILL)
         process.communicate()
-    with locked(tmp_path):  # of a process that is dead
+    with locked(tmp_path):  # the dead process held the lock
         pass
     about = {"machine": "elsewhere", "process": process.pid, "since": "noon"}
     (tmp_path / NAME).write_text(json.dumps(about))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that others have open, and names and folders that are not plain, on every system."""
+"""Files that other programs have open, and unusual names and folders, on every system."""
 
 import os
 import shutil
@@ -43,7 +43,7 @@ def python(path):
 def test_a_file_that_is_read_is_replaced_or_stays_and_its_reader_goes_on(save, face):
     with face.open("rb") as reader:
         begin = reader.read(100)
-        if WINDOWS:  # Python opens files so that nobody can take their names
+        if WINDOWS:  # on Windows, Python opens files so that they cannot be replaced
             with pytest.raises((OSError, risorius.DnaError), match=r"face\.dna") as caught:
                 save(face)
             assert "\n" not in str(caught.value)
@@ -75,7 +75,7 @@ def test_a_file_that_nobody_else_may_open_stays(save, face):
 
 
 def opened_alone(path):
-    """A file opened exclusively, as by a virus scanner or an editor."""
+    """A file that is opened exclusively on Windows, as by a virus scanner or an editor."""
     import ctypes
     import msvcrt
 
@@ -91,7 +91,7 @@ def opened_alone(path):
 def test_a_file_that_may_not_be_written(save, face):
     face.chmod(0o444)
     try:
-        if WINDOWS:  # there it is the file that refuses, on POSIX its folder
+        if WINDOWS:  # Windows refuses the file, POSIX the folder
             with pytest.raises((OSError, risorius.DnaError), match=r"face\.dna"):
                 save(face)
             assert face.read_bytes() == OLD
@@ -135,7 +135,8 @@ def test_the_command_line_takes_them_and_names_them(name, tmp_path):
     done = subprocess.run([*command, str(bad)], capture_output=True, env=utf8, check=False)
     assert done.returncode != 0
     assert bad.name in (done.stdout + done.stderr).decode()
-    # A pipe of Windows has its own code page, which may lack letters: the answer is the same.
+    # Pipes of Windows have their own code page, which may lack letters; the output must be the
+    # same.
     old = {**os.environ, "PYTHONIOENCODING": "cp1252"}
     again = subprocess.run([*command, str(bad)], capture_output=True, env=old, check=False)
     assert again.returncode == done.returncode

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""VRM files and made-up bodies: the tables that programs read, and what is refused.
+"""VRM files and generated bodies: the tables that programs read, and refusals.
 
-packaging/ship/gameface.sh tries three-vrm, TalkingHead and the VRM reader of Blender."""
+packaging/ship/gameface.sh tests them in three-vrm, TalkingHead and Blender's VRM reader.
+"""
 
 import re
 
@@ -47,7 +48,7 @@ def toml_of(table):
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face with a head that stands at 1.5 m, whose controls ARKit's units and VRM's need."""
+    """A face with a head at 1.5 m height and the controls of ARKit's and VRM's units."""
     dna = risorius.load(GOLDEN / "medium.dna")
     names = [c for row in arkit.mapping().values() for c in row]
     dna.raw_control_names = list(dict.fromkeys(names))[: len(dna.raw_control_names)]
@@ -103,7 +104,7 @@ def test_an_expression_holds_back_what_it_does_not_go_with(face, tmp_path):
         both = {c: min(1.0, a.get(c, 0) + b.get(c, 0)) for c in {*a, *b}}
         summed = oracle.vertices(a) + oracle.vertices(b) - rest
         away = 10 * np.linalg.norm(oracle.vertices(both) - summed, axis=1).max()
-        if abs(away - 2) > 0.5:  # the meshes of LOD 0 alone are in the file
+        if abs(away - 2) > 0.5:  # the file has only the meshes of LOD 0
             tried.add(away > 2)
             assert preset[feeling]["overrideBlink"] == ("blend" if away > 2 else "none")
     assert preset["neutral"]["overrideBlink"] == "none"
@@ -163,7 +164,7 @@ def test_a_made_up_body_leaves_the_face_where_it_is(face, tmp_path):
     below = {nodes[i]["name"] for i in nodes[0]["children"]}
     assert below == {*plain.meshes(), "Hips"} | ({"Soles"} & below)
     lowest = min(plain.positions(mesh)[:, 1].min() for mesh in plain.meshes())
-    assert ("Soles" in below) == (lowest > 0.3)  # else something stands on the ground
+    assert ("Soles" in below) == (lowest > 0.3)  # otherwise a mesh touches the ground
 
 
 def test_a_body_of_the_faces_own_needs_none_made_up(face, tmp_path, capsys):
@@ -247,8 +248,8 @@ def test_wishes_that_do_not_go_together(face, tmp_path, capsys):
     assert (code, "a joint called head was expected" in line) == (1, True)
 
 
-# What engines take for a path, or refuse, in names of nodes and targets; whether small letters are
-# the same as large ones. None of them is run here.
+# For each engine: characters that it treats as part of a path or refuses in names of nodes and
+# targets, and whether upper and lower case are equal. The engines are not run here.
 ENGINES = {
     "Godot": (r'[.:@/"%]', False),
     "Unity": (r"[/\x00-\x1f]", False),

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""`risorius export`: the file in a client moves like the rig; limits are reported.
+"""`risorius export`: the exported file moves like the rig, and limits are reported.
 
-The file is read by gltf_oracle.py, and the rig is evaluated by dna_bytes.py: neither shares code
-with the tested one. packaging/ship/gameface.sh tests three.js and gltf-validator."""
+gltf_oracle.py reads the file and dna_bytes.py evaluates the rig; neither shares code with the
+exporter. packaging/ship/gameface.sh tests three.js and gltf-validator.
+"""
 
 import json
 import re
@@ -39,18 +40,18 @@ SAMPLE = PROJECT / "build" / "sample" / "man.dna"
 
 
 def controls():
-    """The 69 raw controls of ARKit's units."""
+    """The 69 raw controls that ARKit's units use."""
     return list(dict.fromkeys(c for row in arkit.mapping().values() for c in row))
 
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face with controls for ARKit's units, except a few missing ones."""
+    """A face with most of the controls of ARKit's units; a few are missing."""
     dna = risorius.load(GOLDEN / "medium.dna")
     count = len(dna.raw_control_names)
     dna.raw_control_names = controls()[:count]
     meshes, apart = list(dna.meshes), np.random.default_rng(3)
-    for mesh in meshes:  # no two vertices at one place: then a place says which vertex it is
+    for mesh in meshes:  # each vertex has its own place, so that a place identifies the vertex
         mesh.positions = mesh.positions + apart.uniform(-0.05, 0.05, mesh.positions.shape)
     dna.meshes = meshes
     path = tmp_path_factory.mktemp("face") / "anna.dna"
@@ -59,7 +60,7 @@ def face(tmp_path_factory):
 
 
 def poses(face):
-    """Name -> (raw controls of the target, raw controls of its base pose)."""
+    """Target name -> (raw controls of the target, raw controls of its base pose)."""
     there = set(risorius.load(face).raw_control_names)
     for name, row in arkit.mapping().items():
         raw = {control: value for control, value in row.items() if control in there}
@@ -75,7 +76,7 @@ def made(face, tmp_path, *more):
 
 
 def places(face):
-    """Row of the oracle's vertices for each vertex of the file's meshes, matched at rest."""
+    """The oracle of a face, and its vertices at rest in metres."""
     oracle = dna_bytes.Face(face.read_bytes())
     return oracle, oracle.vertices({}) / 100
 
@@ -110,7 +111,7 @@ def test_names_are_as_clients_expect_them(face, tmp_path, capsys):
     assert {"viseme_sil", "viseme_PP", "viseme_aa", "viseme_U"} < set(names)
     assert {"happy", "aa", "ou", "blink", "blinkLeft", "lookUp", "neutral"} < set(names)
     assert len(set(names)) == len(names) == 46 + 15 + 18
-    assert set(found.names(TEETH)) < set(names)  # what does not move the teeth is not there
+    assert set(found.names(TEETH)) < set(names)  # targets that do not move the teeth are left out
     assert "tongueOut (tongueOut)" in said  # the rig lacks it
     assert re.search(r"arkit: \d+ shapes? of 52 left out, the rig lacks", said)
     assert re.search(r"visemes: 15 targets, \d+ vertices, [\d,]+ bytes, linear sum within", said)
@@ -156,13 +157,13 @@ def test_the_driver_brings_sums_of_two_to_the_rig(face, tmp_path):
         wanted = surface.positions(raw, mesh)[nearest] / 100
         weights = dict.fromkeys(row["of"], share)
         assert np.abs(found.positions(HEAD, weights) - wanted).max() > 2e-5
-        weights[row["target"]] = 1.0  # the product of ones, and 4 w (1 - w) of a half
+        weights[row["target"]] = 1.0  # for weights of 1 their product, for a half 4 w (1 - w)
         assert np.abs(found.positions(HEAD, weights) - wanted).max() < 5e-5
 
 
 @pytest.mark.parametrize("kind", ["cubic", "early", "late", "middle", "triple"])
 def test_refinements_leave_exact_poses_alone(kind):
-    # where one target is on, or two are fully on, the other targets are exact
+    # If one target is active, or two fully, the other targets add nothing.
     many = {"cubic": 1, "triple": 3}.get(kind, 2)
     for on in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.0, 0.5)):
         weights = np.array([*on, 0.0])[:many]

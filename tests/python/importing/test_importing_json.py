@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""JSON of named curves, in the shapes that software writes."""
+"""JSON of named curves, in the forms of several programs."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_neurosyncs_nameless_rows(tmp_path, columns):
     assert found.clip.rate == 60.0
     assert any("60 frames a second were assumed" in note for note in found.notes)
     _, report = found.apply()
-    # Some meshes name their basis "Neutral", which the mapping leaves out.
+    # Some meshes call their basis "Neutral", which the mapping leaves out.
     emotions = ["Angry", "Disgusted", "Fearful", "Happy", "Sad", "Surprised"]
     assert report.unmapped == (emotions if columns == 68 else [])
     assert ("Neutral" in report.ignored) == (columns == 68)
@@ -110,7 +110,7 @@ def test_unreals_curves_share_one_clock(tmp_path, write):
     assert found.mapping == "controls"
     clip, report = found.apply()
     np.testing.assert_allclose(clip.frame_times(), [0, 0.25, 0.5])
-    assert clip.rate == 60.0  # keys that lie far apart are no frame rate
+    assert clip.rate == 60.0  # keys with long distances do not define a frame rate
     np.testing.assert_array_equal(clip.curve(RIG + "jawOpen"), [0, 0.5, 1])
     np.testing.assert_array_equal(clip.curve(RIG + "eyeBlinkL"), [0.5, 0.5, 0.5])
     assert report.unmapped == []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which vocabulary a file's names are of: VRM in files as live, letters alone never decide."""
+"""The vocabulary of a file's names: VRM as in live captures; never by single letters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VRM_1 = ["aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "look
 
 
 def table(names, moving=None):
-    """A frame at rest, then each name at 1 in a frame of its own, or only those that move."""
+    """A CSV with a frame at rest, then a frame for each moving name in which it is 1."""
     rows = [["0"] * len(names)]
     for i, name in enumerate(names):
         if moving is None or name in moving:
@@ -68,7 +68,7 @@ def test_letters_alone_are_asked_about(tmp_path, names, capsys):
     assert "give one of these mappings (--mapping; Mapping in Blender)" in said
     chosen = "vrm" if names in ("A", "E", "AEO") else "rhubarb" if "X" in names else "oculus"
     assert main(["clip", "convert", str(path), "-o", str(out), "--mapping", chosen]) == 0
-    assert bool(Clip.load(out).names) == (names != "X")  # X is rest
+    assert bool(Clip.load(out).names) == (names != "X")  # X means rest
 
 
 def test_expressions_of_vrm_beside_the_units_are_left_out_as_live(tmp_path):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Values of another scale and heads in degrees are refused with a question and converted by
-options."""
+"""Values in other scales and heads in degrees are refused with a question.
+
+Options convert them.
+"""
 
 from __future__ import annotations
 

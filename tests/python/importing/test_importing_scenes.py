@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""glTF, GLB and FBX: files of Blender's own exporters, and of test writers for other features."""
+"""glTF, GLB and FBX: files of Blender's exporters, and of test writers for other features."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from risorius import importing
 
 DATA = PROJECT / "tests" / "data" / "importing"
 RIG = "CTRL_expressions."
-# Keys of make_blender_files.py: frame -> value, linear between.
+# Keys in make_blender_files.py: frame -> value, with linear interpolation.
 KEYS = {
     "jawOpen": {1: 0.0, 11: 1.0, 31: 0.25},
     "eyeBlinkLeft": {1: 1.0, 31: 0.0},
@@ -67,7 +67,7 @@ def test_gltf_with_its_buffer_beside_or_inside(tmp_path, where):
 
 
 def small(times, values, channel, way="LINEAR", kind=5126):
-    """A glTF with one sampler; two morph targets on a mesh."""
+    """A glTF with one sampler, and a mesh with two morph targets."""
     dtype = {5126: "<f4", 5121: "<u1"}[kind]
     first, second = np.array(times, "<f4").tobytes(), np.array(values, dtype).tobytes()
     binary = first + second
@@ -128,8 +128,8 @@ def test_steps_and_splines_are_sampled(tmp_path):
     clip = read_small(tmp_path, [0, 0.5, 1], [0, 1, 1, 0, 0, 1], WEIGHTS, "STEP").clip
     at = clip.frame_times()
     np.testing.assert_array_equal(clip.curve("jawOpen"), np.where((at >= 0.5) & (at < 1), 1, 0))
-    # In, value, out of each key: the cubic 3 t^2 - 2 t^3 with flat ends; and t with slope 1. The
-    # slopes before the first and after the last key (9) are ignored.
+    # In-slope, value and out-slope of each key: 3 t^2 - 2 t^3 with flat ends, then t with slope 1.
+    # Slopes before the first and after the last key (9) are ignored.
     values = [9, 9, 0, 0, 0, 1, 0, 1, 1, 1, 9, 9]
     clip = read_small(tmp_path, [0, 1], values, WEIGHTS, "CUBICSPLINE").clip
     at = clip.frame_times()
@@ -228,7 +228,7 @@ def test_two_meshes_of_one_name_keep_the_first_and_say_so(tmp_path):
     animation["channels"].append({"sampler": 0, "target": dict(WEIGHTS)})
     (tmp_path / "a.glb").write_bytes(glb(document, binary))
     done = importing.read(tmp_path / "a.glb")
-    assert not any("another mesh" in note for note in done.notes)  # it moves the same
+    assert not any("another mesh" in note for note in done.notes)  # the other mesh moves equally
     animation["samplers"].append({"input": 0, "output": 1, "interpolation": "STEP"})
     document["accessors"].append(document["accessors"][1] | {"byteOffset": 0})
     animation["samplers"][1]["output"] = 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks as Rhubarb, Papagayo and Moho write them, and the curves that they become."""
+"""Viseme tracks of Rhubarb, Papagayo and Moho, and the curves that they become."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_papagayo_and_moho_give_one_track(tmp_path, write):
     found = read(tmp_path, write(), rate=24.0 if write is moho_dat else None)
     assert found.mapping == "papagayo"
     marks = [(round(e.time * 24), e.value) for e in found.clip.events if e.name == "viseme"]
-    # Moho writes a rest twice: at the start and the end of a pause.
+    # Moho writes a rest twice, at the start and at the end of a pause.
     marks = [mark for i, mark in enumerate(marks) if i == 0 or mark[1] != marks[i - 1][1]]
     assert marks == [
         (0, "rest"), (6, "AI"), (9, "L"), (13, "O"), (18, "rest"), (24, "MBP"), (28, "O"),
@@ -193,6 +193,6 @@ def test_a_table_that_is_said_to_be_rhubarbs_is_not(tmp_path):
         importing.AnimationFileError, match="shape A-H or X in each line .* a table"
     ):
         read(tmp_path, "time,jawOpen\n0,1\n", kind="rhubarb")
-    # Two columns of letters, or letters beside numbers, are not a track of visemes.
+    # Two columns of letters, or letters next to numbers, are not a viseme track.
     with pytest.raises(importing.AnimationFileError, match="columns with curves were expected"):
         read(tmp_path, "time,a,b\n0,A,B\n1,C,D\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces with fewer joints, correctives and levels, on which animation plays on."""
+"""Faces with fewer joints, correctives and LODs, which still play the same animation."""
 
 import copy
 import csv
@@ -55,7 +55,8 @@ def test_a_lighter_face_keeps_controls_and_named_joints(face, file, tmp_path):
     assert {row["corrective"] for row in rows} == {"", "kept", "removed"}
     sizes = [float(row["largest_mm"]) for row in rows]
     assert sizes == sorted(sizes, reverse=True)
-    # The corrective that the neck's solver needs fires in both, the map that one drives too.
+    # The corrective that the neck's solver reads is active in both faces, also the one that drives
+    # a map.
     raw = risorius.Rig(face).initial_raw_controls
     raw[7:15] = [0, 0, 0.26, 0.9656] * 2
     raw[:7] = 1
@@ -73,7 +74,7 @@ def test_what_is_said_of_an_expression_is_so(face):
     row = said["CTRL_expressions.mouthSmileRight"]
     way = vertices(face, raw, row.lod, row.lod) - vertices(light, raw, row.lod, row.lod)
     assert row.largest_mm == pytest.approx(10 * np.linalg.norm(way, axis=1).max(), rel=1e-3)
-    # Remaining joints keep their motion, and vertices of these joints alone keep their weights.
+    # Remaining joints keep their motion, and vertices that only they move keep their weights.
     same = [face.joint_names.index(name) for name in light.joint_names]
     old, new = risorius.Rig(face).evaluate(raw).joints, risorius.Rig(light).evaluate(raw).joints
     np.testing.assert_array_equal(old[same], new)
@@ -94,7 +95,7 @@ def test_weights_are_fitted_and_both_sides_alike(face):
     light, report = lighten(face, joints=34)
     left = [face.joint_names.index(name) for name in report.removed_joints]
     assert len(left) == 28
-    sides = {j + (1 if j % 2 else -1) for j in left if 9 <= j < 57}  # pairs follow one another
+    sides = {j + (1 if j % 2 else -1) for j in left if 9 <= j < 57}  # indices of pairs are adjacent
     assert len(sides & set(left)) >= len(sides) - 1
     stays = [name not in report.removed_joints for name in face.joint_names]
     plain = _native.keep_parts(face, joints=stays, correctives=[True] * 9)
@@ -106,7 +107,7 @@ def test_weights_are_fitted_and_both_sides_alike(face):
         squares["fitted"] += float(((vertices(light, raw, 0, 0) - goal) ** 2).sum())
         squares["plain"] += float(((vertices(plain, raw, 0, 0) - goal) ** 2).sum())
     assert squares["fitted"] < 0.35 * squares["plain"]
-    # A rotated neck moves the same vertices as before.
+    # A rotation of the neck moves the same vertices as before.
     moved = np.zeros((2, 62, 9))
     moved[1, 2, 5] = 15.0
     world = sk.world_matrices(face, moved)
@@ -136,12 +137,12 @@ def test_correctives_that_move_least_leave(face):
     assert light.joint_names == face.joint_names
     assert light.psd_count == 6
     names = [name.replace("CTRL_expressions.", "") for name in report.removed_correctives]
-    # By formula a corrective moves the less the later it comes; the sixth moves the jaw's map and
-    # the last as much as a smile.
+    # By the formula for correctives, later ones move the face less; but the sixth drives the jaw's
+    # map, and the last moves the face as much as a smile.
     assert all("jawOpen + neck" not in name for name in names)
     assert "eyeBlinkLeft + mouthSmileRight + jawOpen" not in names
     assert len(report.removed_correctives) == 3
-    # Only the channel of a removed corrective is removed.
+    # Only the channel of the removed corrective is removed.
     none, _ = lighten(face, correctives=2, measured=False)
     assert none.psd_count == 2
     assert none.blend_shape_channel_names == face.blend_shape_channel_names[:-1]
@@ -159,7 +160,7 @@ def test_every_layer_is_counted_anew():
         _native.keep_parts(dna, joints=[True, False, True], correctives=[True, True])
     with pytest.raises(risorius.DnaError, match="one value for each"):
         _native.keep_parts(dna, joints=[True, True], correctives=[True, True])
-    # Two of three joints are moved by networks or turned by setups: they must stay.
+    # Networks and setups move two of the three joints, which must stay.
     with pytest.raises(ArgumentError, match="must stay were expected"):
         lighten(dna, joints=1)
 
@@ -222,5 +223,5 @@ def test_json_says_all(file, tmp_path):
     said = json.loads(done.stdout)
     assert said["lods"] == [1]
     assert said["after"]["levels"] == 1
-    # A single level is the same face without error.
+    # A single LOD is the same face, without error.
     assert max(row["largest_mm"] for row in said["expressions"]) < 1e-3

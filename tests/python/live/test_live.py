@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Live capture, against a program that sends packets over this machine's network."""
+"""Live capture, with a program that sends packets through this machine's network."""
 
 import json
 import math
@@ -19,10 +19,10 @@ import risorius
 from risorius.importing import load_mapping
 from risorius.live import Frame, LiveError, Receiver, Shaper, livelink, osc, shaping
 
-PATIENCE = 600.0  # seconds, on a busy machine too, until a packet counts as missing
+PATIENCE = 600.0  # seconds until a packet counts as missing, for busy machines
 SENDER = Path(__file__).parents[1] / "support" / "face_sender.py"
 PHONE, OTHER = "6F0F5B52-8E3C-4E7B-9D42-0123456789AB", "0AA94E16-1111-4222-8333-BA9876543210"
-JAW, SMILE_LEFT, YAW, PITCH, ROLL = 17, 23, 52, 53, 54  # places in a packet of Live Link Face
+JAW, SMILE_LEFT, YAW, PITCH, ROLL = 17, 23, 52, 53, 54  # indices in a packet of Live Link Face
 
 
 def face(count=61, **at):
@@ -37,14 +37,14 @@ def v6(frame, values, subject="iPhone", device=PHONE, sub_frame=0.0, rate=60):
 
 
 def send(port, *steps):
-    """Run the sender to its end."""
+    """Run the sender program with these steps and wait for its end."""
     lines = "".join(json.dumps(step) + "\n" for step in steps)
     command = [sys.executable, str(SENDER), str(port)]
     limits.run(command, 60, input=lines).check_returncode()
 
 
 def heard(receiver, packets):
-    """The status after a number of packets."""
+    """Wait for a number of packets. Returns the receiver's status."""
     ends = monotonic() + PATIENCE
     while monotonic() < ends:
         status = receiver.status()
@@ -55,12 +55,12 @@ def heard(receiver, packets):
 
 
 def record(source, *steps, shaper=None):
-    """Record the steps with a receiver. Returns: the clip and the status."""
+    """Record the packets of some steps. Returns the clip and the status."""
     with Receiver(source, 0) as receiver:
         take = receiver.record()
         send(receiver.port, *steps)
         heard(receiver, sum(step[0] != "wait" for step in steps))
-        receiver.stop()  # ends also the face that waits for silence
+        receiver.stop()  # also completes the face that waits for further messages
         return receiver.finish(take).clip(shaper), receiver.status()
 
 
@@ -76,7 +76,7 @@ def test_frames_of_live_link_face_arrive_with_their_times():
 
 
 def test_every_curve_of_a_packet_has_its_name():
-    # The order of the packet, and the control that Apple's unit of that place is mapped to.
+    # The order of values in the packet, and the control of Apple's unit at each index.
     units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
@@ -85,12 +85,12 @@ def test_every_curve_of_a_packet_has_its_name():
     values = [(n + 1) / 100.0 for n in range(61)]
     packet = livelink.decode(packed(v6(1, values)))
     assert np.allclose(packet.values[:52], values[:52])
-    # Own right, down and own left are positive in the app.
+    # In the app, angles to the face's right, down and left are positive.
     assert np.allclose(packet.values[52:55], [-0.53, -0.54, 0.55])
 
 
 def packed(step):
-    """The bytes of a step, made by the sender's own code."""
+    """The bytes of a step, made by the sender program's code."""
     sys.path.insert(0, str(SENDER.parent))
     try:
         import face_sender
@@ -124,7 +124,7 @@ def test_a_timecode_with_a_byte_for_drop_frame():
 
 
 def test_gaps_are_kept_late_packets_left_out_and_losses_counted():
-    numbers = [0, 1, 2, 3, 4, 5, 6, 12, 11, 13]  # 7 to 10 are lost, 11 is late
+    numbers = [0, 1, 2, 3, 4, 5, 6, 12, 11, 13]  # 7 to 10 are lost, 11 arrives late
     steps = [v6(n, face(i17=n / 100.0)) for n in numbers]
     clip, status = record("livelink", *steps)
     kept = [n for n in numbers if n != 11]
@@ -144,7 +144,7 @@ def test_midnight_and_a_clock_that_is_set():
     for part in (clip.times[:4], clip.times[4:7], clip.times[7:]):
         assert np.allclose(np.diff(part), 1 / 60, atol=1e-6)
     for leap in (clip.times[4] - clip.times[3], clip.times[7] - clip.times[6]):
-        assert 0.0 < leap < 1.0  # as they arrived
+        assert 0.0 < leap < 1.0  # with the distance of their arrival
     assert status.late == 0
 
 
@@ -153,7 +153,7 @@ def test_two_phones_are_told_apart():
     for n in range(5):
         steps.append(v6(n, face(i17=0.1 * n), "Ada"))
         steps.append(v6(1000 + n, face(i17=1.0 - 0.1 * n), "Bob", OTHER))
-        steps.append(v6(n, face(i17=0.5), "Ada", OTHER))  # another phone with a name that is taken
+        steps.append(v6(n, face(i17=0.5), "Ada", OTHER))  # another phone that uses an existing name
     with Receiver("livelink", 0) as receiver:
         takes = [receiver.record("Bob"), receiver.record("Ada")]
         send(receiver.port, *steps)
@@ -168,7 +168,7 @@ def test_two_phones_are_told_apart():
 
 
 def hostile():
-    """Packets with wrong content."""
+    """Packets with invalid content."""
     good = packed(v6(1, face(i17=0.5)))
     bad = [good[:n] for n in range(0, len(good), 7)] + [good + b"\0", b"\xff" * 300]
     bad.append(good.replace(b"\0\0\0\x24", b"\xff\xff\xff\xff", 1))
@@ -187,13 +187,13 @@ def test_hostile_packets_are_counted_and_change_nothing():
     assert (status.frames, status.faceless) == (2, 1 + faceless(junk))
     assert status.refused == len(junk) - faceless(junk)
     assert status.reasons
-    assert not any("Error" in reason for reason, _ in status.reasons)  # all of them foreseen
+    assert not any("Error" in reason for reason, _ in status.reasons)  # all faults are foreseen
     with pytest.raises(LiveError, match="subject of 300 bytes"):
         livelink.decode(packed(v6(1, face(), "x" * 300)))
 
 
 def faceless(junk):
-    """The number of cut packets that equal packets of a phone without a face."""
+    """The number of truncated packets that look like packets of a phone without a face."""
     head = 1 + 4 + len(PHONE) + 4 + len("iPhone")
     return sum(len(data) in (head, head + 16) for data in junk if data[:1] == b"\x06")
 
@@ -238,15 +238,15 @@ def vmc(values, head=(0.0, 0.0, 0.0, 1.0)):
 def test_vmc_applies_a_whole_face_at_once():
     one = vmc({"A": 0.5, "Blink_L": 1.0}, (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
     two = vmc({"A": 1.0, "Blink_L": 0.0, "unheardOf": 0.5})
-    # The first as a bundle, the second as single messages with a wait before its Apply, the third
-    # in two bundles.
+    # The first face is sent as a bundle, the second as single messages with a pause before its
+    # Apply, the third in two bundles.
     steps = [["bundle", one], *[["osc", *m] for m in two[:-1]], ["wait", 0.05], ["osc", *two[-1]]]
     steps += [["bundle", one[:5]], ["bundle", one[5:]]]
     clip, status = record("osc", *steps)
     assert status.frames == 3
     assert np.allclose(clip.curve("CTRL_expressions.jawOpen"), [0.3, 0.6, 0.3])
     assert np.allclose(clip.curve("CTRL_expressions.eyeBlinkL"), [1.0, 0.0, 1.0])
-    yaw = [-0.4, 0.0, -0.4]  # to the own right in Unity
+    yaw = [-0.4, 0.0, -0.4]  # to the face's right in Unity
     assert np.allclose(clip.curve("head.yaw"), yaw, atol=1e-6)
     assert status.subjects == ("127.0.0.1",)
     plan = shaping.Plan(("A", "unheardOf"), load_mapping("arkit"))
@@ -261,14 +261,15 @@ def test_units_of_perfect_sync_are_not_doubled_by_vrm():
 
 
 def test_face_cap_and_plain_messages():
-    # Without a receiver: it ends a face after a silence too, and a busy machine has silences.
+    # Without a receiver, because a receiver also ends a face after a pause, and a busy machine has
+    # pauses.
     decoder, packets = osc.Decoder(), []
     for n in range(3):
         face = [["osc", "/HR", [10.0 * n, 20.0, 0.0]], ["osc", "/W", [24, n / 4.0]]]
         face += [["osc", "/W", [0, 0.5]], ["osc", "/avatar/parameters/v2/MouthSmileLeft", [0.125]]]
         for message in face:
             packets += decoder.feed(packed(message), "here", 0.0)
-        assert len(packets) == n  # the first message of the next face ends it
+        assert len(packets) == n  # the first message of the next face completes the face
         assert decoder.pending()
     packets += decoder.flush()
     assert not decoder.pending()
@@ -288,7 +289,7 @@ def test_face_cap_and_plain_messages():
 
 
 def faces_of(*messages):
-    """The values of the face from messages, and sentences of invalid messages."""
+    """Decode messages. Returns the values of the faces, and the errors of invalid messages."""
     decoder, refused = osc.Decoder(), []
     for address, values in messages:
         try:
@@ -303,7 +304,7 @@ def test_a_head_as_a_quaternion_is_not_overruled_by_degrees():
     turned = [0.0, math.sin(half), 0.0, math.cos(half)]  # ARKit: about up, to the own left
     (face,), _ = faces_of(["/HRQ", turned], ["/HR", [40.0, 40.0, 40.0]])
     angles = {"head.yaw": math.radians(30.0), "head.pitch": 0.0, "head.roll": 0.0}
-    # The app's degrees and its quaternion mean the same turn.
+    # The app's degrees and its quaternion describe the same rotation.
     (degrees,), _ = faces_of(["/HR", [0.0, 30.0, 0.0]])
     assert face == pytest.approx(angles, abs=1e-6)
     assert degrees == pytest.approx(angles, abs=1e-6)
@@ -372,7 +373,7 @@ def test_hostile_osc():
     steps += [["osc", "/jawOpen", [0.25]]]
     clip, status = record("osc", *steps)
     assert clip.curve("CTRL_expressions.jawOpen")[-1] == 0.25
-    # Of the junk only a message without values and one of an odd name are sound OSC.
+    # Only a message without values and one with an odd name are valid OSC.
     assert status.refused >= len(steps) - 4
     for data, words in ((deep, "too deep"), (b"/x\0\0,q\0\0", "a message of OSC was expected")):
         with pytest.raises(LiveError, match=words):
@@ -392,14 +393,14 @@ def test_names_without_end_do_not_stop_a_sender():
     make_up("n", 600)
     for letter in "abcdefghij":
         decoder.feed(units, "here", 1.0)
-        # Repeated names keep their places among names that come once.
+        # Repeated names keep their places among unique names.
         values = make_up(letter, 60)
         assert len(values) == 512
         assert [values[name] for name in livelink.NAMES[:52]] == [0.25] * 52
 
 
 def fed(receiver, step, now, sender="127.0.0.1"):
-    """Give a receiver a packet as its thread does, at a time of our own."""
+    """Give a receiver a packet at a chosen time, as its thread would."""
     receiver._take_in(packed(step), sender, now)
 
 
@@ -408,7 +409,7 @@ def test_made_up_subjects_lock_no_phone_out():
     for n in range(500):
         fed(receiver, v6(n, face(), f"made up {n}", OTHER), 1.0 + n / 500)
     assert len(receiver.status().subjects) == 32
-    for n in range(120):  # the phone comes later and streams; they go on
+    for n in range(120):  # the phone starts later, while the invented subjects continue
         fed(receiver, v6(n, face(i17=n / 128.0)), 2.0 + n / 60)
         for other in range(3):
             fed(receiver, v6(n, face(), f"again {n} {other}", OTHER), 2.0 + n / 60 + 0.005)
@@ -432,7 +433,7 @@ def test_subjects_that_stream_keep_their_places():
 
 
 def flood(receiver, seconds, at, steps=lambda n: ()):
-    """Send six packets a second for each of 32 invented subjects, and the packets of `steps`."""
+    """Send six packets per second for each of 32 invented subjects, and the packets of `steps`."""
     for n in range(round(6 * seconds)):
         for k in range(32):
             address = at(k)
@@ -447,7 +448,7 @@ def test_a_phone_that_was_there_first_keeps_its_place_in_a_flood(at):
     for n in range(10):
         fed(receiver, v6(n, face(i17=0.25)), 9.0 + n / 60)
 
-    def phone(n):  # silent for 3 s
+    def phone(n):  # no packets for 3 s
         return [(v6(n, face(i17=0.75)), "127.0.0.1")] if n > 18 else []
 
     flood(receiver, 4.0, at.format, phone)
@@ -461,7 +462,7 @@ def test_invented_subjects_of_one_address_lock_no_phone_of_another_out():
     for n in range(6):
         fed(receiver, v6(n, face(), "second", OTHER), 9.0 + n / 60, "10.0.0.2")
 
-    def phone(n):  # the second of its address too, and silent for some time
+    def phone(n):  # the second subject of its address, with a pause
         busy = n < 3 or n > 20
         return [(v6(6 * n, face(i17=0.5), f"iPhone {k}"), "10.0.0.1") for k in range(2 * busy)]
 
@@ -475,7 +476,7 @@ def test_invented_subjects_of_one_address_lock_no_phone_of_another_out():
 def test_packets_of_another_address_do_not_move_a_face_that_is_followed():
     receiver = Receiver("livelink")
     take = receiver.record("iPad")
-    for n in range(6):  # version 1 has no device: the name alone is the same
+    for n in range(6):  # version 1 lacks the device: only the name identifies
         fed(receiver, ["v1", "iPad", n / 60, n, face(52, i17=0.25)], 1.0 + n / 60, "10.0.0.1")
         fed(receiver, ["v1", "iPad", n / 60, n, face(52, i17=1.0)], 1.0 + n / 60, "10.0.0.66")
         fed(receiver, v6(n, face(i17=1.0), "iPad", PHONE), 1.0 + n / 60, "10.0.0.66")
@@ -504,7 +505,7 @@ def test_a_named_subject_gets_a_place_in_a_flood_that_came_first(way):
     receiver = Receiver("livelink")
     getattr(receiver, way)("iPhone" if way == "record" else ["iPhone"])
 
-    def phone(n):  # from the address of the flood, with long silences
+    def phone(n):  # from the address of the flood, with pauses
         return [(v6(10 * n, face(i17=n / 64.0)), "127.0.0.1")] if n > 12 and n % 12 == 1 else []
 
     flood(receiver, 8.0, "127.0.0.1".format, phone)
@@ -588,7 +589,7 @@ def test_a_port_in_use_is_one_sentence():
 
 @pytest.fixture
 def bound(monkeypatch):
-    """The addresses that receivers listen at, as the system tells them."""
+    """The addresses that receivers listen at, as the system reports them."""
     from risorius.live import receiver
 
     found, bind = [], receiver._bound
@@ -619,7 +620,7 @@ def test_nothing_but_this_machine_is_heard_unless_it_is_said(bound, capsys):
 
 def test_the_address_for_the_app_is_one_of_this_machine(monkeypatch):
     address = risorius.live.own_address()
-    if address:  # somebody listens there: only an own address can be bound
+    if address:  # only own addresses can be bound
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind((address, 0))
     assert not address.startswith("127.")
@@ -651,7 +652,7 @@ def test_neutral_now_and_gains():
     assert values["CTRL_expressions.eyeBlinkL"] == 0.0
     shaper.gains = {"jawOpen": 0.25}
     got = shaper.apply(frame_of(jawOpen=1.0, head__yaw=0.3, eyeBlinkLeft=1.0))
-    assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is still reached
+    assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is reached
 
 
 def test_gains_leave_shut_lips_shut():
@@ -664,7 +665,7 @@ def test_gains_leave_shut_lips_shut():
         assert values["CTRL_expressions.jawOpen"] == pytest.approx(0.375)
         assert values["CTRL_expressions.mouthLipsTogetherUR"] == pytest.approx(share)
     got = shaper.apply(frame_of(jawOpen=0.025, mouthClose=0.03))
-    assert 0 < got.values[1] < 1  # near a shut jaw the share falls to 0
+    assert 0 < got.values[1] < 1  # near a shut jaw the share is below 1
 
 
 def test_a_mapping_of_ones_own(tmp_path):
@@ -708,7 +709,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
 
 
 def test_smoothing_is_the_one_euro_filter():
-    """Against the paper's algorithm, value by value in plain Python."""
+    """Compared with the paper's algorithm, value by value in plain Python."""
     random = np.random.default_rng(3)
     raw = np.clip(
         0.5 + random.normal(0, 0.02, 200) + np.where(np.arange(200) > 120, 0.4, 0.0), 0, 1
@@ -720,7 +721,7 @@ def test_smoothing_is_the_one_euro_filter():
     assert np.allclose(got, wanted, atol=1e-5)
     still = slice(60, 120)
     assert np.std(got[still]) < 0.4 * np.std(raw[still])
-    assert np.mean(got[130:140]) > 0.5 + 0.4 * 0.8  # a quick move passes
+    assert np.mean(got[130:140]) > 0.5 + 0.4 * 0.8  # a quick movement passes
 
 
 def plain_one_euro(past, value, step):

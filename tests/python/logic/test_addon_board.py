@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face board's table, its fit and its layout, without Blender."""
+"""The face board's table, its fit and its layout, tested without Blender."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def board(sample: tuple[Any, list[str]]) -> Any:
 
 
 def _raw_by_hand(table: Any, gui: np.ndarray) -> np.ndarray:
-    """The rows of the table, evaluated one after the other."""
+    """The raw controls of a pose, from the table's rows one after the other."""
     out = np.zeros(table.raw_count)
     done = set()
     for row in table.rows:
@@ -91,7 +91,7 @@ def test_a_fit_finds_the_way_back(sample: tuple[Any, list[str]]) -> None:
 
 
 def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> None:
-    # raw 0 = a + b, raw 1 = a: of (0.9, 0.2) a = 0.2 and b = 0.7 give all.
+    # raw 0 = a + b, raw 1 = a: for (0.9, 0.2) the solution is a = 0.2 and b = 0.7.
     rows: Rows = [
         (0, 0, 0.0, 1.0, 1.0, 0.0),
         (0, 1, 0.0, 1.0, 1.0, 0.0),
@@ -103,7 +103,7 @@ def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> No
 
 
 def test_what_a_fit_loses_is_said_by_name() -> None:
-    """Up 0.5 and down 0.3 of one slider at once: the greater stays, the other is lost."""
+    """Up 0.5 and down 0.3 of one slider: the larger value is kept, the other is lost."""
     rows: Rows = [(0, 0, 0.0, 1.0, 1.0, 0.0), (0, 1, -1.0, 0.0, -1.0, 0.0)]
     table = _of_rows(["a.ty"], rows, 2)
     gui = fitting.fit(table, [[0.5, 0.3]], [[0.0]])
@@ -176,7 +176,7 @@ def test_a_board_lies_as_one_sees_a_face(board: Any) -> None:
         by_stem.setdefault(handle.stem, {})[handle.side] = handle.place
     for stem, sides in by_stem.items():
         if {"L", "R"} <= set(sides):
-            assert sides["L"][0] > sides["R"][0], stem  # the character's left: the viewer's right
+            assert sides["L"][0] > sides["R"][0], stem  # the character's left is the viewer's right
             assert sides["L"][1] == pytest.approx(sides["R"][1]), stem
     rows = [by_stem[stem]["L"][1] for stem in ("brow_raiseIn", "eye", "nose", "mouth_corner")]
     rows.append(by_stem["jaw"][""][1])
@@ -195,7 +195,7 @@ def test_handles_go_as_the_face_goes(sample: tuple[Any, list[str]]) -> None:
     assert ways["CTRL_R_mouth_corner.tx"] == layout.LEFT  # wide is outwards
     assert ways["CTRL_C_mouth_lipShiftU.ty"] == layout.RIGHT
     jaw = table.names.index("CTRL_C_jaw.tx")
-    measured = layout.ways_of(table, raw, {jaw: -0.4})  # of a face whose left is the viewer's
+    measured = layout.ways_of(table, raw, {jaw: -0.4})  # a face whose left is the viewer's left
     assert measured[jaw] == layout.LEFT
 
 

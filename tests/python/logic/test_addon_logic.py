@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic, which needs no Blender: names, regions, spaces, plans."""
+"""The add-on's logic, tested without Blender: names, regions, spaces, plans."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOGIC = Path(__file__).resolve().parents[3] / "addon" / "risorius" / "logic"
 
 
 def _load_logic() -> ModuleType:
-    """The package under a name of its own, so that addon/ never comes onto sys.path."""
+    """Load the package under another name, so that addon/ need not be on sys.path."""
     name = "risorius_addon_logic"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(
@@ -174,7 +174,7 @@ def test_a_sentence_remembers_what_it_was_made_of() -> None:
     assert whole == "Idle: only the first 3 are shown."
     assert whole.template == "{layer}: {reason}."
     assert whole.values["reason"].values == {"count": 3}
-    assert sentences.told("100 % {plain}") == "100 % {plain}"  # nothing stands for it
+    assert sentences.told("100 % {plain}") == "100 % {plain}"  # without values, a % stays
 
 
 REGIONS = face_regions.FaceRegions(
@@ -226,7 +226,7 @@ class TestLeftAndRight:
             rows = slider_rows.rows_of([names[i] for i in groups[region]], region, regions, True)
             first, more = first_sliders.part(rows, region)
             assert sorted((*first, *more), key=str) == sorted(rows, key=str)
-            assert more == [row for row in rows if row in more]  # in the order of the file
+            assert more == [row for row in rows if row in more]  # the order of the file
             assert 1 <= len(first) <= 10
             shown = [slider_words.short_name(name) for row in first for name in row.sliders]
             assert set(shown) == set(listed), region
@@ -345,7 +345,7 @@ class TestSpace:
     def test_rotation_carries_points_as_in_the_file(
         self, sequence: str, signs: tuple[int, int, int], axes: tuple[str, str, str]
     ) -> None:
-        # Turning in the file and converting equals converting and turning in Blender.
+        # Rotating in the file and converting equals converting and rotating in Blender.
         made = _space(rotation_sequence=sequence, rotation_signs=signs, coordinate_system=axes)
         angles = np.array([[20.0, -70.0, 130.0]])
         point = np.array([1.0, 2.0, 3.0])
@@ -409,7 +409,7 @@ class TestSpace:
 
 
 def _matrix(q: Any) -> Any:
-    """A quaternion w x y z as the matrix that turns v into q v q*."""
+    """The matrix that rotates v like the quaternion w x y z: q v q*."""
     w, v = float(q[0]), np.asarray(q[1:], np.float64)
     cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return np.eye(3) + 2 * w * cross + 2 * cross @ cross
@@ -572,7 +572,7 @@ def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
 
 
 def _along(keys: Any, frames: Any) -> Any:
-    """Values at frames of keys with handles at thirds."""
+    """Values of a curve at frames, with handles at a third of the distance between keys."""
     place = np.clip(np.searchsorted(keys.co[:, 0], frames, "right") - 1, 0, len(keys.co) - 2)
     first, after = keys.co[place], keys.co[place + 1]
     t = (frames - first[:, 0]) / (after[:, 0] - first[:, 0])
@@ -586,7 +586,7 @@ def test_few_keys_stay_near_every_sample_and_between_them(even: bool) -> None:
     random = np.random.default_rng(5)
     frames = np.arange(80.0) if even else np.cumsum(random.uniform(0.2, 2.0, 80))
     smooth = np.convolve(random.uniform(0, 1, 100), np.hanning(21) / 10, "valid")
-    values = np.where(frames < frames[60], smooth, 0.0)  # a jump, then nothing moves
+    values = np.where(frames < frames[60], smooth, 0.0)  # a jump, then a constant
     keys = bezier_keys.Fitter(0.01).keys(frames, values)
     assert len(keys.co) < 40
     assert np.abs(_along(keys, frames) - values).max() <= 0.01

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic of looks: textures by name, effects of animated maps, folds of a face."""
+"""The add-on's logic of materials: textures by name, effects of animated maps, folds of a face."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ class TestMaps:
 
 
 class TestFolds:
-    """A head of 18 by 20 by 25 cm; its eyes 6 cm apart, the mouth 7 cm below them."""
+    """A head of 18 by 20 by 25 cm, with eyes 6 cm apart and the mouth 7 cm below the eyes."""
 
     eyes = (np.array([0.03, -0.06, 1.6]), np.array([-0.03, -0.06, 1.6]))
     head = np.array([[-0.09, -0.10, 1.47], [0.09, 0.10, 1.72]])
@@ -223,8 +223,8 @@ class TestFolds:
         points = np.array([place, (-place[0], *place[1:]), (place[0], 0.1, place[2])])
         masks = folds.area_masks(points, self.frame())
         assert masks[area][0] > 0.6
-        assert masks[area][1] == pytest.approx(masks[area][0])  # both sides alike
-        assert masks[area][2] == 0.0  # not at the back of the head
+        assert masks[area][1] == pytest.approx(masks[area][0])  # both sides are equal
+        assert masks[area][2] == 0.0  # nothing at the back of the head
         assert all(m.min() >= 0 and m.max() <= 1 for m in masks.values())
 
     def test_sides(self) -> None:
@@ -244,6 +244,6 @@ def test_light_goes_nowhere_beside_the_necks_border_and_through_lids():
     assert near.dtype == np.float32
     np.testing.assert_array_equal(near[heights.searchsorted([-0.2, -0.191])], 1)
     assert 0 < near[heights.searchsorted(-0.182)] < 1
-    assert not near[(points[:, 2] > -0.174)].any()  # nor at the rim of a lid
+    assert not near[(points[:, 2] > -0.174)].any()  # nor at the rim of an eyelid
     assert not folds.border_share(points, np.array([41]), frame).any()
     assert not folds.border_share(points, np.array([], int), frame).any()

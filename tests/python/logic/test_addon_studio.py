@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The studio: the picture contains head and shoulders, and the lights follow portrait
-photography."""
+"""The studio: the picture contains head and shoulders.
+
+The lights follow portrait photography.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,12 @@ import test_addon_logic  # noqa: F401  loads the package
 
 studio: Any = importlib.import_module("risorius_addon_logic.character.studio_plan")
 
-GROWN = (0.063, (-0.2, -0.1, -0.42), (0.2, 0.2, 0.125))  # with shoulders
-GIRL = (0.056, (-0.1, -0.09, -0.2), (0.1, 0.14, 0.13))  # ends at the neck
+GROWN = (0.063, (-0.2, -0.1, -0.42), (0.2, 0.2, 0.125))  # an adult, with shoulders
+GIRL = (0.056, (-0.1, -0.09, -0.2), (0.1, 0.14, 0.13))  # a child whose mesh ends at the neck
 
 
 def edges(plan):
-    """Height of the picture's lower and upper edge over the eyes, at their distance."""
+    """Heights of the picture's lower and upper edge relative to the eyes, at the eyes' distance."""
     x, y, z = plan.camera
     away, whole = math.hypot(x, y), math.dist(plan.camera[:2], plan.target[:2])
     middle = z + (plan.target[2] - z) * away / whole
@@ -42,7 +44,7 @@ def test_a_neck_that_ends_is_below_the_picture_and_high_hair_in_it():
 
 
 def test_a_head_that_ends_at_the_chin_is_in_the_picture_whole():
-    for end in (-0.1, -0.135, -0.18):  # the last: where eyes are guessed from the box
+    for end in (-0.1, -0.135, -0.18):  # the last: eyes are estimated
         low, high = edges(studio.plan(0.063, (-0.08, -0.1, end), (0.08, 0.1, 0.12)))
         assert low < end
         assert high > 0.12
@@ -80,7 +82,7 @@ def test_lamps_and_backdrop_are_outside_of_the_picture_and_behind_it():
     plan = studio.plan(*GROWN)
     camera, target = plan.camera, plan.target
     way = [t - c for t, c in zip(target, camera, strict=True)]
-    slope = studio.SENSOR / plan.lens / 2 * 16 / 9  # of half a wide picture's width
+    slope = studio.SENSOR / plan.lens / 2 * 16 / 9  # half the width of a 16:9 picture
     for lamp in plan.lamps:
         off = [p - c for p, c in zip(lamp.place, camera, strict=True)]
         along = sum(a * b for a, b in zip(off, way, strict=True)) / math.hypot(*way)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every word that the add-on shows is in the tables of each language, and none there is stale."""
+"""The translation tables contain every text that the add-on shows, and no other text."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ CLASSES = (
     "FileHandler",
     "PropertyGroup",
 )
-# functions that look words up -> which argument
+# function that translates a text -> index of the argument with the text
 SENTENCES = {"say": 0, "told": 0, "mark": 0, "write": 1, "prop_or": 4}
-SHOWN = {"report": 1, "poll_message_set": 0}  # functions of Blender that show a text as it is
+SHOWN = {"report": 1, "poll_message_set": 0}  # Blender shows these texts unchanged
 
-Found = dict[tuple[str, str], str]  # (context, English) -> where
+Found = dict[tuple[str, str], str]  # (context, English text) -> place in the source
 
 
 def read(name: str) -> dict[str, Any]:
@@ -40,20 +40,20 @@ def read(name: str) -> dict[str, Any]:
 
 
 class Reader(ast.NodeVisitor):
-    """Collects the strings of a file, and code that hides them from translation."""
+    """Collects the texts in a source file, and code whose texts cannot be translated."""
 
     def __init__(self, path: Path, only: Sequence[str] = ()) -> None:
         self.path, self.only = path, only
         self.found: Found = {}
         self.hidden: list[str] = []
         self.tree = ast.parse(path.read_text(encoding="utf-8"))
-        self.values: dict[str, list[ast.expr]] = {}  # what a name can stand for
+        self.values: dict[str, list[ast.expr]] = {}  # name -> the expressions assigned to it
         for node in ast.walk(self.tree):
             self.note(node)
         self.visit(self.tree)
 
     def note(self, node: ast.AST) -> None:
-        """Record values of names from assignments and from loops over literal rows."""
+        """Record the values of names from assignments, and from loops over literal rows."""
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 if isinstance(target, ast.Name):
@@ -67,7 +67,7 @@ class Reader(ast.NodeVisitor):
                             self.values.setdefault(target.id, []).append(value)
 
     def add(self, node: ast.expr | None, context: str, only_plain: bool = True) -> None:
-        """The texts that an expression can be."""
+        """Add all texts that an expression can have."""
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if any(letter.isalpha() for letter in node.value):
                 self.found[context, node.value] = f"{self.path.name}:{node.lineno}"
@@ -80,6 +80,13 @@ class Reader(ast.NodeVisitor):
                     self.add(value, context, only_plain=False)
         elif isinstance(node, ast.JoinedStr) and only_plain:
             self.hidden.append(f"{self.path.name}:{node.lineno}")
+
+    def add_items(self, rows: Sequence[ast.expr]) -> None:
+        """The names and descriptions of an enumeration, whatever the case of its identifiers."""
+        for row in rows:
+            if isinstance(row, ast.Tuple) and len(row.elts) == 3:
+                self.add(row.elts[1], "Risorius")
+                self.add(row.elts[2], "*")
 
     def visit_ClassDef(self, node: ast.ClassDef) -> None:
         bases = {ast.unparse(base).rpartition(".")[2] for base in node.bases}
@@ -98,7 +105,7 @@ class Reader(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Tuple(self, node: ast.Tuple) -> None:
-        """(IDENTIFIER, name, description) is an item of an enumeration."""
+        """A tuple (IDENTIFIER, name, description) is an item of an enum."""
         values = [e.value for e in node.elts if isinstance(e, ast.Constant)]
         if (
             not self.only
@@ -120,10 +127,10 @@ class Reader(ast.NodeVisitor):
         if name.endswith("Property") or name == "_still":
             self.add(words.get("name"), "Risorius")
             self.add(words.get("description"), "*")
-            for row in getattr(words.get("items"), "elts", ()):
-                if isinstance(row, ast.Tuple) and len(row.elts) == 3:  # whatever its case
-                    self.add(row.elts[1], "Risorius")
-                    self.add(row.elts[2], "*")
+            self.add_items(getattr(words.get("items"), "elts", ()))
+        elif name in ("_choice", "_allowed"):  # of the licence: a name and items
+            self.add(node.args[0], "Risorius")
+            self.add_items(node.args[1:])
         elif name == "pgettext_tip":
             self.add(node.args[0], "*")
         elif name in SENTENCES and owner in ("", "words"):
@@ -150,7 +157,7 @@ def sources() -> Iterator[Path]:
 
 
 def sources_of_sentences() -> Iterator[Path]:
-    """Files that make sentences for other files to show."""
+    """Files with sentences that other files show."""
     yield ADDON / "native.py"
     for folder in ("scene", "logic"):
         for path in sorted((ADDON / folder).rglob("*.py")):
@@ -159,14 +166,14 @@ def sources_of_sentences() -> Iterator[Path]:
 
 
 def titles_of_the_package() -> Found:
-    """Headings and names that the package has and the add-on shows."""
+    """Titles and labels in the package's files that the add-on shows."""
     found: Found = {}
     table = tomllib.loads((PACKAGE / "controls" / "regions.toml").read_text(encoding="utf-8"))
     found |= {("Risorius", row["title"]): "regions.toml" for row in table.values()}
     for path in [*(PACKAGE / "expressions").glob("*.toml"), PACKAGE / "anim" / "reactions.toml"]:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         if table.get("group") == "viseme":
-            continue  # their labels are signs of sounds
+            continue  # the labels of visemes are phonetic signs
         for row in table.get("expressions", table).values():
             if isinstance(row, dict) and "label" in row:
                 found["Risorius", row["label"]] = path.name
@@ -226,7 +233,7 @@ def test_there_is_a_second_language() -> None:
 
 
 def _tables() -> Any:
-    """The add-on's own reader of the tables, under a name of its own."""
+    """The add-on's reader of translation tables, loaded under another name."""
     name = "risorius_addon_language"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, None, is_package=True)
@@ -279,7 +286,7 @@ def test_animators_words_find_controls(search: str, wanted: str) -> None:
 def test_translations_have_a_context_of_their_own() -> None:
     found = _tables().translation("de")
     assert found["Risorius", "Face"] == "Gesicht"
-    assert ("*", "Face") not in found  # a polygon, which is Blender's
+    assert ("*", "Face") not in found  # a polygon, which Blender translates itself
     english = _tables().controls("en").tooltip("CTRL_expressions.jawOpen")
     assert found["*", english] == "Senkt den Unterkiefer und öffnet den Mund"
 

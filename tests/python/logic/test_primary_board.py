@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The primary board without Blender: controls and places of its handles, and reachable poses."""
+"""The primary board, tested without Blender: controls and places of its handles, and poses."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ primary: Any = importlib.import_module("risorius_addon_logic.character.primary_t
 drawing: Any = importlib.import_module("risorius_addon_logic.character.primary_layout")
 view_fit: Any = importlib.import_module("risorius_addon_logic.character.view_fit")
 
-# In a window of 1366 x 768 pixels as Blender opens it: a 3D view, and what toolbar, sidebar and
-# headers leave of it (measured in 4.3.2 and 5.2.2).
+# A 3D view in a window of 1366 x 768 pixels as Blender opens it (width, height); its part that
+# toolbar, sidebar and headers leave free (left, bottom, right, top; measured in 4.3.2 and 5.2.2);
+# its lens in mm.
 VIEW, FREE, LENS = (1119, 663), (58, 0, 827, 609), 50.0
-HEAD = (-10.1, -17.1, 142.9), (10.1, 4.8, 173.5)  # of the sample man, in cm
+HEAD = (-10.1, -17.1, 142.9), (10.1, 4.8, 173.5)  # corners of the sample man's head, in cm
 
 
 @pytest.fixture(scope="module")
 def labels() -> list[str]:
-    """The names of the sample's raw controls."""
+    """Names of the sample's raw controls."""
     table = sample_controls.gui_table()
     return list(dict.fromkeys(name for _gui, ways in table for name, _numbers in ways))
 
@@ -90,7 +91,7 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
 
 
 def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
-    """A brow goes down by its inner or its outer end, while the other end goes up."""
+    """One end of a brow is lowered while the other end is raised."""
     names = [f"face_L_brow_{end}.ty" for end in ("inner", "outer")]
     inner, outer = (table.names.index(name) for name in names)
     for up, down in ((inner, outer), (outer, inner)):
@@ -147,7 +148,7 @@ def test_outwards_is_outwards_and_left_is_where_the_face_goes(table: Any) -> Non
     assert way("face_R_mouth_corner", {}) == layout.LEFT
     jaw = table.names.index("face_jaw.tx")
     assert way("face_jaw", {jaw: 0.4}) == layout.RIGHT
-    assert way("face_jaw", {jaw: -0.4}) == layout.LEFT  # this face's left is the viewer's
+    assert way("face_jaw", {jaw: -0.4}) == layout.LEFT  # this face's left is the viewer's left
 
 
 @pytest.mark.parametrize("perspective", [True, False])
@@ -158,7 +159,7 @@ def test_a_handle_travels_40_pixels_in_a_small_window_beside_the_whole_head(
     corners = [(x, y, z) for x in (-10.1, 10.1) for y in (-17.1, 4.8) for z in (142.9, 173.5)]
     for x, z in board.border[0]:
         corners.append((middle[0] + x * unit, middle[1], middle[2] + z * unit))
-    points = np.array(corners)[:, [0, 2, 1]] * (1, 1, -1)  # right, up, towards the view
+    points = np.array(corners)[:, [0, 2, 1]] * (1, 1, -1)  # right, up, to the viewer
     points[:, 2] -= -middle[1]
     right, up, far = view_fit.fit(points, LENS, VIEW, FREE, perspective)
     seen = view_fit.on_screen(points - (right, up, 0.0), far, LENS, VIEW, perspective)
@@ -168,14 +169,14 @@ def test_a_handle_travels_40_pixels_in_a_small_window_beside_the_whole_head(
     ends = np.array([(0.0, 0.0, 0.0), (unit, 0.0, 0.0)])
     travel = float(np.ptp(view_fit.on_screen(ends, far, LENS, VIEW, perspective), axis=0)[0])
     assert travel >= 40.0
-    assert np.ptp(seen[:8], axis=0)[0] > 150.0  # the head is not a speck beside it
+    assert np.ptp(seen[:8], axis=0)[0] > 150.0  # the head is not too small beside the board
 
 
 def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None:
-    """The handles that a click on an expression sets, on a face that is 240 mm high.
+    """Compares expressions with the handles that a click on them sets, on a face 240 mm high.
 
-    Of each mesh that moves, tongue and teeth too: root of the mean square over its vertices that
-    the expression moves by 0.1 mm.
+    The error of a mesh, tongue and teeth included, is the root mean square over the vertices that
+    the expression moves by 0.1 mm or more.
     """
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
@@ -190,7 +191,7 @@ def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None
 
 @dataclass
 class Near:
-    """How far an expression is from rest, and the board's pose from it, in mm; handles used."""
+    """Distance of an expression from rest and from the board's pose in mm; used handles."""
 
     way: float = 0.0
     off: float = 0.0
@@ -198,7 +199,7 @@ class Near:
 
 
 def primary_errors(dna: Any) -> dict[str, Near]:
-    """Smallest error of the primary board for each expression, on its worst mesh."""
+    """The error of the primary board for each expression, on the mesh with the largest error."""
     surface = risorius.Surface(dna, risorius.Rig(dna), lod=1)
     table = primary.table_of(list(dna.raw_control_names))
     named = expressions.load()
@@ -225,7 +226,7 @@ def primary_errors(dna: Any) -> dict[str, Near]:
 
 
 def _at(surface: Any, raw: np.ndarray, mesh: int) -> np.ndarray:
-    """Vertices in mm."""
+    """Vertices of a mesh in mm."""
     places = surface.positions(raw.astype(np.float32), mesh)
     return np.asarray(places, np.float64) * surface.mm
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces mixed by region, compared with a model in this test."""
+"""Faces mixed by region, compared with a calculation in this test."""
 
 import copy
 import importlib.util
@@ -29,7 +29,7 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=4), lods=LodOptions(count=3))
 
 
 def stretched(dna, factors, lift):
-    """A face of shapes, stretched and lifted, with eyes of another size."""
+    """A copy of a face with blend shapes, scaled and raised, with eyes of another size."""
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -49,7 +49,7 @@ def stretched(dna, factors, lift):
 
 @pytest.fixture(scope="module")
 def faces(tmp_path_factory):
-    """Three faces of one topology, made of joints; the second is narrow, the third far above."""
+    """Three faces of joints with equal topology; the second is narrow, the third is higher."""
     folder = tmp_path_factory.mktemp("mixing")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
@@ -64,7 +64,7 @@ def faces(tmp_path_factory):
 
 
 def dense_joints(dna):
-    """float64[rows, columns]: the joint matrix."""
+    """The joint matrix as a dense array, float64[rows, columns]."""
     out = np.zeros((9 * len(dna.joint_names), len(dna.raw_control_names) + dna.psd_count))
     for group in dna.joint_groups:
         out[np.ix_(group.output_indices, group.input_indices)] += group.values
@@ -84,7 +84,7 @@ def test_one_share_is_that_parent_bit_for_bit(faces, shares, at):
 
 
 def test_halves_are_the_mean_of_all_numbers(faces):
-    """The model: every number is the mean of the parents' numbers."""
+    """With equal shares, every number is the mean of the parents' numbers."""
     one, narrow, _ = faces
     mixed = mix_faces([one, narrow], Mix([0.5, 0.5]))
     assert mixed.validate() == []
@@ -106,8 +106,10 @@ def test_halves_are_the_mean_of_all_numbers(faces):
 
 
 def test_a_mix_moves_half_way_between_its_parents(faces):
-    """In an independent reader, an expression of the mix lies between the parents' within a tenth
-    of a mm."""
+    """In an independent reader, an expression of the mix is the mean of its parents'.
+
+    The largest error is 0.3 mm.
+    """
     one, narrow, _ = faces
     mixed = mix_faces([one, narrow], Mix([0.5, 0.5]))
     values = np.zeros(len(one.raw_control_names), np.float32)
@@ -132,7 +134,7 @@ def test_blend_shapes_keep_the_order_of_the_first_parent(faces):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_mean_of_two_turns_lies_on_the_short_way(faces, sign):
-    """Between 170 and -170 degrees is 180, and not 0."""
+    """The mean of 170 and -170 degrees is 180 degrees, not 0."""
     parents = [copy.copy(faces[0]), copy.copy(faces[0])]
     for dna, angle in zip(parents, (170.0, -170.0), strict=True):
         turns = np.array(dna.neutral_joint_rotations)
@@ -160,11 +162,12 @@ def test_a_region_takes_the_other_ones_form_to_its_own_place(faces):
     mouth = masks[:, REGIONS.index("mouth")]
     before, after = (np.asarray(d.meshes[0].positions, np.float64) for d in (one, mixed))
     np.testing.assert_allclose(after[mouth < 1e-9], before[mouth < 1e-9], atol=1e-6)
-    # The other face is 30 higher and a fifth larger, otherwise equal: no difference remains.
+    # The other face is 30 units higher and a fifth larger, otherwise equal, so no difference
+    # remains.
     np.testing.assert_allclose(after, before, atol=1e-4)
     other = copy.deepcopy(high)
     mesh = other.meshes[0]
-    # One half of its mouth is farther forward; the mix has this in its own size.
+    # One half of its mouth is moved forward; the mix contains this in its own size.
     left = before[:, 0] > 0
     mesh.positions = np.asarray(mesh.positions) + np.outer(0.6 * (left & (mouth > 0.5)), [0, 0, 1])
     other.meshes = [mesh, *other.meshes[1:]]
@@ -276,7 +279,7 @@ def test_what_does_not_go_together_is_said(faces, change, why):
 
 @pytest.fixture
 def files(faces, tmp_path):
-    """Files of the faces with a picture each: of the skin, one value."""
+    """Files of the faces, each with a skin texture of one colour and a wrinkle mask."""
     for number, dna in enumerate(faces):
         own = copy.copy(dna)
         own.metadata = {f"texture:{dna.mesh_names[0]}:color": "skin.png"}
@@ -432,7 +435,7 @@ def test_pictures_are_read_back_or_refused():
 
 
 def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
-    """The man and the most different person as blend shape faces, whole and by region."""
+    """The man and the most different person, with blend shapes, mixed wholly and by region."""
     both = [sample_people.assembled(name)[0] for name in ("man", "girl")]
     masks = Masks(both[0])
     mixes = [Mix([1.0, 1.0])]
@@ -446,13 +449,13 @@ def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
             assert off[0] <= 1.05 * max(off[1:])
         head = list(dna.mesh_names).index("head_lod0_mesh")
         own, *parents = (_normals(d.meshes[head]) for d in (dna, *both))
-        # Deep in nostrils and lips the two themselves have faces that look elsewhere.
+        # Deep in nostrils and lips, faces of the two parents themselves have opposite normals.
         flipped = np.all([(own * p).sum(axis=1) < 0 for p in parents], axis=0)
         assert flipped.sum() == 0, mix.regions
 
 
 def _roundness(mesh):
-    """How far an eye's vertices are from the ball that fits them best, of its radius."""
+    """Deviation of an eye's vertices from the best fitting ball, relative to its radius."""
     points = np.asarray(mesh.positions, np.float64)
     rows = np.column_stack([2 * points, np.ones(len(points))])
     solved, *_ = np.linalg.lstsq(rows, (points**2).sum(axis=1), rcond=None)

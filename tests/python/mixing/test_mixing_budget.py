@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Mixing, solving and authoring use memory in proportion to their files: large counts in a file
-make no dense tables."""
+"""Mixing, solving and authoring use memory in proportion to their files.
+
+Large counts in a file do not lead to dense tables.
+"""
 
 import copy
 import struct
@@ -23,11 +25,11 @@ MB = 1 << 20
 BASE, BYTES_PER_BYTE = (
     64 * MB,
     64,
-)  # of the peaks below; tables take twice as much
+)  # limit for the peaks below; dense tables take twice as much
 
 
 def peak_of(work):
-    """The result of work(), and its peak of bytes."""
+    """Run work(). Returns its result and the peak of memory in bytes."""
     tracemalloc.start()
     try:
         return work(), tracemalloc.get_traced_memory()[1]
@@ -36,7 +38,7 @@ def peak_of(work):
 
 
 def large_face(joints=8, controls=8, vertices=64, targets=0):
-    """A face of one mesh, of which each vertex hangs on one joint, and each target moves one."""
+    """A face with one mesh; each vertex has one joint, and each target moves one vertex."""
     dna = Dna()
     dna.name, dna.lod_count = "large", 1
     dna.raw_control_names = [f"CTRL_expressions.jaw{i}" for i in range(controls)]
@@ -89,7 +91,7 @@ def _other_skin(dna):
 
 
 def _groups_that_share_a_joint(dna):
-    """A tall narrow group beside a low wide one, in another order, so that they must be joined."""
+    """Replace the groups by a tall narrow and a low wide one that must be joined."""
     rows, columns = np.arange(9 * len(dna.joint_names)), np.arange(len(dna.raw_control_names))
     dna.joint_groups = [group(rows[1:], columns[:1]), group(rows[:1], columns)]
 
@@ -119,7 +121,7 @@ def test_mixing_holds_no_more_than_some_times_the_faces(sizes, change):
 
 
 def test_groups_of_others_rows_are_joined_row_by_row():
-    """As the union of all would be, without its empty cells."""
+    """The result equals the union of all groups without its empty cells."""
     face = large_face(joints=40, controls=60)
     other = copy.copy(face)
     _groups_that_share_a_joint(other)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hooks and workflows run the same checks as the tests, and the scripts of the workflows exist."""
+"""Git hooks and CI workflows run the same checks as the tests, and their scripts exist."""
 
 import importlib.util
 import os
@@ -41,7 +41,7 @@ def test_the_hooks_are_the_checks_of_the_style_script():
 def test_the_whole_test_command_runs_each_check():
     text = (PROJECT / "packaging" / "test.sh").read_text(encoding="utf-8")
     named = " ".join(re.findall(r"for name in ([\w -]+); do\n +check \"\$name\" .*style", text))
-    # The layers are among the Python tests.
+    # The checks of layers are Python tests.
     assert [*named.split(), "layers"] == _checks()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Results of the packaging scripts: names of wheels in the zip, and the version matrix."""
+"""Results of packaging scripts: names of wheels in the zip, the version matrix, progress."""
 
 import importlib.util
 import os
@@ -35,7 +35,7 @@ def _report(path, *cases):
 
 
 def test_the_wheel_for_3_11_has_the_name_that_sorts_last(tmp_path):
-    # Blender 4.2.0 takes all wheels of its platform and keeps the last name.
+    # Blender 4.2.0 extracts all wheels of its platform and uses the one whose name sorts last.
     build = _script("ship/build_extension")
     version = build.manifest_version(
         (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
@@ -162,7 +162,7 @@ def test_a_rendering_says_how_far_it_is_and_what_is_left():
         now[0] += 2.0
         progress.step()
     assert said[0] == "frame 1 of 240, about 7 min 58 s left"
-    assert said[1] == "frame 4 of 240, about 7 min 52 s left"  # 6 s later: at least 5
+    assert said[1] == "frame 4 of 240, about 7 min 52 s left"  # at least 5 s later
     assert said[-1] == "frame 240 of 240"
     assert len(said) == 1 + 79 + 1
     assert [module.duration(s) for s in (59.4, 80, 3900)] == ["59 s", "1 min 20 s", "1 h 05 min"]
@@ -212,8 +212,8 @@ def test_lines_that_never_ran_are_listed_by_function(tmp_path):
                     {"line_number": 1, "count": 0, "function_name": unnamed},
                     {"line_number": 2, "count": 0, "function_name": unnamed},
                     {"line_number": 4, "count": 0, "function_name": method},
-                    {"line_number": 4, "count": 1, "function_name": method},  # of another type
-                    {"line_number": 5, "count": 0, "function_name": method},  # only cleans up
+                    {"line_number": 4, "count": 1, "function_name": method},  # another type
+                    {"line_number": 5, "count": 0, "function_name": method},  # clean-up only
                     {"line_number": 9, "count": 0, "function_name": method},
                 ],
             }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The gate itself: whatever a lane, a program of tests or a report does, its failure is counted."""
+"""The gate counts every failure of a lane, of a test program or of a report."""
 
 import subprocess
 import sys
@@ -39,8 +39,8 @@ def _report(tmp_path, *cases):
         ([PASS, FAIL, FAIL], 1, "1\t2\t0"),
         ([PASS, SKIP, XFAIL], 0, "1\t0\t2"),
         ([PASS, GOOGLE_SKIP], 0, "1\t0\t1"),
-        ([PASS], 139, "1\t1\t0"),  # died after its report
-        ([SKIP], 0, "0\t1\t1"),  # nothing was tested
+        ([PASS], 139, "1\t1\t0"),  # the program crashed after its report
+        ([SKIP], 0, "0\t1\t1"),  # no test was run
         ([], 0, "0\t1\t0"),
     ],
 )
@@ -103,7 +103,7 @@ def test_a_lane_that_wrote_nothing_at_all_is_a_failure(tmp_path):
 
 
 def _lane(tmp_path, commands):
-    """The exit code of the table after a lane of these commands, run by test.sh's own functions."""
+    """Run these commands as a lane with the functions of test.sh. Returns the table's exit code."""
     script = f"""
       set -uo pipefail; source {PACKAGING}/setup.sh; logs={tmp_path}; mkdir -p {tmp_path}/rows
       source {PACKAGING}/check/rows.sh

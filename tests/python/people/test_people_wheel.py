@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The sample people are a wheel of their own that the package finds, or asks for in a sentence."""
+"""The sample people are a separate wheel.
+
+The package finds it, or asks for it in a sentence.
+"""
 
 import tomllib
 from importlib import metadata
@@ -36,7 +39,7 @@ def test_without_the_wheel_the_command_asks_for_it(tmp_path, monkeypatch, capsys
     assert said.startswith("risorius: the wheel risorius-people is not installed")
     assert f"risorius-people {risorius.__version__}" in said
     assert not face.exists()
-    # Other commands do not need it.
+    # Other commands do not need the wheel.
     assert main(["info", str(tmp_path)]) == 1
     assert "people" not in capsys.readouterr().err
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample person: its parts by formula, and the whole against the data that it is made from."""
+"""The sample person: its parts compared with formulas, the whole with its source data."""
 
 import os
 import sys
@@ -121,7 +121,7 @@ def test_a_texture_shrinks_to_the_means_of_its_blocks(shape):
 
 
 class _Nobody:
-    """A body for tests without painting."""
+    """A body for tests that paint no texture."""
 
     positions, units = np.zeros((0, 3)), {}
 
@@ -132,13 +132,15 @@ class _Nobody:
         return self
 
 
-# ---- on the real data, where they can be had
+# ---- with the real data, if they are available
 
 
 @pytest.fixture(scope="module", params=["girl", "man"])
 def sample(request):
-    """(source, dna, parts, shaped positions, person, body) of a real person: the one that the data
-    are made for, and the one that is least like him."""
+    """A real person: (source, dna, parts, shaped positions, person, body).
+
+    The persons are the one for whom the data are made, and the one that differs most.
+    """
     data, person = sample_people.data(), people.PEOPLE[request.param]
     dna, parts, body = sample_people.assembled(request.param)
     return data, dna, parts, body.positions, person, body
@@ -146,7 +148,7 @@ def sample(request):
 
 @pytest.fixture(scope="module")
 def packed():
-    """The face that the extension carries."""
+    """The sample face in the extension."""
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
         _not_run.add("the extension's sample face")
@@ -155,7 +157,7 @@ def packed():
 
 
 def skinned(dna, rig, raw, mesh_index, lod):
-    """Vertices of a mesh by linear blend skinning in float64, written for this test alone."""
+    """Vertices of a mesh by linear blend skinning in float64, independent of the package."""
     pose = rig.evaluate(raw, lod=lod)
     mesh = dna.meshes[mesh_index]
     p = np.asarray(mesh.positions, float).copy()
@@ -163,7 +165,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
         weight = float(pose.blend_shapes[target.blend_shape_channel_index])
         p[target.vertex_indices] += weight * np.asarray(target.deltas, float)
     starts = np.asarray(mesh.skin_offsets, int)[:-1]
-    assert (np.diff(mesh.skin_offsets.astype(int)) > 0).all()  # who has no weight would be another
+    assert (np.diff(mesh.skin_offsets.astype(int)) > 0).all()  # every vertex has a weight
     moves = _moves(dna, np.asarray(pose.joints, float))[mesh.skin_joint_indices]
     weights = np.asarray(mesh.skin_weights, float)
     blend = np.add.reduceat(weights[:, None, None] * moves[:, :3], starts)
@@ -171,7 +173,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
 
 
 def _moves(dna, joints):
-    """float64[J, 4, 4]: from rest to posed joints."""
+    """Matrices from rest to posed joints, float64[J, 4, 4]."""
     rest = np.asarray(dna.neutral_joint_translations, float)
     (cx, cy, cz), (sx, sy, sz) = (f(np.radians(joints[:, 3:6])).T for f in (np.cos, np.sin))
     zero, one = np.zeros(len(rest)), np.ones(len(rest))
@@ -195,8 +197,10 @@ def _moves(dna, joints):
 
 
 def _rows():
-    """The rows of arkit.toml; a control that takes back a share of another one, with that one at
-    1."""
+    """The rows of arkit.toml.
+
+    To a control that is a share of another control, the other control is added with 1.
+    """
     whole = shares()
     return {
         unit: row | {whole[name]: 1.0 for name in row if name in whole}
@@ -205,8 +209,10 @@ def _rows():
 
 
 def _wanted(data, body, unit, row):
-    """float64[V, 3]: the unit of the data, for lips with the open jaw; lids and eyes as in their
-    own tests."""
+    """The wanted displacement of an ARKit unit, float64[V, 3].
+
+    Shares of the jaw are measured with an open jaw; lids and eyes have tests of their own.
+    """
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
     names = {name.rsplit(".", 1)[-1]: weight for name, weight in row.items()}
@@ -225,14 +231,14 @@ def _wanted(data, body, unit, row):
 
 @pytest.mark.parametrize("lod", [0, 1])
 def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
-    """Within 0.1 % of head height, for every vertex of every mesh."""
+    """The error is at most 0.1 % of the head's height for every vertex of every mesh."""
     data, dna, parts, positions, _, body = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
     head = np.asarray(dna.meshes[0].positions)
     chin = 10 * positions[np.linalg.norm(data.face_unit("jawOpen", len(positions)), axis=1) > 0.3]
     height = head[:, 1].max() - chin[:, 1].min()
-    assert 15 < height < 30  # centimetres; the data's child of eight has 16.3
+    assert 15 < height < 30  # centimetres; the child of eight in the data has 16.3
     worst = {}
     for unit, row in _rows().items():
         raw = np.zeros(len(names), np.float32)
@@ -248,7 +254,7 @@ def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
 
 
 def _heads(dna, poses):
-    """float64[V, 3] of the head at LOD 0 in each pose, centimetres."""
+    """Vertices of the head at LOD 0 in each pose, float64[V, 3], in centimetres."""
     rig, head = risorius.Rig(dna), dna.mesh_names.index("head_lod0_mesh")
     for controls in poses:
         raw = np.zeros(len(dna.raw_control_names), np.float32)
@@ -258,8 +264,10 @@ def _heads(dna, poses):
 
 
 def lips_apart(dna, *poses):
-    """For each pose the least and the most that places of the lips that touch at rest came apart,
-    and the most that they slid along each other, mm."""
+    """For each pose, how far places of the lips that touch at rest move apart, in mm.
+
+    Returns the least and the largest distance, and the largest sliding along each other.
+    """
     purse = {f"mouthLipsPurse{lip}{side}": 1 for lip in "UD" for side in "LR"}
     rest, jaw, purse, *posed = _heads(dna, [{}, {"jawOpen": 1}, purse, *poses])
     travel, moved = (np.linalg.norm(pose - rest, axis=1) for pose in (jaw, purse))
@@ -279,7 +287,7 @@ def lips_apart(dna, *poses):
 
 
 def _takes(*values):
-    """Controls without prefix from captured jawOpen and mouthClose."""
+    """Controls without prefix for captured values of jawOpen and mouthClose."""
     for jaw, close in values:
         curves = {"jawOpen": ([0.0], [jaw]), "mouthClose": ([0.0], [close])}
         clip, _ = importing.import_curves(curves)
@@ -300,14 +308,17 @@ def _check_lips(dna, most):
 
 
 def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
-    """Within 0.8 mm, and a shut jaw's do not move; the data's shape alone moves them by 35 mm."""
+    """Within 0.8 mm; a shut jaw moves no lips. The data's own shape moves them by 35 mm."""
     _check_lips(sample[1], 0.8)
 
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
 def test_extra_the_packed_face_gives_back_its_units(sample, packed):
-    """The joints and shapes that the extension's man is made of, within 0.8 mm; of lips that are
-    to meet over an open jaw too, where five controls and five correctives turn the same joints."""
+    """The extension's man reproduces the units within 0.8 mm.
+
+    Also for lips that meet over an open jaw, where five controls and five correctives rotate the
+    same joints.
+    """
     data, before, parts, _, _, body = sample
     dna = packed
     assert dna.raw_control_names == before.raw_control_names
@@ -326,13 +337,13 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
         wanted = _wanted(data, body, unit, row)
         for part in parts:
             number = dna.mesh_names.index(part.name)
-            # At rest its sides differ, which its joints do not, so compare the displacement.
+            # At rest the man's sides differ, unlike his joints', so displacements are compared.
             rest = np.asarray(dna.meshes[number].positions, float)
             goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0
             error = np.linalg.norm(skinned(dna, rig, raw, number, lod) - goal, axis=1).max()
             worst[unit] = max(worst.get(unit, 0.0), float(error))
-    assert max(worst.values()) < 0.08, worst  # of one control 0.02 and the 0.1 % of the unit
+    assert max(worst.values()) < 0.08, worst  # 0.02 for one control, and 0.1 % of the unit
     _check_lips(dna, 0.8)
 
 
@@ -342,7 +353,7 @@ def test_extra_the_packed_face_has_what_all_expressions_ask_for(packed):
 
 
 def _carried(dna, mesh_name):
-    """float64[V, 4]: how much spine, the two of the neck and the head carry of each vertex."""
+    """Shares of spine, neck_01, neck_02 and head in each vertex's weights, float64[V, 4]."""
     carriers = ["spine_04", "neck_01", "neck_02", "head"]
     mesh = dna.meshes[dna.mesh_names.index(mesh_name)]
     out = np.zeros((len(mesh.positions), len(carriers)))
@@ -359,7 +370,7 @@ def _carried(dna, mesh_name):
 def test_extra_the_packed_face_turns_its_neck_as_before(sample, packed):
     apart = [_carried(dna, "head_lod0_mesh") for dna in (sample[1], packed)]
     deviation = np.abs(apart[0] - apart[1]).sum(axis=1) / 2
-    # Turned by 16 and 18 degrees no vertex is off by 2.2 mm, 0.02 in the mean.
+    # With rotations of 16 and 18 degrees, the largest error is below 2.2 mm, the mean 0.02 mm.
     assert deviation.max() < 0.18
     assert deviation.mean() < 0.003
 
@@ -408,9 +419,9 @@ def test_extra_each_cheek_flushes_on_its_side(sample):
 
 
 def test_people_are_shares_of_the_data():
-    """The formula of the data's own program: ages, muscle and weight are each a line."""
+    """The formula of the data's own program: age, muscle and weight are interpolated linearly."""
     girl = people.PEOPLE["girl"].shape()
-    for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # hers is 0.4
+    for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # her weight is 0.4
         for age, years in (("child", 0.7), ("baby", 0.3)):
             name = f"macrodetails/universal-female-{age}-averagemuscle-{weight}"
             assert girl[name] == pytest.approx(years * share)
@@ -482,7 +493,7 @@ def test_an_unknown_person_is_one_sentence(tmp_path, capsys):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The arguments of build_sample from the command."""
+    """The arguments with which the command calls build_sample."""
     calls = []
 
     def build_sample(path, **options):
@@ -531,7 +542,7 @@ def test_a_spec_that_makes_no_sense_is_one_sentence(tmp_path, asked, capsys, tex
 
 
 def test_the_joints_that_come_along_are_those_of_the_rig():
-    """Its fit to the man himself, names of joints and controls: every test that builds a person."""
+    """Checks the stored joint reference that every person uses: joints, LODs and weights."""
     like = references.shipped()
     assert len(like.names) == build.RIG.fit.joints
     assert len(like.levels) == build.RIG.lods.count
@@ -553,13 +564,13 @@ def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
 
 
 def test_a_displacement_is_carried_by_the_change_of_form():
-    """On a stretched and sheared sheet, motion along an edge stays along that edge."""
+    """On a stretched and sheared sheet, a motion along an edge stays along this edge."""
     side = 12
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)
     faces = [[a, a + 1, a + side + 1, a + side]
              for r in range(side - 1) for a in range(r * side, r * side + side - 1)]  # fmt: skip
-    jaw = [[0, 0, 5], [1, 0, 5], [0, 1, 5]]  # it rests, and nothing else goes as it does
+    jaw = [[0, 0, 5], [1, 0, 5], [0, 1, 5]]  # the jaw is at rest, and no other group moves with it
     before = np.vstack([before, jaw])
     groups = {"body": np.arange(side**2), "helper-lower-teeth": side**2 + np.arange(3)}
     faces = {"body": faces, "teeth": [groups["helper-lower-teeth"].tolist()]}
@@ -595,7 +606,7 @@ def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
         source.Source(other)
 
 
-# A fake pip: it writes a part of a file, waits for the test, and fails.
+# A fake pip that writes a part of a file, waits for the test, and fails.
 PART = """
 import os, sys, tempfile, time
 path = os.path.join(tempfile.mkdtemp(), "part.whl")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample's eyes: their form by formula, and lids that stay on them wherever both go."""
+"""The sample's eyes: their form compared with formulas, and lids that stay on the eyes."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ from risorius_people.eyes import eye_parts, eyeball, lids, with_eyeballs
 from risorius_people.eyes.rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 from risorius_people.paint import eyes as paint
 
-MM = 0.01  # of the data's decimetres
-LIMBUS = 5.85  # mm from the gaze, where a cornea of 7.8 mm begins
+MM = 0.01  # in the data's unit, decimetres
+LIMBUS = 5.85  # mm from the axis of the gaze, where a cornea with a radius of 7.8 mm begins
 
 
 def _height(points, middle, radius, gaze):
-    """How far points are above the ball and the sphere of the cornea, in their units."""
+    """Heights of points above the eyeball and the sphere of the cornea, in the points' unit."""
     scale = radius * eyeball.IRIS / LIMBUS
     ahead = np.sqrt(radius**2 - (LIMBUS * scale) ** 2) - np.sqrt(7.8**2 - LIMBUS**2) * scale
     arm = points - middle
@@ -25,11 +25,11 @@ def _height(points, middle, radius, gaze):
 
 
 def test_the_eye_has_the_measures_of_real_ones():
-    """In millimetres, scaled to a human iris."""
+    """In millimetres, scaled to the size of a human iris."""
     size = LIMBUS / eyeball.IRIS
-    assert 12 <= size <= 15.5  # the ball of people has 12, that of the data up to 16
+    assert 12 <= size <= 15.5  # people's eyeballs have a radius of 12 mm, the data's up to 16
     top = size * float(eyeball.surface(np.zeros(1))[0])
-    assert 1.0 < top - size < 2.0  # what bulges beyond the ball
+    assert 1.0 < top - size < 2.0  # height of the cornea above the ball
     ball = size * eyeball.BALL.points()
     iris = ball[2 * eyeball.SEGMENTS : 12 * eyeball.SEGMENTS]
     depth = top - iris[:, 2]
@@ -39,7 +39,7 @@ def test_the_eye_has_the_measures_of_real_ones():
     ray = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
     points = size * eyeball.surface(angle)[:, None] * ray
     above = _height(points, np.zeros(3), size, np.array([0, 0, 1.0]))
-    assert np.abs(above).max() < 0.1  # but where both run into each other they are the spheres
+    assert np.abs(above).max() < 0.1  # except at their blend the surfaces are spheres
 
 
 def test_ball_and_cornea_are_seen_from_outside_and_do_not_cut_each_other():
@@ -51,9 +51,9 @@ def test_ball_and_cornea_are_seen_from_outside_and_do_not_cut_each_other():
         assert (np.einsum("ij,ij->i", normals, points)[outer] > 0.5).all()
         assert sorted({v for face in faces for v in face}) == list(range(len(points)))
     edges = polygons.edges_of(eyeball.BALL.faces(0, list(range(len(eyeball.BALL.away))), 1))
-    assert {len(owners) for owners in edges.values()} == {2}  # closed
+    assert {len(owners) for owners in edges.values()} == {2}  # closed surface
     shell = eyeball.SHELL.points()
-    inner = shell[: -eyeball.SEGMENTS - 1]  # but the last ring, which sinks into the ball
+    inner = shell[: -eyeball.SEGMENTS - 1]  # without the last ring, which is inside the ball
     assert np.linalg.norm(inner, axis=1).min() > 1.001
     assert np.linalg.norm(shell[-eyeball.SEGMENTS - 1 : -1], axis=1).max() < 0.999
 
@@ -71,11 +71,11 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
     light = image.mean(axis=2)
     rim, white = (light[np.abs(away - x) < 0.03].mean() for x in (1.0, 1.35))
     assert rim < 0.3 * white
-    assert 0.55 < white < 0.85  # not white
-    # Between limbus and sclera there is no step: a millimetre is a sixth of the iris.
+    assert 0.55 < white < 0.85  # grey rather than white
+    # There is no step between limbus and sclera: a millimetre is a sixth of the iris.
     profile = [light[np.abs(away - x) < 0.01].mean() for x in np.arange(0.95, 1.25, 0.02)]
     assert np.abs(np.diff(profile)).max() < 0.25 * white
-    # Fibres: neighbours around the pupil differ, and no frequency alone makes them.
+    # Fibres: neighbours around the pupil differ, and no single frequency dominates.
     around = np.linspace(0, 2 * np.pi, 2048, endpoint=False)
     x, y = (half + 0.72 * reach * f(around) for f in (np.cos, np.sin))
     power = np.abs(np.fft.rfft(light[y.astype(int), x.astype(int)]))[8:400] ** 2
@@ -84,7 +84,7 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
 
 @pytest.fixture(scope="module")
 def faces():
-    """The girl, and the man after whom all people are made."""
+    """The girl, and the man from whom all people are made."""
     girl = sample_people.body("girl")
     return {"girl": girl, "model": girl.man}, with_eyeballs(sample_people.data().base_mesh())
 
@@ -95,7 +95,7 @@ def face(request, faces):
 
 
 def _posed(face, side, **values):
-    """The grid of the lids at LOD 0, and the rotation of the eye, for given controls."""
+    """The grid of the lids at LOD 0 and the rotation of the eye, for some control values."""
     eye, letter = face.eyes.lids[side], side.upper()
     controls = {f"{name}{letter}": value for name, value in values.items()}
     grid = eye.grid(face.positions).copy()
@@ -118,7 +118,7 @@ LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLo
 
 
 def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
-    """The skin around the rim when several controls push it at once."""
+    """The skin around the rim when several controls raise it at the same time."""
     for side, eye in face.eyes.lids.items():
         for pose in (
             {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},
@@ -132,7 +132,7 @@ def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
 
 
 def test_extra_no_eye_goes_through_its_lids(face):
-    """At each gaze, open, half closed and closed: at most 0.5 mm of penetration."""
+    """For each gaze with open, half closed and closed lids, penetration is at most 0.5 mm."""
     for side, eye in face.eyes.lids.items():
         gaze = eyeball.gaze(side)[:, 2]
         for look in LOOKS:
@@ -145,7 +145,7 @@ def test_extra_no_eye_goes_through_its_lids(face):
 
 
 def test_extra_lids_touch_their_eyes(face):
-    """There is no gap: the rim turns in until it is within the ball."""
+    """Lids leave no gap: their rim bends inwards until it is inside the ball."""
     for side, eye in face.eyes.lids.items():
         gaze = eyeball.gaze(side)[:, 2]
         for look in LOOKS[:5]:
@@ -163,7 +163,7 @@ def test_extra_closed_lids_meet_in_one_line(face, look):
         for row in (ROOT, ROOT + 1, ROOT + 2):
             line = grid[row, lower]
             line = line[line[:, 0].argsort()]
-            upper = grid[row, UPPER][2:-1]  # at the corner there is nothing to close
+            upper = grid[row, UPPER][2:-1]  # at the corner of the eye there is no gap to close
             gap = upper[:, 1] - np.interp(upper[:, 0], line[:, 0], line[:, 1])
             assert np.abs(gap).max() < 0.35 * MM
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample's controls beyond ARKit's, on the real data if available."""
+"""The sample's controls that ARKit lacks, with the real data if available."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from risorius_people.controls import gui_table
 from risorius_people.further import CONTROLS_OF_CODE
 
 STANDARD = Path(__file__).parents[2] / "data" / "controls" / "standard_raw.txt"
-MM = 0.01  # of the data's decimetres
+MM = 0.01  # in the data's unit, decimetres
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def man():
 
 @pytest.fixture(scope="module")
 def motions(man):
-    """Names, and float64[controls, V, 3] of the vertices that a face has."""
+    """Names of controls, and the motion of a face's vertices, float64[controls, V, 3]."""
     kept = [v for name, v in man.groups.items() if name == "body" or "teeth" in name]
     kept += [v for name, v in man.groups.items() if "tongue" in name or "eye" in name]
     some = np.unique(np.concatenate(kept))
@@ -41,14 +41,17 @@ def test_extra_all_but_one_of_the_standard_controls_are_there(motions):
 
 
 def test_extra_each_control_moves_something_that_no_other_does(motions):
-    """At least 0.5 mm, and a cosine of at most 0.95 with the motion of any other; for controls that
-    close the lips, with the jaw open."""
+    """Each control moves at least 0.5 mm, in a direction of its own.
+
+    The cosine with the motion of any other control is at most 0.95. Controls that close the lips
+    are tested with the jaw open.
+    """
     names, moved = motions
     assert (np.linalg.norm(moved, axis=2).max(axis=1) >= 0.5 * MM).all()
     flat = moved.reshape(len(names), -1)
     flat = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     alike = np.argwhere(np.triu(flat @ flat.T, 1) > 0.95)
-    # Opening further is the same way once more.
+    # Opening further continues the same motion.
     assert [(names[a], names[b]) for a, b in alike] == [("jawOpen", "jawOpenExtreme")]
 
 
@@ -73,7 +76,8 @@ def test_extra_lids_slide_on_the_eye_and_the_tongue_keeps_its_root(man):
     moved = np.linalg.norm(lower, axis=1) > 0.5 * MM
     assert moved.sum() > 30
     along = np.einsum("ij,ij->i", lower, arm)[moved] / np.linalg.norm(arm[moved], axis=1)
-    # To or from the eye's middle only as the cornea bulges; test_sample_eyes has the rest.
+    # Vertices move towards or from the eye's middle only because the cornea bulges;
+    # test_sample_eyes tests the rest.
     assert np.abs(along).max() < 1.0 * MM
     assert np.median(np.abs(along)) < 0.1 * MM
     assert lower[moved, 1].max() > 2 * MM
@@ -99,8 +103,10 @@ def test_extra_what_closes_lips_needs_an_open_jaw(man):
 
 
 def test_extra_no_reaction_lifts_the_lower_lip_over_the_upper_one(man):
-    """At rest the lips are shut, so a reaction must not contain controls that close an opened
-    mouth."""
+    """At rest the lips are shut.
+
+    So a reaction must not contain controls that close an opened mouth.
+    """
     body = man.groups["body"]
     middle = body[np.abs(man.positions[body, 0]) < 0.02]
     still = np.zeros_like(man.positions)

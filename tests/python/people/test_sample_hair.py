@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hair of the sample people: growth, orientation of cards, and contact with the skin."""
+"""Hair of the sample people: growth, orientation of hair cards, and contact with the skin."""
 
 import zlib
 from dataclasses import replace
@@ -36,7 +36,7 @@ MOST_VERTICES = 12_000
 
 @pytest.fixture(scope="module")
 def ball():
-    """A ball of radius 1 as a head."""
+    """A ball with radius 1 as a head."""
     polygons, points = CUBE, CORNERS
     for _ in range(3):
         polygons, operator = subdivide(polygons)
@@ -46,7 +46,7 @@ def ball():
 
 
 def test_hair_grows_within_the_hairline():
-    """Crown, nape and side are inside; forehead, brow, ear, cheek and neck are not."""
+    """Crown, nape and side of the head have hair; forehead, brow, ear, cheek and neck have none."""
     inside = [[0, 1.05, -0.7], [0, -0.3, -1.6], [0.75, 0.4, -0.7]]
     outside = [[0, 0.5, 0.2], [0.3, 0.2, 0.1], [0.8, -0.2, -0.8], [0.6, -0.5, 0], [0, -1, -1.5]]
     assert hairline_height(np.array(inside, float)).min() > 0.1
@@ -94,12 +94,12 @@ def test_guides_stay_over_the_skin_and_are_as_long_as_asked(ball):
     corners = positions[np.array(faces)]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
     middles = corners.mean(axis=1)
-    outward = (facing * middles).sum(axis=1)  # counter-clockwise seen from outside
-    assert outward[middles[:, 1] > -0.8].min() > 0  # below, all ways of the flow meet
+    outward = (facing * middles).sum(axis=1)  # positive: counter-clockwise
+    assert outward[middles[:, 1] > -0.8].min() > 0  # below -0.8 hairs of all directions meet
 
 
 def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
-    """On flat skin: an edge of a root is 1.4 mm deep at most, and a curl goes away from it only."""
+    """On flat skin a root's edge is at most 1.4 mm deep, and a curl moves away from the skin."""
     n, rows = 50, 6
     roots = ball.scattered(np.ones(len(ball.positions)), 0.2, np.random.default_rng(3))
     roots = roots.taken(np.arange(n))
@@ -110,7 +110,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
     half, taper = np.full(n, 0.06), np.ones(rows)
     strips = make_strips(points, outside, half, taper, np.zeros(n, int), roots, turns)
     assert np.abs(strips.sides[:, 0, 2]).max() == pytest.approx(0.014)
-    np.testing.assert_allclose(np.linalg.norm(strips.sides[0, 0]), 0.06)  # one that lies flat
+    np.testing.assert_allclose(np.linalg.norm(strips.sides[0, 0]), 0.06)  # the first card is flat
     np.testing.assert_allclose(np.linalg.norm(strips.sides[:, 1:], axis=2), 0.06)
     random = np.random.default_rng(4)
     wound = curled(points, outside, np.full(n, 0.05), np.full(n, 1.5), random)
@@ -119,7 +119,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
 
 
 def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
-    """Where a hair turns past the normal of the skin, its left and right would be swapped."""
+    """If a hair bends back past the skin's normal, left and right of its card must not swap."""
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
     roots = roots.taken(np.arange(1))
     points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
@@ -130,7 +130,7 @@ def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
 
 @pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
 def test_hairs_of_a_card_fade_out_to_its_sides(who):
-    """A card with even hairs, or hairs cut off at its edge, would look like a rectangle."""
+    """A card with even hairs, or with hairs cut off at its edge, would look like a rectangle."""
     cover = paint_strands(people.PEOPLE[who])[..., 3]
     curly = who in ("fighter", "woman")
     for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
@@ -148,7 +148,7 @@ def test_no_straight_hair_is_cut_off_by_a_side_of_its_card(who):
     left, low, width, height, count = TILES["scalp"]
     tiles = cover[low : low + height, left : left + count * width].reshape(height, count, width)
     sides = tiles[:, :, [0, 1, -2, -1]]
-    # Bent hairs may touch a side; where leaning ones leave, it is 0.056.
+    # Bent hairs may touch a side; if inclined hairs crossed it, the share would be 0.056.
     assert (sides > 0.5).mean() < 0.02
 
 
@@ -165,7 +165,7 @@ def test_an_eased_guide_goes_to_and_fro_no_more_and_keeps_its_ends():
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
-    """Against the rotation itself: hair of 5 mm turns with it, hair of 20 mm as its first 8 do."""
+    """Hair of 5 mm rotates with the skin; hair of 20 mm rotates like its first 8 mm."""
     grid = np.array([[x, 0.0, z] for x in range(5) for z in range(5)], float)
     faces = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5] for i, j in np.ndindex(4, 4)]
     head = polygon_mesh(grid, np.tile([0.0, 1.0, 0.0], (25, 1)), faces, grid[:, [0, 2]] / 4, faces)
@@ -183,8 +183,11 @@ def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
 
 @pytest.fixture
 def stage():
-    """A face of one flat mesh, 2 decimetres wide, whose only control raises the left half like a
-    stage: a tenth of a decimetre up, by a slope between x = 0.15 and 0.2."""
+    """A face with one flat mesh, 2 decimetres wide.
+
+    Its only control raises the left half by a tenth of a decimetre, with a slope between x = 0.15
+    and 0.2.
+    """
     side = np.arange(41)
     x, z = np.meshgrid(0.05 * side - 1, 0.05 * side - 1, indexing="ij")
     flat = np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
@@ -215,7 +218,7 @@ def stage():
 
 
 def _lying(dna, roots_x, way):
-    """Hairs of 0.3 that lie along x over the stage, 0.03 over it at their ends."""
+    """Hairs with a length of 0.3 along x, whose ends are 0.03 above the skin."""
     n = len(roots_x)
     at = np.column_stack([roots_x, np.zeros(n), np.full(n, 0.02)])
     roots = nearest_places(dna.meshes[0].positions.astype(float), *corners_of(dna.meshes[0]), at)
@@ -233,19 +236,19 @@ def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, 
     np.testing.assert_array_equal(kept.points, away.points)
     toward = _lying(stage, [-0.055, 0.14], 1)
     kept = cut_clear(_lying(stage, [-0.055, 0.14], 1), stage, head, 1.0, faces)
-    assert len(kept) == 1  # who stands at the slope has no room
+    assert len(kept) == 1  # a hair with its root at the slope has no room
     np.testing.assert_array_equal(kept.points[0, 0], toward.points[0, 0])
-    # Cut once to three quarters it would end in the slope, at x = 0.17.
+    # Shortened once to three quarters, it would end in the slope, at x = 0.17.
     np.testing.assert_allclose(
         kept.points[0, -1] - kept.points[0, 0], 0.75**2 * np.array([0.3, 0.03, 0]), atol=1e-12
     )
 
 
 def test_a_face_that_no_control_makes_alone_counts(stage):
-    """Two controls of a fifth of the height each are harmless alone, and a slope together."""
+    """Two controls of a fifth of the height do no harm alone, but together make a slope."""
     head = stage.meshes[0]
     target = head.blend_shape_targets[0]
-    low = 0.2 * np.asarray(target.deltas)  # 0.02 each, and the ends are 0.03 high
+    low = 0.2 * np.asarray(target.deltas)  # 0.02 each; the ends are 0.03 high
     stage.blend_shape_channels = risorius.BlendShapeChannels(
         lods=[2], input_indices=[0, 1], output_indices=[0, 1]
     )
@@ -260,7 +263,8 @@ def test_a_face_that_no_control_makes_alone_counts(stage):
     alone = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, [])
     both = [np.ones(2, np.float32)]
     together = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, both)
-    # At x = 0.17 the skin has risen by 0.016, and the end of three quarters is 0.0225 high.
+    # At x = 0.17 the skin rises by 0.016, and at three quarters of its length the hair is 0.0225
+    # high.
     np.testing.assert_allclose(
         together.points[0, -1] - together.points[0, 0],
         0.75 * (alone.points[0, -1] - alone.points[0, 0]),
@@ -278,7 +282,7 @@ def test_no_edge_of_a_card_lies_deep_in_the_skin(ball, row, most):
         points, np.stack([out, out], axis=1), np.full(len(at), 0.1), np.ones(2),
         np.zeros(len(at), int), roots,
     )  # fmt: skip
-    # The second row stands 0.1 over the skin, and an edge of it comes down through it.
+    # The second row is 0.1 above the skin, and one of its edges goes through the skin.
     strips.sides[:, row] += (0.08, 0.18)[row] * out
     narrow_edges(strips, ball)
     edges = points[:, row] - strips.sides[:, row]
@@ -295,7 +299,7 @@ def test_a_picture_with_opacity_is_a_png_that_others_read():
     rows = np.frombuffer(zlib.decompressobj().decompress(data[begin:]), np.uint8).reshape(4, 25)
     if not rows[:, 0].any():
         np.testing.assert_array_equal(rows[::-1, 1:].reshape(4, 6, 4), np.rint(image * 255))
-    assert read_png(data) is None  # pictures of hair are not mixed
+    assert read_png(data) is None  # hair textures are not mixed
 
 
 @pytest.mark.parametrize(
@@ -316,12 +320,12 @@ def test_styles_are_named_or_refused(tmp_path, text, sentence):
     assert sentence in str(caught.value)
 
 
-# ---- on the real data, where they can be had
+# ---- with the real data, if they are available
 
 
 @pytest.fixture(scope="module")
 def haired():
-    """(face of shapes with hair, its hair, person) of the man and of another with his head."""
+    """Face of blend shapes with hair, its hair and person, for the man and a variant of him."""
     man = people.PEOPLE["man"]
     dna, parts, body = sample_people.assembled("man")
     base = sample_people.data().base_mesh()
@@ -335,7 +339,7 @@ def haired():
 
 
 def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
-    """A fringe has more hair on the forehead, down to the wanted height, and never at the eyes."""
+    """A fringe adds hair on the forehead down to the chosen height, but never at the eyes."""
     _, parts, body = sample_people.assembled("man")
     base, even = sample_people.data().base_mesh(), body.man.positions
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
@@ -347,13 +351,13 @@ def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
         front = (np.abs(ends[:, 0]) < 0.35) & (ends[:, 2] > 0.2)
         before.append(int(front.sum()))
         lowest.append(float(ends[front, 1].min(initial=1.0)))
-    assert before[0] == 0  # parted hair goes aside
+    assert before[0] == 0  # parted hair falls to the sides
     assert min(before[1:]) > 25
     assert lowest == pytest.approx([1.0, 0.42, 0.24], abs=0.06)
 
 
 def moved(dna, raw, name):
-    """Where linear skinning and shapes bring the vertices of a mesh."""
+    """Vertices of a mesh after blend shapes and linear skinning."""
     from risorius.author.geometry import skeleton as sk
 
     pose = risorius.Rig(dna).evaluate(raw)
@@ -392,7 +396,7 @@ def test_metadata_say_where_strands_wind(haired):
         assert wound["man"] == {}
         assert own
         assert set(wound["woman"]) == set(wound["fighter"]) == {f"coil:{n}" for n in own}
-        # Shorter hair winds in smaller coils.
+        # Shorter hair has smaller coils.
         for name in wound["woman"]:
             sizes = [float(wound[who][name].split()[0][7:]) for who in ("fighter", "woman")]
             assert 0.3 < sizes[0] <= sizes[1] < 3
@@ -400,7 +404,7 @@ def test_metadata_say_where_strands_wind(haired):
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):
-    """Within 2 mm, for each row of the mapping at once with an open jaw."""
+    """Within 2 mm, for several controls at 1."""
     dna, hair, _ = haired[1]
     names = dna.raw_control_names
     worst = {}
@@ -439,7 +443,7 @@ def test_extra_lashes_have_controls_of_their_own(haired):
 
 
 def test_extra_lashes_turn_with_the_lid(haired):
-    """On a closed eye the upper ones leave it downward, as far as the lid went about the ball."""
+    """On a closed eye the upper lashes point downwards, rotated with the lid."""
     dna, hair, _ = haired[0]
     rows = hair.strips["eyelashes"].rows
     raw = np.zeros(len(dna.raw_control_names), np.float32)

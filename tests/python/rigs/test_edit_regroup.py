@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Rebuilt joint groups: the same function, without small values of other regions.
+"""Rebuilt joint groups: the same poses, without small values of other regions.
 
-The joint groups of a file are read independently from the format: a dense matrix for each LOD, in
-    which the last writer of a row wins.
+The test reads the joint groups of a file independently of the package: a dense matrix for each LOD,
+in which the last group that writes a row is used.
 """
 
 import copy
@@ -35,7 +35,7 @@ def control_count(dna):
 
 
 def turned(dna):
-    """Joints that jbmd declares to be quaternions."""
+    """Indices of joints that layer jbmd declares as quaternions."""
     flags = np.asarray(dna.joint_behavior_metadata.joint_representations).reshape(-1, 3)[:, 1]
     return {int(j) for j in np.flatnonzero(flags == 1) if j < len(dna.joint_names)}
 
@@ -55,7 +55,7 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, angles), ...]}: the product of each quaternion, factor by factor."""
+    """{joint: [(control, angles), ...]}: factors of each joint's quaternion, in order."""
     out = {}
     for group in dna.joint_groups:
         found, order = {}, oracle.column_order(dna, group)
@@ -74,7 +74,7 @@ def turns(dna, lod):
 
 
 def giant(dna):
-    """The face with all rows in one joint group. Every LOD nests, no two groups share a row."""
+    """The face with all rows in one joint group: each LOD contains the coarser ones."""
     out = copy.deepcopy(dna)
     width = control_count(dna)
     rows = []
@@ -97,7 +97,7 @@ def giant(dna):
 
 
 def scattered(dna, seed):
-    """Each row in one of many groups of the same LODs, with columns in any order."""
+    """The face with rows spread over many groups of equal LODs, and columns in random order."""
     rng = np.random.default_rng(seed)
     out, groups = copy.deepcopy(dna), []
     for group in dna.joint_groups:
@@ -124,7 +124,7 @@ def random_poses(dna, count=12):
 
 
 def assert_same_poses(before, after, **options):
-    """To the last bit at every LOD."""
+    """Check that two faces give equal poses at every LOD, bit for bit."""
     rigs = [risorius.Rig(dna, simd="scalar", **options) for dna in (before, after)]
     raw = random_poses(before)
     for lod in range(before.lod_count):
@@ -143,7 +143,7 @@ def assert_same_matrices(before, after):
 
 
 def effects(dna, coefficients):
-    """float64[joints * 9, controls]: mm, degrees, or scale."""
+    """The effect of coefficients in mm, degrees or scale, float64[joints * 9, controls]."""
     units = [MM[dna.translation_unit]] * 3 + [DEGREES[dna.rotation_unit]] * 3 + [1.0] * 3
     return np.abs(coefficients) * np.tile(units, len(dna.joint_names))[:, None]
 
@@ -184,7 +184,7 @@ def test_random_faces_with_repeated_rows_and_columns(width):
     out, _ = edit.regroup(dna, timed=0)
     for lod in range(dna.lod_count):
         wide = control_count(dna)
-        # Duplicate columns are added before rounding.
+        # Values of duplicate columns are summed before rounding.
         np.testing.assert_allclose(
             matrix(dna, lod, wide), matrix(out, lod, wide), rtol=2**-23, atol=0
         )
@@ -197,8 +197,11 @@ def test_random_faces_with_repeated_rows_and_columns(width):
 
 
 def overlapping_face(seed):
-    """Few joints in many groups: rows written twice, repeated columns in any order, quaternions,
-    LODs that skip, correctives that read correctives."""
+    """A face with few joints in many groups.
+
+    Rows are written twice, columns repeat in any order, joints are quaternions, LODs are skipped,
+    and correctives read correctives.
+    """
     rng = np.random.default_rng(seed)
     dna = random_face(seed, 5)
     joints, groups = int(rng.integers(3, 12)), []
@@ -235,7 +238,8 @@ def test_faces_whose_groups_overlap(seed):
         assert rigs[0].joint_indices_written.tolist() == rigs[1].joint_indices_written.tolist()
         for lod in range(dna.lod_count):
             a, b = (rig.evaluate_batch(raw, lod=lod) for rig in rigs)
-            # Duplicate columns are added before rounding: sums of 14 values below 3 * 1.5.
+            # Values of duplicate columns are summed before rounding: sums of 14 values below 3 *
+            # 1.5.
             np.testing.assert_allclose(a.joints, b.joints, rtol=0, atol=14 * 4.5 * 14 * oracle.EPS)
             np.testing.assert_array_equal(a.animated_maps, b.animated_maps)
     assert edit.regroup(out, timed=0, combinations=0)[0].to_bytes() == out.to_bytes()
@@ -255,7 +259,7 @@ def test_correctives_that_others_read_are_computed_as_before(seed):
 
 
 def without_turns(dna):
-    """The face without quaternions, whose columns have an order."""
+    """The face without quaternions, for which the order of columns matters."""
     out = copy.deepcopy(dna)
     out.joint_behavior_metadata = risorius.JointBehaviorMetadata()
     return out
@@ -287,7 +291,7 @@ def test_quaternions_come_out_of_one_group_whole(name):
 
 
 def turning_face(*groups):
-    """Two joints of quaternions, at 2 LODs; groups: (rows of each LOD, controls, rows, values)."""
+    """Two quaternion joints at 2 LODs; groups: (rows of each LOD, controls, rows, values)."""
     dna = risorius.Dna()
     dna.lod_count = 2
     dna.raw_control_names = [f"raw{i}" for i in range(4)]
@@ -305,7 +309,7 @@ def turning_face(*groups):
 
 COARSE, FINE = [0, 0, 20], [[30, 0, 10], [0, 25, 5]]
 TURNING = {
-    # Together in one group control 3, which the coarser LOD has, would be multiplied first.
+    # In one group, control 3 of the coarser LOD would be multiplied first.
     "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
     "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
     # The angles of one joint start at two LODs, so the order of its columns must be kept.
@@ -325,7 +329,7 @@ def test_products_of_quaternions_stay_in_their_order(case):
 
 
 def face_of_regions(seed, regions=6, joints=12, controls=20):
-    """Dense regions of joints, shuffled, in one group; small values that do not belong there."""
+    """One group with dense regions of joints in random order, and small values elsewhere."""
     rng = np.random.default_rng(seed)
     count = regions * joints
     owner = rng.permutation(np.repeat(np.arange(regions), joints))
@@ -336,7 +340,7 @@ def face_of_regions(seed, regions=6, joints=12, controls=20):
         values[joint * 9 : joint * 9 + 9, reads[region]] = part
     clean = values.copy()
     for region in range(regions):
-        # At most three of twelve joints, a quarter, which still counts as foreign.
+        # At most a quarter of the region's joints, which still counts as foreign.
         for column in np.setdiff1d(np.arange(60), reads[region])[::2]:
             for joint in rng.choice(np.flatnonzero(owner == region), 3, replace=False):
                 values[joint * 9 + rng.integers(9), column] = rng.uniform(0.0001, 0.0009)
@@ -388,7 +392,7 @@ def test_what_goes_is_below_the_threshold(name, threshold):
         gone = np.count_nonzero(changed)
         assert turns(out, lod) == turns(dna, lod)
     assert report.removed == gone == report.before.nonzero - report.after.nonzero
-    # Controls are at most 1 here, so a joint changes by at most its lost values.
+    # Controls are at most 1, so a joint changes by at most the sum of its lost values.
     lost = effects(dna, matrix(dna, 0, wide) - matrix(out, 0, wide)).sum(axis=1).reshape(-1, 9)
     assert report.translation_mm.value <= np.linalg.norm(lost[:, :3], axis=1).max() * 1.001
     assert report.rotation_degrees.value <= lost[:, 3:6].sum(axis=1).max() * 1.001
@@ -462,7 +466,7 @@ def test_regions_by_name_and_index():
     assert_same_matrices(dna, out)
     named = {str(i): [dna.joint_names[j] for j in half] for i, half in enumerate(halves)}
     assert edit.regroup(dna, regions=named, timed=0)[0].to_bytes() == out.to_bytes()
-    # Joints without a listed region form a group of their own.
+    # Joints that no region lists form a group of their own.
     out, report = edit.regroup(dna, regions=[halves[0]], timed=0)
     assert report.regions[0] == halves[0]
     assert sorted(j for region in report.regions[1:] for j in region) == halves[1]
@@ -674,8 +678,11 @@ def test_a_full_scale_face():
 
 
 def _face_of(values):
-    """A face of one joint group: float[joints, controls], effect of each control on x of each
-    joint."""
+    """A face with one joint group.
+
+    Args: values: float[joints, controls], effect of each control on the x translation of each
+    joint.
+    """
     joints, controls = values.shape
     dna = risorius.Dna()
     dna.joint_names = [f"j{i}" for i in range(joints)]
@@ -699,9 +706,11 @@ def _face_of(values):
 @pytest.mark.parametrize(
     ("values", "groups"),
     [
-        # One control drives one joint: by region 4 x 4 of which 4 are not 0, by drivers 4 x 1.
+        # One control drives one joint: a group by regions has 4 x 4 values with 4 nonzero, groups
+        # by drivers 4 x 1.
         (np.eye(4), 4),
-        # Two controls drive two joints each: half is empty, which a region may be.
+        # Two controls drive two joints each: half of the values are 0, which is allowed in a
+        # region.
         (np.kron(np.eye(2), np.ones((2, 2))), 1),
         (np.ones((4, 4)), 1),
     ],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Raw controls of joint rotations, found in a file and filled from the head curves of a clip."""
+"""Raw controls for rotations of joints: found in a file, and set from a clip's head curves."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from risorius.rigs.joint_controls import head_turns, joint_controls, one_sign
 
 PARTS = "xyzw"
 NEUTRAL = ((10, -20, 30), (-35, 5, 80), (15, 60, -10))
-UP = (0.0, 0.0, 0.2164396, 0.9762960)  # 25 degrees about the head's own z
+UP = (0.0, 0.0, 0.2164396, 0.9762960)  # a quaternion: 25 degrees about the head's own z axis
 
 
 def face(axes=("right", "up", "front"), sequence="xyz", signs=(1, 1, 1), unit="degrees"):
-    """A chain of three joints, whose last is the head; its pose UP drives the one channel."""
+    """A chain of three joints that ends with the head; the pose UP of the head drives a channel."""
     dna = risorius.Dna()
     dna.lod_count, dna.coordinate_system = 1, axes
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = sequence, signs, unit
@@ -47,7 +47,7 @@ def face(axes=("right", "up", "front"), sequence="xyz", signs=(1, 1, 1), unit="d
     return dna
 
 
-# ---- the same by matrices, from the format's description alone
+# ---- the same with matrices, from the description of the format
 
 DIRECTIONS = {
     "right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 0, 1), "down": (0, 0, -1),
@@ -56,14 +56,14 @@ DIRECTIONS = {
 
 
 def about(axis, angle):
-    """A turn by the right hand about an axis of any kind."""
+    """The rotation matrix about an axis, right-handed; angle in radians."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], float)
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def resting(dna):
-    """The head's resting axes in the file's space."""
+    """The head's axes at rest, in the file's space."""
     unit = np.pi / 180 if dna.rotation_unit == "degrees" else 1.0
     out = np.eye(3)
     for angles in dna.neutral_joint_rotations:
@@ -76,12 +76,12 @@ def resting(dna):
 
 
 def head_matrix(yaw, pitch, roll):
-    """Yaw to the face's left, then pitch up, then roll to its left shoulder; x left, z up."""
+    """The rotation of yaw to the face's left, pitch up, and roll to its left shoulder."""
     return about((0, 0, 1), yaw) @ about((-1, 0, 0), pitch) @ about((0, 1, 0), roll)
 
 
 def rotation_of(q):
-    """The matrix of x, y, z, w."""
+    """The rotation matrix of a quaternion x, y, z, w."""
     x, y, z, w = np.asarray(q, float)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + 2 * w * cross + 2 * cross @ cross
@@ -91,7 +91,7 @@ CONVENTIONS = [
     {},
     {"sequence": "zyx", "unit": "radians"},
     {"axes": ("left", "front", "up"), "sequence": "yxz", "signs": (1, -1, 1)},
-    {"axes": ("right", "front", "up")},  # a left hand
+    {"axes": ("right", "front", "up")},  # left-handed axes
 ]
 
 
@@ -120,7 +120,7 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     dna.save(str(tmp_path / "face.dna"))
     character = load_face(tmp_path / "face.dna")
     (head,) = character.turning
-    # The head's angles at which its joint turns as the pose wants.
+    # The head's angles for which its joint has the rotation of the pose.
     x, y, z = np.linalg.inv(head.axes) @ UP[:3]
     turn = rotation_of((x, y, z, UP[3]))
     pitch = -np.arcsin(turn[2, 1])
@@ -133,13 +133,13 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     bake(ready, character, 0, {"npz": tmp_path / "out.npz"})
     with np.load(tmp_path / "out.npz") as out:
         assert out["blend_shapes"][:, 0] == pytest.approx([0.0, 1.0], abs=4e-3)
-    # A clip's own curves of these controls lead.
+    # A clip's own curves of these controls have precedence.
     own = clip.replaced(names=[*names, "head.qx"], curves=np.vstack([clip.curves, [[0, 0]]]))
     assert prepared(own, character).names == own.names
 
 
 def neck_face(folder):
-    """The face whose last joint is the second of the neck: it takes half of the neck's turn."""
+    """A face whose last joint is neck_02, which takes half of the neck's rotation."""
     dna = face()
     dna.joint_names = ["spine", "neck_01", "neck_02"]
     dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rig and Morph as callers meet them: wrong arguments, edited files, the choice of SIMD."""
+"""Rig and Morph for callers: wrong arguments, edited files, the choice of SIMD."""
 
 import copy
 import os
@@ -25,7 +25,7 @@ def rig(dna):
     return risorius.Rig(dna)
 
 
-# ---- arguments
+# ---- wrong arguments
 
 
 @pytest.mark.parametrize("method", ["evaluate", "gui_to_raw"])
@@ -68,14 +68,14 @@ def test_poses_do_not_share_memory(rig):
 
 def test_faces_in_turn_and_in_threads_do_not_see_each_other(dna):
     rigs = []
-    for times in range(1, 13):  # more than one thread keeps memory for
+    for times in range(1, 13):  # more rigs than one thread keeps memory for
         one, groups = copy.copy(dna), list(dna.joint_groups)
         groups[0] = copy.copy(groups[0])
         groups[0].values = np.asarray(groups[0].values) * times
         one.joint_groups = groups
         rigs.append(risorius.Rig(one))
     raw = np.float32([0.5, 0.25, 0, 1])
-    # Of a batch, which has its memory for itself.
+    # A batch has its own memory.
     wanted = [rig.evaluate_batch(raw[None]).joints[0] for rig in rigs]
     assert not np.array_equal(wanted[0], wanted[1])
 
@@ -233,7 +233,7 @@ def test_morph_is_the_sum_of_transformed_deltas():
         moved_size = np.abs(np.asarray(target.deltas, float)) @ np.abs(matrix.T.astype(float))
         np.add.at(expected, target.vertex_indices, weight * moved)
         np.add.at(size, target.vertex_indices, abs(weight) * moved_size)
-    # Per vertex: 3 products and sums of the matrix, 1 of the weight, 5 terms of the sum.
+    # Roundings per vertex: 3 products and sums of the matrix, 1 of the weight, 5 terms of the sum.
     bound = 9 * np.finfo(np.float32).eps * size
     assert (np.abs(morph.evaluate(weights, base) - expected) <= bound).all()
     assert morph.channel_indices.tolist() == [0, 3, 7]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Networks, solvers, setups and quaternions against the reference's values, every case and LOD.
+"""Networks, solvers, setups and quaternions at every LOD, compared with the reference's values.
 
 Known deviations, left out by name below: - networks that move joints by Euler angles, read as Euler
 angles: the reference takes their
@@ -25,20 +25,20 @@ from test_rig_golden import SIMD, Golden
 EVALUATIONS = evaluations()
 FACES = [name for name, tag, _ in EVALUATIONS if tag == ""]
 CASES = [(name, tag) for name, tag, _ in EVALUATIONS if tag in ("", ".quat")]
-# Of these the reference gave angles alone.
+# Faces for which the reference gave only Euler angles.
 EULER_ONLY = [name for name in FACES if (name, ".quat") not in CASES]
 SEQUENCES = [(name, tag) for name, tag, _ in EVALUATIONS if tag in (".seq", ".quat.seq")]
 FILTERED = [
     (name, tag, lods_of(about)) for name, tag, about in EVALUATIONS if lods_of(about) is not None
 ]
-# Interpolation multiplies what float32 loses by the condition of its matrix: an arc near 0 errs by
-# sqrt(8 eps) = 1e-3 there.
+# Interpolation multiplies the float32 error by the condition of its matrix; an arc near 0 has an
+# error of sqrt(8 eps) = 1e-3.
 WELL_CONDITIONED = 1e3
 ARC = 1e-3
 
 
 class Face:
-    """A rig and its possible deviations."""
+    """A rig, its expected values, and the parts that are not compared."""
 
     def __init__(self, name, rotation, simd=None, folder=GOLDEN_SET, **load):
         self.name, self.rotation = name, rotation
@@ -59,7 +59,7 @@ class Face:
         self.vague_joints[self.mixed_twists()] = True
 
     def vague_controls(self):
-        """Outputs of solvers whose matrix is singular or nearly so."""
+        """Controls that solvers with a singular or nearly singular matrix write."""
         out = np.zeros(self.rig.control_count, bool)
         poses = self.dna.rbf_behavior_ext.poses
         first = self.rig.control_count - len(self.dna.rbf_behavior.poses)
@@ -71,7 +71,7 @@ class Face:
         return out
 
     def stretched(self, record):
-        """Joints of setups whose rotation is no unit: their angles are not their quaternion."""
+        """Joints of setups whose input is no unit quaternion, so their angles differ."""
         layer, controls = self.dna.twist_swing_behavior, self.expected_controls(record)
         out = []
         for s in (*layer.twists, *layer.swings):
@@ -104,7 +104,7 @@ class Face:
             )
 
     def bounds(self, pose, record, lod):
-        """[J, 9]: bounds from rounding of sums and from differences of controls."""
+        """Allowed errors [J, 9], from rounding of sums and from differences of controls."""
         wanted = self.expected_controls(record)
         error = np.abs(pose.controls - wanted)
         if self.converted:
@@ -119,7 +119,7 @@ class Face:
         return out.reshape(-1, 9) + 1e-6
 
     def mixed_twists(self):
-        """Joints of twists that share a swing's rotation with another twist, or not its axis."""
+        """Joints of twists whose rotation another twist shares, or a swing with another axis."""
         layer = self.dna.twist_swing_behavior
         axes = {}
         for s in layer.swings:
@@ -154,7 +154,7 @@ class Face:
         sure = np.nonzero(~vague)[0]
         a, b = self.quaternions(actual[sure]), self.quaternions(wanted[sure])
         error = np.minimum(np.abs(a - b).max(1), np.abs(a + b).max(1))
-        # a cosine of the middle angle near 0 takes half of the digits
+        # if the cosine of the middle angle is near 0, half of the digits are lost
         pole = np.where(self.near_pole(wanted[sure]), 1e-3, 0)
         bad = np.nonzero(error > 0.5 * scale * bounds[sure, 3:6].sum(1) + 5e-6 + pole)[0]
         assert bad.size == 0, (
@@ -165,7 +165,7 @@ class Face:
     compared = 0
 
     def quaternions(self, rows):
-        """[n, 4] of rows [n, 9] or [n, 10] of joints."""
+        """The quaternions [n, 4] of joint rows [n, 9] or [n, 10]."""
         if rows.shape[1] == 10:
             return rows[:, 3:7]
         scale = oracle_behavior.radians_per_unit(self.dna)
@@ -257,7 +257,7 @@ def test_a_face_through_time(name, tag, simd):
             instance.masks = masks
         record = golden.record(step["recordOffset"])
         pose = instance.evaluate(record["rawControls"])
-        if step["call"] != "calculate":  # the generator left out networks and joints
+        if step["call"] != "calculate":  # the generator did not run networks and joints
             continue
         face.check(pose, record, instance.lod, f"{name}{tag} step {number}")
     assert face.compared > 0
@@ -266,8 +266,11 @@ def test_a_face_through_time(name, tag, simd):
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_filtered_loads_are_our_lods(name, tag, lods, simd):
-    """Filtered loads of the reference have the joints of their LODs and joints of no LOD.
-    Quaternions are left out, because the order of their columns depends on the load."""
+    """Compare filtered loads of the reference with our LODs.
+
+    They have the joints of their LODs and of no LOD. Quaternions are left out, because the order of
+    their columns depends on the load.
+    """
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)
     listed = set().union(*(set(face.dna.lod_joint_mapping[lod].tolist()) for lod in lods))
@@ -297,7 +300,7 @@ def test_filtered_loads_are_what_the_reference_loads(name, tag, lods, simd):
 
 
 def reference_joints(name, lods, loaded):
-    """Indices of the reference's joints in our load, which also keeps ancestors of joints."""
+    """Indices of the reference's joints in our load, which also keeps the joints' ancestors."""
     whole = risorius.load(GOLDEN_SET / f"{name}.dna")
     kept = set(range(len(whole.joint_names))) - set(whole.lod_joint_mapping[0].tolist())
     kept |= set().union(*(whole.lod_joint_mapping[lod].tolist() for lod in lods))
@@ -329,7 +332,7 @@ def test_oracle_agrees_and_settled_is_what_repeats_itself(name, rotation):
 
 @pytest.mark.parametrize("rotation", ["euler", "quaternion"])
 def test_euler_angles_of_networks_are_read_by_their_own_system(rotation):
-    """Angles of another order and other signs than the face's, about other axes."""
+    """Angles in another order, with other signs and about other axes than the face's."""
     dna = risorius.load(GOLDEN / "ml.dna")
     joints = dna.machine_learned_behavior_ext.joints
     assert oracle_behavior.ml_stride(dna) == 9
@@ -365,7 +368,7 @@ def test_batch_rows_are_single_evaluations(name, simd, rotation):
 
 
 def random_raw(rng, dna):
-    """Sparse controls; the quaternions of setups and solvers are units."""
+    """Sparse random controls; quaternions of setups and solvers have unit length."""
     raw = rng.uniform(0, 1, len(dna.raw_control_names)) * (rng.random() < 0.7)
     names = list(dna.raw_control_names)
     for i, name in enumerate(names):
@@ -420,7 +423,7 @@ def test_a_read_only_view_of_what_others_may_write_is_copied():
     raw = random_raw(np.random.default_rng(3), dna)
     data = np.frombuffer(rig.to_bytes(), np.uint8)
     space = np.empty(len(data) + 64, np.uint8)
-    owner = space[-space.ctypes.data % 64 :][: len(data)]  # where a view could be used in place
+    owner = space[-space.ctypes.data % 64 :][: len(data)]  # aligned: a view is possible
     owner[:] = data
     again = risorius.Rig.from_bytes(memoryview(owner).toreadonly())
     owner[:] = 0
@@ -450,7 +453,7 @@ def test_rotation_is_one_of_two():
 
 
 def one_pose_solver(threshold):
-    """A pose at 0 whose value is 1 - x, written to a control that moves a joint."""
+    """A solver with one pose at 0; its value 1 - x is written to a control that moves a joint."""
     dna = risorius.Dna()
     dna.lod_count, dna.rotation_unit = 1, "radians"
     dna.raw_control_names, dna.joint_names, dna.joint_parents = ["x"], ["joint"], [0]

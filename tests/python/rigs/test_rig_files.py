@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compiled rigs in files and in a cache, and the opt-in check of controls."""
+"""Compiled rigs in files and in the cache, and the optional check of controls."""
 
 import os
 import sys
@@ -22,7 +22,7 @@ def rig():
     return risorius.Rig(risorius.load(FILE))
 
 
-HASH = slice(24, 32)  # of a block; what lies behind it is hashed
+HASH = slice(24, 32)  # place of the hash in a block; the bytes after it are hashed
 # ---- files
 
 
@@ -43,7 +43,7 @@ def test_what_is_refused_names_the_file_and_the_field(tmp_path, rig):
     data[-1] ^= 1
     file.write_bytes(data)
     with pytest.raises(risorius.DnaError, match="face.rig") as caught:
-        risorius.Rig.load(file)  # every file is checked unless the caller says otherwise
+        risorius.Rig.load(file)  # files are checked by default
     assert (caught.value.code, caught.value.where) == ("invalid_value", "rig.hash")
     file.write_bytes(b"short")
     with pytest.raises(risorius.DnaError, match="face.rig.*5 bytes"):
@@ -61,9 +61,9 @@ def test_what_is_refused_names_the_file_and_the_field(tmp_path, rig):
 
 
 def forged(rig):
-    """The bytes of a rig with an index that points outside, under a right hash."""
+    """The bytes of a rig with an index out of range, and with a matching hash."""
     data = bytearray(rig.to_bytes())
-    data[data.index(b"\x00\x01\x02\x00", HASH.stop)] = 9  # an axis of the rotation order
+    data[data.index(b"\x00\x01\x02\x00", HASH.stop)] = 9  # an axis in the rotation order
     data[HASH] = xxhash.xxh64_digest(data[HASH.stop :])[::-1]
     return data
 
@@ -84,7 +84,7 @@ def test_a_file_that_others_may_write_is_checked(tmp_path, rig):
 def test_only_the_caller_answers_for_a_wrong_hash(tmp_path, rig):
     file = tmp_path / "face.rig"
     data = bytearray(rig.to_bytes())
-    data[-1] ^= 1  # past the last array: nothing reads it
+    data[-1] ^= 1  # after the last array, where nothing reads
     file.write_bytes(data)
     for trusted in (False, None):
         with pytest.raises(risorius.DnaError, match="changed or cut"):
@@ -96,12 +96,12 @@ def test_only_the_caller_answers_for_a_wrong_hash(tmp_path, rig):
 
 
 class CompiledError(Exception):
-    """The cache was not used."""
+    """Raised if the cache was not used."""
 
 
 @pytest.fixture
 def no_compiling(monkeypatch):
-    """From then on a miss raises CompiledError."""
+    """Returns a function after whose call a compilation raises CompiledError."""
 
     def arm():
         def load(_):
@@ -133,7 +133,7 @@ def test_another_file_option_or_version_is_another_face(tmp_path, monkeypatch, n
         risorius.compile_cached(GOLDEN / "units.dna", tmp_path)
     for module, name, value in (
         (cache, "rig_block_version", lambda: 0),
-        (cache, "compile_version", lambda: 1),  # quaternion columns in the order of the file
+        (cache, "compile_version", lambda: 1),  # another version of the compiler
         (cache.version, "__version__", "0.0.0"),
         (sys, "byteorder", "middle"),
     ):
@@ -156,13 +156,13 @@ def test_a_damaged_cache_is_made_anew(tmp_path, rig, no_compiling):
 
 
 def test_a_flipped_bit_in_the_cache_is_a_face_made_anew(tmp_path, rig):
-    """In the header, in every array of the block, and between them."""
+    """Flip bits in the header, in every array of the block, and between the arrays."""
     risorius.compile_cached(FILE, tmp_path)
     (file,) = tmp_path.glob("*.rig")
     good = rig.to_bytes()
     raw = np.full(len(rig.raw_control_names), 0.5, np.float32)
     pose = rig.evaluate(raw)
-    for at in range(0, len(good), 61):  # an array begins on a multiple of 64
+    for at in range(0, len(good), 61):  # arrays begin at multiples of 64
         data = bytearray(good)
         data[at] ^= 1 << at % 8
         file.write_bytes(data)
@@ -214,7 +214,7 @@ def test_the_folder_follows_the_platform(tmp_path, monkeypatch):
     assert file.suffix == ".rig"
 
 
-# ---- controls that are no numbers
+# ---- controls that are not finite
 
 
 def test_a_control_that_is_not_finite_is_named_when_asked(rig):
@@ -233,7 +233,7 @@ def test_a_control_that_is_not_finite_is_named_when_asked(rig):
     raw[1, jaw] = -np.inf
     with pytest.raises(risorius.DnaError, match=f"{JAW} is minus infinite"):
         rig.evaluate(raw[1], check=True)
-    # Values beyond float32 are infinite to the evaluator.
+    # Values beyond float32 become infinite.
     with pytest.raises(risorius.DnaError, match="is infinite"), np.errstate(over="ignore"):
         rig.evaluate(np.full(4, 1e39), check=True)
 
@@ -266,7 +266,7 @@ def test_a_refused_frame_leaves_an_instance_as_it_was(rig):
 
 
 def test_nan_spoils_what_its_control_drives_and_nothing_else(rig):
-    """By the file's own tables: whatever does not hang on the control is as before."""
+    """The test follows the file's tables: all other outputs are unchanged."""
     dna = risorius.load(GOLDEN / "medium.dna")
     rig = risorius.Rig(dna)
     raw = np.full(len(rig.raw_control_names), 0.25, np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The evaluator against an independent implementation's values, every case at every LOD."""
+"""The evaluator, compared with values of an independent implementation at every LOD."""
 
 import gzip
 import json
@@ -16,8 +16,10 @@ BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
 
 
 def is_plain(name, about):
-    """Whether this oracle evaluates a file quickly: few joints are quaternions. test_rig_behavior
-    tests all files."""
+    """Whether the oracle of this test evaluates a file quickly, because few joints are quaternions.
+
+    test_rig_behavior tests all files.
+    """
     if any(about["counts"][part] for part in BEYOND):
         return False
     dna = risorius.load(GOLDEN_SET / f"{name}.dna", layers="joint_behavior_metadata")
@@ -28,7 +30,7 @@ def is_plain(name, about):
 PLAIN = [e for e in evaluations() if is_plain(e[0], e[2])]
 RIGS = [name for name, tag, _ in PLAIN if tag == ""]
 SEQUENCES = [name for name, tag, _ in PLAIN if tag == ".seq"]
-# Loaded by the reference with a filter: (file, tag, our LOD of each of its LODs).
+# Files that the reference loaded with a filter: (file, tag, our LOD for each of its LODs).
 FILTERED = [
     (name, tag, lods_of(about) or list(range(about["counts"]["lods"])))
     for name, tag, about in PLAIN
@@ -37,7 +39,7 @@ FILTERED = [
 
 
 class Golden:
-    """One <rig>.eval<tag> pair of files."""
+    """A pair of files <rig>.eval<tag>: description and values."""
 
     def __init__(self, folder, name, tag=""):
         self.about = json.loads((folder / f"{name}.eval{tag}.json").read_text())
@@ -56,7 +58,10 @@ class Golden:
 
 
 def assert_within(actual, expected, bound, what):
-    """|actual - expected| <= 2 bound: each side may lose one."""
+    """Check
+
+    actual - expected| <= 2 bound, because both sides may round.
+    """
     excess = np.abs(actual.astype(float) - expected) - 2 * bound
     worst = int(np.argmax(excess)) if excess.size else 0
     assert excess.size == 0 or excess[worst] <= 0, (
@@ -84,7 +89,7 @@ def raw_of_case(golden, rig, case):
     if case["kind"] == "raw":
         return values
     raw = rig.gui_to_raw(values)
-    # The generator then wrote 1 to the w of quaternion inputs.
+    # The generator then set the w of quaternion inputs to 1.
     raw[[name.endswith((".w", ".qw")) for name in rig.raw_control_names]] = 1
     return raw
 
@@ -103,7 +108,7 @@ def check_rig(folder, name, simd):
         raw = raw_of_case(golden, rig, case)
         for lod, offset in enumerate(case["lodRecordOffsets"]):
             expected = golden.record(offset)
-            if case["kind"] == "gui":  # the table's own rounding: two roundings a row
+            if case["kind"] == "gui":  # two roundings per row of the table
                 np.testing.assert_allclose(
                     raw, expected["rawControls"], rtol=0, atol=8 * oracle.EPS
                 )
@@ -159,7 +164,7 @@ def test_a_face_through_time_has_the_reference_latency(name, simd):
             dna, expected["rawControls"].astype(float), lod, settle=False, controls=state
         )
         expected["rawControls"] = raw
-        if step["call"] != "calculate":  # the generator ran all stages but the joints
+        if step["call"] != "calculate":  # the generator ran all stages except joints
             assert "joints not recalculated" in step["call"]
             expected["joints"] = pose.joints.ravel()
         check_pose(dna, pose, expected, bounds, f"{name} step {number}")
@@ -168,8 +173,11 @@ def test_a_face_through_time_has_the_reference_latency(name, simd):
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods, simd):
-    """A filter keeps the joints of its LODs in order: rows are compared joint by joint. Quaternions
-    are left out, because the order of their columns depends on the load."""
+    """Compare filtered loads of the reference with our LODs, joint by joint.
+
+    A filter keeps the joints of its LODs in order. Quaternions are left out, because the order of
+    their columns depends on the load.
+    """
     dna = risorius.load(GOLDEN_SET / f"{name}.dna")
     rig = risorius.Rig(dna, simd=simd)
     golden = Golden(GOLDEN_SET, name, tag)

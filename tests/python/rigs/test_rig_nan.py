@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A NaN control spoils only its own outputs, directly or through other controls.
+"""A NaN control affects only its own outputs, directly or through other controls.
 
 Its outputs are found by following the lists of the file, without arithmetic.
 """
@@ -16,7 +16,7 @@ FACES = ("core", "medium", "units", "rbf", "ml", "mlbase", "mlquat", "twistswing
 
 
 def feeds(dna, lod):
-    """(inputs, outputs) of everything between controls at the LOD."""
+    """(inputs, outputs) of all correctives, networks and solvers at a LOD, as sets of controls."""
     psds = dna.psds
     pairs = [
         ({int(c)}, {int(r)}) for r, c in zip(psds.rows.tolist(), psds.columns.tolist(), strict=True)
@@ -35,7 +35,7 @@ def feeds(dna, lod):
 
 
 def graph_feeds(kind, lod):
-    """Each scatter, with all that the operations before it gather."""
+    """For each scatter operation: the controls that it depends on, and those it writes."""
     reads, pairs = {}, []
     for s, operations in enumerate(kind.operations):
         for o in oracle_behavior.listed(kind.lod_operation_mappings[s], lod):
@@ -75,7 +75,7 @@ def driven_controls(dna, lod, control):
 
 
 def driven_joints(dna, lod, controls, stride):
-    """bool[J, stride]: all rows of a group; rotations as a whole where they may be quaternions."""
+    """Attributes that the controls may change, bool[J, stride]; rotations as a whole."""
     out = np.zeros((len(dna.joint_names), stride), bool)
     rotation = slice(3, stride - 3)
     for group in dna.joint_groups:
@@ -115,7 +115,7 @@ def driven_shapes(dna, lod, controls):
 
 
 def surely_spoiled(dna, lod, control, stride):
-    """Translations and scales [K, 2] that the control itself moves."""
+    """(joint, attribute) of translations and scales that the control moves itself, int[K, 2]."""
     out = []
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
@@ -148,7 +148,7 @@ def check(dna, rig, raw, lod, control, bad):
     assert not np.isfinite(pose.controls[control])
     again = rig.evaluate(raw, lod=lod)
     np.testing.assert_array_equal(again.joints, clean.joints)
-    # In a batch it spoils its own frame.
+    # In a batch, only the frame with NaN is affected.
     batch = rig.evaluate_batch(np.array([raw, spoiled, raw]), lod=lod)
     for n, wanted in enumerate((clean, pose, clean)):
         np.testing.assert_array_equal(batch.joints[n], wanted.joints, f"frame {n} of a batch")

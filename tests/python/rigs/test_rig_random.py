@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random faces against the oracle in double precision, at the sizes where loops begin and end."""
+"""Random faces compared with the double precision oracle, at sizes around the SIMD widths."""
 
 import numpy as np
 import oracle
@@ -25,7 +25,7 @@ def random_group(rng, dna, control_count, rows, columns):
 
 
 def random_table(rng, rows, inputs, outputs):
-    """Rows in runs of up to three, some of them with from and to swapped, sharing their bounds."""
+    """A table with runs of up to three rows of shared bounds, some with from and to swapped."""
     pairs = [(rng.integers(inputs), rng.integers(outputs)) for _ in range(rows)]
     pairs = [pairs[r - r % 3] if rng.random() < 0.7 else pairs[r] for r in range(rows)]
     bounds = rng.choice([-0.5, 0, 0.25, 0.5, 0.75, 1, 1.5], (rows, 2))
@@ -40,7 +40,7 @@ def random_table(rng, rows, inputs, outputs):
 
 
 def random_psds(rng, raw, count):
-    """Correctives of raw controls and, without cycles, of others on either side; interleaved."""
+    """Random correctives of raw controls and other correctives, without cycles, in mixed order."""
     order = rng.permutation(count)
     entries = []
     for rank, p in enumerate(order):
@@ -56,7 +56,7 @@ def random_psds(rng, raw, count):
 
 
 def random_face(seed, width):
-    """A face with joint groups of `width` rows and columns, and with one lane more."""
+    """A face with joint groups of `width` rows and columns, and of one SIMD width more."""
     rng = np.random.default_rng(seed)
     raw, psds, joints, lods = 12, 9, 60, 3
     dna = risorius.Dna()
@@ -87,7 +87,7 @@ def random_face(seed, width):
 
 
 def random_raw(seed, count, frames=6):
-    """Sparse controls, some beyond 0..1, some exactly on the tables' bounds."""
+    """Sparse random controls, some outside 0 to 1, some exactly on the tables' bounds."""
     rng = np.random.default_rng(seed)
     raw = rng.uniform(-0.5, 1.5, (frames, count)) * (rng.random((frames, count)) < 0.6)
     raw[0] = rng.choice([0, 0.25, 0.5, 0.75, 1], count)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Settling against a fixed point: random chains of correctives of correctives, solvers of
-correctives, networks of networks and every other order, each read by an earlier stage of a frame,
-against the oracle's frame that is repeated until nothing changes.
+"""Settled poses of random chains of correctives, networks and solvers.
+
+Each element is read by an earlier stage of a frame. The expected pose is a frame of the oracle that
+is repeated until nothing changes.
 """
 
 import numpy as np
@@ -13,20 +14,20 @@ from risorius import _native
 SIMD = _native.available_simd().split(", ")
 RAW, JOINTS = 4, 9
 KINDS = ("corrective", "network", "solver")
-# float32 rounds each sum of at most 9 products below 1. No node magnifies its inputs, so errors add
-# up along a chain of at most 12.
+# float32 rounds each sum of at most 9 products below 1. No node magnifies its inputs, so errors sum
+# along a chain of at most 12 nodes.
 LOSS = 12 * 10 * float(np.finfo(np.float32).eps)
 
 
 class Chain:
-    """Nodes in the order of their dependency; each reads raw controls and earlier nodes."""
+    """A chain of nodes; each reads raw controls and earlier nodes."""
 
     def __init__(self, kinds, rng):
         self.rng, self.kinds = rng, kinds
         self.correctives = kinds.count("corrective")
         self.networks = kinds.count("network")
         self.solvers = kinds.count("solver")
-        # The file numbers controls by kind, and each kind against the chain's order or along it.
+        # Controls are numbered by kind, and within each kind in random order.
         numbers = {kind: list(rng.permutation(kinds.count(kind))) for kind in KINDS}
         first = {"corrective": RAW, "network": RAW + self.correctives}
         first["solver"] = first["network"] + 2 * self.networks
@@ -36,14 +37,14 @@ class Chain:
             number = int(numbers[kind].pop())
             width = 1 if kind == "corrective" else 2
             outputs = [first[kind] + number * width + i for i in range(width)]
-            # always the node before, so that the chain is one
+            # the previous node is always read, so that all nodes form one chain
             inputs = [readable[-1], *rng.choice(readable[:-1], 2, replace=False).tolist()]
             self.nodes.append((kind, number, inputs, outputs))
             readable += outputs
         self.count = len(readable)
 
     def of(self, kind):
-        """The nodes of a kind in the order of the file: (inputs, outputs)."""
+        """(inputs, outputs) of the nodes of a kind, in the order of the file."""
         return [n[2:] for n in sorted(self.nodes, key=lambda n: n[1]) if n[0] == kind]
 
 
@@ -62,7 +63,7 @@ def network(rng, inputs, outputs):
 
 
 def graph(networks):
-    """The same networks as operations: gather, run, scatter."""
+    """The same networks as a graph of operations: gather, run, scatter."""
 
     def operation(kind, parameters, before):
         return risorius.MlOperation(
@@ -111,7 +112,7 @@ def make_dna(chain, as_graph):
     rows = [rows[i] for i in rng.permutation(len(rows))]
     names = ("rows", "columns", "values")
     dna.psds = risorius.Psds(**{name: [r[i] for r in rows] for i, name in enumerate(names)})
-    # Every control is used at LOD 0 by a joint; the first half of them at LOD 1.
+    # A joint uses every control at LOD 0, and the first half of them at LOD 1.
     half = chain.count // 2
     dna.joint_groups = [
         risorius.JointGroup(

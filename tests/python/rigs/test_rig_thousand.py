@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A thousand rigs of every shape: each instruction set, precision and kind of rotation against a
-dozen lines of NumPy, and against the scalar path; one frame, a batch, and a face come to rest.
+"""A thousand random rigs, with each instruction set, precision and kind of rotation.
+
+They are compared with a short NumPy version and the scalar code: a single frame, a batch, and a
+settled face.
 """
 
 from collections import Counter
@@ -22,7 +24,7 @@ EPS = oracle.EPS
 
 
 def random_shape(rng):
-    """Numbers of raw controls, correctives, joints, LODs, and (rows, columns) of each group."""
+    """Numbers of raw controls, correctives, joints and LODs; (rows, columns) of each group."""
     joints = int(rng.choice([0, 1, 2, 7, 30]))
     groups = [
         (min(int(rng.choice(WIDTHS)), 9 * joints), int(rng.choice(WIDTHS)))
@@ -33,7 +35,7 @@ def random_shape(rng):
 
 
 def falling(rng, rows, lods):
-    """Rows of each LOD: all of them, then fewer and fewer."""
+    """The number of rows for each LOD, from all rows down."""
     return [rows, *sorted((int(n) for n in rng.integers(0, rows + 1, lods - 1)), reverse=True)]
 
 
@@ -69,7 +71,7 @@ def random_dna(rng, shape):
 
 
 def expected(dna, raw, lod, precision):
-    """A pose by NumPy in double precision, and bounds of float32 errors: two dicts."""
+    """A pose computed by NumPy in double precision, and bounds of float32 errors: two dicts."""
     c = np.zeros(len(raw) + dna.psd_count)
     c[: len(raw)] = raw
     oracle.correctives(dna, c, oracle.used_controls(dna, lod), settle=True)
@@ -99,7 +101,7 @@ def expected(dna, raw, lod, precision):
 
 
 def turned(dna, values, losses):
-    """Poses and losses [J, 9] -> [J, 10], rotations as quaternions."""
+    """Convert poses and errors [J, 9] to [J, 10], with rotations as quaternions."""
     scale = oracle_behavior.radians_per_unit(dna)
     out, lost = np.zeros((2, len(values), 10))
     out[:, :3], out[:, 7:] = values[:, :3], values[:, 6:]
@@ -107,7 +109,8 @@ def turned(dna, values, losses):
     out[:, 3:7] = oracle_behavior.from_euler(
         dna.rotation_sequence, dna.rotation_signs, values[:, 3:6] * scale
     )
-    # Half an angle's loss, the roundings of the angle itself, sines to 1e-7, three products.
+    # Half of the angle's error, the rounding of the angle, an error of 1e-7 of sines, three
+    # products.
     angles = np.abs(values[:, 3:6]) * scale
     loss = 0.5 * (losses[:, 3:6] * scale + 4 * EPS * angles).sum(axis=1) + 3e-7 + 12 * EPS
     lost[:, 3:7] = loss[:, None]
@@ -128,7 +131,7 @@ def same(a, b, what):
 
 
 def check_frames(rig, raw, lod, threads, what):
-    """Rows of a batch, and a face that has come to rest, have the bits of one frame alone."""
+    """Check that rows of a batch and a settled instance equal single frames bit for bit."""
     batch = rig.evaluate_batch(raw, lod=lod, threads=threads)
     alone = [rig.evaluate(values, lod=lod) for values in raw]
     for field in FIELDS:
@@ -136,7 +139,7 @@ def check_frames(rig, raw, lod, threads, what):
         np.testing.assert_array_equal(getattr(batch, field), frames, f"{what} batch")
     instance = rig.instance()
     instance.lod = lod
-    for _ in range(7):  # six correctives in a chain, and once more
+    for _ in range(7):  # a chain of six correctives, and one frame more
         pose = instance.evaluate(raw[0])
     same(pose, rig.evaluate(raw[0], lod=lod), f"{what} instance")
 

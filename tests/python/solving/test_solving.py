@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drags on a skin, handles, and curves from a mesh that moves."""
+"""Dragging points of the skin, handles, and control curves from a moving mesh."""
 
 import math
 
@@ -66,7 +66,7 @@ def test_a_drag_arrives_with_the_smallest_change(face):
     assert solved.raw.max() <= 1
     assert solved.raw[IDLE] == 0
     assert solved.change == pytest.approx(np.linalg.norm(solved.raw - at), abs=1e-5)
-    # As the textbook has it, where no limit is in the way: the pseudo-inverse of the Jacobian.
+    # Compared with the pseudo-inverse of the Jacobian, because no limit is reached.
     small = surface.positions(at, 0, [vertex])[0] + [0.0, 0.004, 0.002]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6}
     step = risorius.solve_drag(surface, at, [(0, vertex)], [small], **free).raw - at
@@ -125,11 +125,11 @@ PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_partners_change_alike_and_as_little_as_they_can(face, method):
-    """As the textbook has it: the pseudo-inverse over one number for both."""
+    """Compared with the pseudo-inverse for one common number of both partners."""
     surface = face[1]
     vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
     here = surface.positions(begin, 0, vertices).astype(float)
-    apart = np.array([[-0.003, 0.002, 0.001], [0.001, 0.002, 0.0]])  # not alike on both sides
+    apart = np.array([[-0.003, 0.002, 0.001], [0.001, 0.002, 0.0]])  # different on both sides
     moved = here + apart
     points = [(0, v) for v in vertices]
     given = {"partners": PARTNERS, "method": method, "lowest": -1, "highest": 2, "smallest": 1e-6}
@@ -139,17 +139,17 @@ def test_partners_change_alike_and_as_little_as_they_can(face, method):
     assert abs(change[LEFT]) > 1e-3
     if method == "transpose":
         return
-    root = np.sqrt(0.5)  # of a unit of what both change
+    root = np.sqrt(0.5)  # the length of a common change of 1
     jacobian = surface.jacobian(begin, 0, vertices, -1, 2).reshape(6, 7).astype(float)
     jacobian[:, LEFT] = root * (jacobian[:, LEFT] + jacobian[:, RIGHT])
     jacobian[:, RIGHT] = 0
     best = np.linalg.pinv(jacobian, rcond=1e-4) @ apart.ravel()
     best[LEFT] = best[RIGHT] = root * best[LEFT]
-    np.testing.assert_allclose(change, best, atol=5e-4)  # of a face that bends
+    np.testing.assert_allclose(change, best, atol=5e-4)  # tolerance, because the face is not linear
 
 
 def test_partners_keep_the_limits_of_both(face):
-    """How far each may go is how far both go, up and down."""
+    """The narrower limits of the two partners apply to both."""
     surface, points = face[1], [(0, 14 * 3 + 5), (0, 14 * 10 + 5)]
     begin = raw(left=0.5, right=0.5)
     both = {"free": np.isin(np.arange(7), [LEFT, RIGHT]), "partners": PARTNERS}
@@ -166,7 +166,7 @@ def test_partners_keep_the_limits_of_both(face):
 
 @pytest.mark.parametrize("eases", [(1, 0.01), (0.01, 1)])
 def test_partners_change_as_readily_as_the_readier_one(face, eases):
-    """Others come there as well, and it is the pair that is to move."""
+    """Both partners use the smaller ease, because the pair moves as one."""
     surface, vertex = face[1], 14 * 5 + 6
     axis = np.array([0, 0.6, 0.8])
     target = surface.positions(raw(), 0, [vertex]) + 0.1 * axis
@@ -183,7 +183,7 @@ def test_partners_change_as_readily_as_the_readier_one(face, eases):
 
 
 def test_of_opposites_one_alone_is_used(face):
-    """The left smile and the puff both bring this vertex up; together they fit a little better."""
+    """The left smile and the puff both raise this vertex; both together fit slightly better."""
     surface, vertex = face[1], 14 * 5 + 6
     target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
     drag = [(0, vertex)], target
@@ -194,7 +194,7 @@ def test_of_opposites_one_alone_is_used(face):
     assert max(one.raw[LEFT], one.raw[PUFF]) > 0.05
     more = LEFT if both.raw[LEFT] > both.raw[PUFF] else PUFF
     assert one.raw[more] > 0.05
-    # One that was on goes back before the other comes, and only then does that come.
+    # An active control first returns to rest; only then does its opposite start.
     begin = raw(left=0.3)
     rest, puffed, here, lower = (
         surface.positions(raw(**at), 0, [vertex])
@@ -205,7 +205,7 @@ def test_of_opposites_one_alone_is_used(face):
         assert min(found.raw[LEFT], found.raw[PUFF]) <= 1e-6
         assert (found.raw[PUFF] > 0.1) == gone
         assert (found.raw[LEFT] > 0.01) == (not gone)
-    # Two that are on already may stay so, but go no further.
+    # Two opposites that are already active may stay, but do not increase.
     begin = raw(left=0.3, puff=0.2)
     found = risorius.solve_drag(surface, begin, *drag, opposites=[(LEFT, PUFF)])
     assert min(found.raw[LEFT], found.raw[PUFF]) <= 0.2 + 1e-6
@@ -225,7 +225,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
     most, spread = far.max(axis=0), np.sqrt((far**2).mean(axis=0))
     np.testing.assert_allclose(surface.strongest(), most, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(surface.spread(), spread, rtol=1e-4, atol=1e-6)
-    vertex = 14 * 3 + 5  # at the left corner
+    vertex = 14 * 3 + 5  # at the left corner of the mouth
     reach = surface.jacobian(raw(), 0, [vertex])
     here = np.linalg.norm(reach[0], axis=0)
     share = here / np.maximum(most, 1e-9)
@@ -241,7 +241,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """At most 1.3 mm behind; no active slider has an active opposite."""
+    """At most 1.3 mm farther away; no active slider has an active opposite."""
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
@@ -265,7 +265,7 @@ def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mir
 
 
 def test_a_sparse_drag_moves_few_and_arrives(face):
-    """Along two axes two controls arrive; least squares spread the way over all that help."""
+    """Along two axes two controls are enough; least squares would use all controls that help."""
     surface, vertex = face[1], 14 * 5 + 6
     axes = np.eye(3)[None, 1:]
     target = surface.positions(raw(left=0.5, jaw=0.2), 0, [vertex])
@@ -286,11 +286,11 @@ def test_a_sparse_drag_moves_few_and_arrives(face):
 def test_a_sparse_drag_leaves_what_belongs_elsewhere(face):
     surface, vertex = face[1], 14 * 3 + 5
     target = surface.positions(raw(jaw=0.4), 0, [vertex])
-    ease = np.where(np.arange(7) == JAW, 0.001, 1.0)  # the twin does the same
+    ease = np.where(np.arange(7) == JAW, 0.001, 1.0)  # the twin moves the same
     given = {"ease": ease, "method": "sparse"}
     near = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **given)
     assert near.raw[JAW] == 0 < near.raw[TWIN]
-    alone = np.isin(np.arange(7), [JAW, IDLE, PUFF])  # what reaches nothing asks the jaw
+    alone = np.isin(np.arange(7), [JAW, IDLE, PUFF])  # idle cannot help: the jaw does
     helped = risorius.solve_drag(surface, raw(), [(0, vertex)], target, free=alone, **given)
     assert helped.raw[JAW] == pytest.approx(0.4, abs=0.02)
 
@@ -313,8 +313,10 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """Compared with coordinate descent on the penalised problem, at the penalty with the same
-    error."""
+    """Compared with coordinate descent on the penalised problem.
+
+    Its penalty is chosen so that both have the same error.
+    """
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2
     low, high = -rng.uniform(0, 1, 12), rng.uniform(0.1, 1, 12)
@@ -336,11 +338,11 @@ def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     ease = np.where(np.arange(7) == LEFT, 1.0, 0.1)
     points = [(0, vertex)]
     loath = risorius.solve_drag(surface, raw(), points, target, ease=ease)
-    assert loath.error < 2e-3  # it comes as near
-    twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # which does what the jaw does
+    assert loath.error < 2e-3  # the error is as small
+    twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # the twin moves like the jaw
     alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
     assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
-    # As the textbook has it: least squares weighted by the inverse of the squared ease.
+    # Compared with least squares weighted by the inverse of the squared ease.
     small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
     step = risorius.solve_drag(surface, raw(), points, [small], **free).raw
@@ -361,7 +363,7 @@ def test_what_cannot_be_reached_ends_at_the_limits(face):
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_a_control_beyond_its_limits_stays_or_comes_back(face, method):
-    """A pose from elsewhere may be beyond the limits; a drag goes no further and jumps nowhere."""
+    """A pose may be beyond the limits; a drag neither increases this nor jumps."""
     surface, vertex = face[1], 14 * 7
     only = {"free": np.arange(7) == JAW, "method": method}
     for start, wanted, found in (
@@ -481,7 +483,7 @@ def test_a_structure_beside_its_fields_or_an_unknown_keyword_is_refused(face):
 
 
 def performance(face, frames=40):
-    """Curves of four controls that are seen, and float32[F, V, 3]."""
+    """Curves of four visible controls, and the vertices of each frame, float32[F, V, 3]."""
     t = np.arange(frames) / 30
     curves = np.zeros((frames, 7), np.float32)
     curves[:, JAW] = 0.5 - 0.5 * np.cos(7 * t)
@@ -514,7 +516,7 @@ def test_a_baked_clip_comes_back(face):
     assert not {"CTRL_expressions.idle", "CTRL_expressions.widen"} & set(solved.clip.names)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1, abs=0.01)
-    # The reported residual equals the error of a mesh from these curves.
+    # The reported residual equals the error of the mesh that these curves give.
     left = np.stack([pose(face, row) for row in found]) - vertices
     rms = np.sqrt((left**2).sum(axis=2).mean(axis=1))
     np.testing.assert_allclose(solved.frame_residual, rms, atol=1e-4)
@@ -538,7 +540,7 @@ def test_a_noisy_mesh_gives_quiet_curves(face):
     assert solved.noise * surface.mm == pytest.approx(1, abs=0.15)
 
     def flicker(values):
-        smooth = np.delete(values, PUFF, axis=1)  # which jumps
+        smooth = np.delete(values, PUFF, axis=1)  # which jumps by itself
         return np.sqrt((np.diff(smooth, 2, axis=0) ** 2).mean())
 
     loose = risorius.solve_clip(surface, vertices + noise, rate=30, free=FREE, smooth=0, sparse=0)

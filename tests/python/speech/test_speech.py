@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech to animation: sound files, transcripts, phonemes against espeak-ng's, and the mouth."""
+"""Speech to animation: sound files, transcripts, phonemes compared with espeak-ng's, the mouth."""
 
 import json
 import os
@@ -46,7 +46,7 @@ P = "CTRL_expressions."
 
 @pytest.fixture
 def voice(tmp_path):
-    """Speak a text into a file; without espeak-ng the test is an extra that does not run."""
+    """Returns a function that speaks a text into a file; the test is skipped without espeak-ng."""
     if not espeak_truth.is_installed():
         conftest.require_extra(Path("espeak-ng"), "speech of espeak-ng (apt install espeak-ng)")
     pytest.importorskip("pocketsphinx")
@@ -60,7 +60,7 @@ def voice(tmp_path):
 
 
 def wav(kind, bits, channels, rate, body, *, block=None, size=None, extra=b""):
-    """A WAV file, as the specification has it."""
+    """A WAV file according to the specification."""
     block = channels * bits // 8 if block is None else block
     form = struct.pack("<HHIIHH", kind, channels, rate, rate * block, block, bits) + extra
     chunks = b"fmt " + struct.pack("<I", len(form)) + form
@@ -81,7 +81,7 @@ def encoded(kind, bits, values):
     return b"".join(int(v).to_bytes(bits // 8, "little", signed=True) for v in whole)
 
 
-# ---- sound files ----
+# ---- reading of sound files ----
 
 
 @pytest.mark.parametrize(("kind", "bits"), [(1, 8), (1, 16), (1, 24), (1, 32), (3, 32), (3, 64)])
@@ -178,7 +178,7 @@ def test_resampling_keeps_the_band_and_nothing_else(rate):
         assert np.abs(folded[400:-400]).max() < 1e-3
 
 
-# ---- text ----
+# ---- words and numbers in transcripts ----
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_any_letters_have_a_pronunciation_of_known_phonemes():
             assert set(said) <= set(CLASS_OF)
 
 
-# ---- phonemes against the true ones ----
+# ---- phonemes compared with espeak-ng's ----
 
 
 def test_frames_with_a_transcript_are_right_and_without_better_than_a_guess(tmp_path, voice):
@@ -251,7 +251,7 @@ def test_lips_are_closed_at_the_true_times_of_bilabials(voice):
             frames = (times >= begin - 0.03) & (times <= end + 0.03)
             closed.append(jaw[frames].min() < 0.05 and pressed[frames].max() > 0.95)
     assert len(closed) >= 12
-    assert np.mean(closed) >= 0.9  # a reduced vowel that is missed takes a closure along
+    assert np.mean(closed) >= 0.9  # a missed reduced vowel hides a closure
     vowels = [
         jaw[(times >= begin) & (times <= end)].max()
         for name, begin, end in zip(spoken.names, spoken.times, spoken.times[1:], strict=False)
@@ -328,7 +328,7 @@ def test_listening_tells_how_far_it_is_and_can_be_cancelled(voice):
 
 
 def test_phonemes_of_a_piece_lie_on_the_clock_of_the_whole_and_end_with_it():
-    heard = [Phoneme(0.0, 0.5, "AA"), Phoneme(0.5, 1.1, "P")]  # the last one a little too long
+    heard = [Phoneme(0.0, 0.5, "AA"), Phoneme(0.5, 1.1, "P")]  # the last one is too long
     found = _shifted(heard, 2.0, 3.0)
     assert found == [Phoneme(2.0, 2.5, "AA"), Phoneme(2.5, 3.0, "P")]
 
@@ -356,7 +356,7 @@ def test_silence_is_taken_from_a_phoneme_but_not_from_a_stop_within_a_word():
 
 
 class Fake:
-    """A recogniser that always hears the same."""
+    """A recogniser with a fixed result."""
 
     def __init__(self, phones, words):
         self.phones = [Segment(*phone, "") for phone in phones]
@@ -384,7 +384,7 @@ def test_votes_elect_the_viseme_first_and_words_outvote_phonemes():
 
 
 def spell(*sounds, length=0.1):
-    """Heard of these sounds, each as long, in a vowel-like tone."""
+    """A Heard with these sounds, each `length` seconds long, in a vowel-like tone."""
     phones = [Phoneme(i * length, (i + 1) * length, name) for i, name in enumerate(sounds)]
     samples = sine(150, RATE, len(sounds) * length).astype(np.float32)
     return Heard(phones, samples, True, [])
@@ -409,13 +409,13 @@ def test_weights_are_parts_of_a_whole_and_rounding_is_anticipated():
     assert np.allclose(weights.sum(axis=1), 1.0)
     assert weights.min() >= 0.0
     rounding = weights[:, VISEMES.index("U")]
-    assert rounding[int(0.3 * 60)] > 0.2  # 100 ms before it sounds
+    assert rounding[int(0.3 * 60)] > 0.2  # 100 ms before the sound
     assert rounding.argmax() / 60 == pytest.approx(0.45, abs=0.05)
 
 
 def test_vowels_change_what_a_consonant_looks_like():
     def rounding(*sounds):
-        return animate(spell(*sounds)).curve(P + "mouthLipsPurseUL")[15]  # amid the consonant
+        return animate(spell(*sounds)).curve(P + "mouthLipsPurseUL")[15]  # inside the consonant
 
     assert rounding("UW", "UW", "T", "UW", "UW") > 0.2
     assert rounding("IY", "IY", "T", "IY", "IY") < 0.02
@@ -437,7 +437,7 @@ def test_curves_are_smooth_and_in_range():
             assert curve.min() >= 0.0
             assert curve.max() <= 1.0
         turns = np.abs(np.diff(curve, 2)).max()
-        assert turns < 0.006, name  # twice that where sounds meet, if nothing rounds them off
+        assert turns < 0.006, name  # without rounding, twice as much
 
 
 def test_intensity_scales_shapes_but_not_closures():
@@ -461,7 +461,7 @@ def test_a_louder_vowel_opens_wider():
 def test_blinks_come_at_a_natural_rate_near_pauses_and_from_the_seed():
     pauses = [Phoneme(t, t + 0.4, "SIL") for t in np.arange(3.0, 297.0, 6.0)]
     begins = gestures.blink_times(pauses, 300.0, 7)
-    assert 12 <= len(begins) / 5.0 <= 30  # a minute
+    assert 12 <= len(begins) / 5.0 <= 30  # blinks per minute
     assert np.diff(begins).min() >= 0.9
     near = [min(abs(b - p.begin) for p in pauses) < 0.07 for b in begins]
     assert np.mean(near) > 0.3
@@ -494,7 +494,7 @@ def test_the_loudest_and_highest_vowel_is_accented():
     assert clip.curve("head.pitch").min() < -0.01
 
 
-# ---- the command, and what goes wrong ----
+# ---- the command, and errors ----
 
 
 def test_command_writes_clips_and_phonemes(tmp_path, voice, capsys):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech in a process of its own: with any state and any end of the main program."""
+"""Speech recognition in a separate process, independent of the state and the end of this one."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ WORDS = "Hello, my name is Bob."
 
 @pytest.fixture
 def voice(tmp_path):
-    """A spoken sentence; without espeak-ng the test is an extra that is not run."""
+    """A spoken sentence as a file; the test is skipped without espeak-ng."""
     if not espeak_truth.is_installed():
         conftest.require_extra(tmp_path / "espeak-ng", "speech of espeak-ng")
     espeak_truth.say(WORDS).save(tmp_path / "voice.wav")
@@ -29,7 +29,7 @@ def voice(tmp_path):
 
 @pytest.fixture
 def endless(tmp_path):
-    """A sound file without an end: a pipe without a writer."""
+    """A sound file without an end: a named pipe without a writer."""
     if not hasattr(os, "mkfifo"):
         pytest.skip("pipes with names")
     os.mkfifo(tmp_path / "endless.wav")
@@ -38,7 +38,7 @@ def endless(tmp_path):
 
 @pytest.fixture
 def processes(monkeypatch):
-    """The processes that were begun."""
+    """The processes that were started."""
     found, begin = [], apart._started
 
     def spy(said):
@@ -54,7 +54,7 @@ def test_it_is_the_same_speech(voice, monkeypatch):
     options = {"seed": 3, "rate": 30.0, "library": {"aa": own}}
     wanted = speak(voice, WORDS, **options)
     assert "CTRL_expressions.open_A" in wanted.names
-    # The state of this process does not matter: it cannot even import the recogniser.
+    # The state of this process does not matter, even if it cannot import the recogniser.
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     with pytest.raises(MissingError):
         speak(voice, WORDS)
@@ -91,7 +91,7 @@ def test_another_libpocketsphinx_in_this_process_does_not_matter(voice, tmp_path
     done = limits.run(command, 120)
     said = done.stdout.splitlines()
     assert said[-1:] == ["apart: aligned"], done.stderr
-    # And the library does clash: without a process of its own there is no speech.
+    # The libraries do clash: in one process, recognition fails.
     assert said[:1] == ["in one process: RuntimeError"]
 
 
@@ -123,10 +123,10 @@ def test_it_ends_with_the_process_that_began_it(endless, tmp_path):
         process = apart._started(said)
         task = {"paths": sys.path, "path": str(endless), "transcript": None, "options": {}}
         apart._write(process, task)
-        # Open at both ends: now the other process waits for a sound that does not come.
+        # Open at both ends, so the other process waits for sound that does not come.
         with endless.open("wb"):
             assert process.poll() is None
-            process.stdin.close()  # as the system does when a process dies
+            process.stdin.close()  # the system does this when a process dies
             assert process.wait(60) == 1
         process.stdout.close()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words and phonemes as files: written, corrected by others, and read without a recogniser."""
+"""Words and phonemes in files: written, corrected by other programs, and read."""
 
 import json
 import sys
@@ -22,7 +22,7 @@ PHONES = [
 
 @pytest.fixture(scope="module")
 def voice(tmp_path_factory):
-    """A tone of 0.9 s."""
+    """A WAV file with a tone of 0.9 s."""
     path = tmp_path_factory.mktemp("voice") / "hum.wav"
     tone = 9000 * np.sin(2 * np.pi * 150 * np.arange(int(0.9 * RATE)) / RATE)
     with wave.open(str(path), "wb") as file:
@@ -41,7 +41,7 @@ def test_what_was_written_is_read(name):
 
 
 def test_files_of_praat_and_of_aligners_are_read():
-    """Short form, UTF-16, stress, a tier of points, other names of tiers, gaps, comments."""
+    """TextGrid in short form and UTF-16, with stress, points, other tier names and gaps."""
     short = """File type = "ooTextFile"
         "TextGrid" 0 0.8 <exists> 3
         "TextTier" "clicks" 0 0.8 1 0.4 "here" ! nobody asks
@@ -159,8 +159,8 @@ def test_a_face_speaks_with_visemes_of_its_own(tmp_path, voice, capsys):
     mine, ours = Clip.load(out), speech.animate(speech.listening.follow(voice, PHONES))
     spoken = mine.curves[mine.names.index("CTRL_expressions.viseme_aa")]
     assert spoken.max() > 0.5
-    assert 0.2 < mine.frame_times()[spoken.argmax()] < 0.5  # the two AA
-    closed = "CTRL_expressions.mouthPressUL"  # of PP, which this library lacks
+    assert 0.2 < mine.frame_times()[spoken.argmax()] < 0.5  # during the two AA
+    closed = "CTRL_expressions.mouthPressUL"  # PP uses this control, but this library lacks PP
     assert np.array_equal(
         mine.curves[mine.names.index(closed)], ours.curves[ours.names.index(closed)]
     )

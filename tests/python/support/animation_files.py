@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Files of animation as the tools write them: header order, decimals, quotes, line ends.
+"""Writes animation files like their programs: header order, decimals, quotes, line ends.
 
-What each follows:
+Sources of the forms:
 
 * Live Link Face: takes of the app as published recordings show them. 63 columns, 10 decimals, LF;
   BlendShapeCount 61; timecode HH:MM:SS:FF.sss where FF counts 60 a second while rows come 30 times
@@ -47,7 +47,7 @@ def camel(name: str) -> str:
 
 
 def timecode(seconds: float, base: int) -> str:
-    """HH:MM:SS:FF.sss of seconds since midnight, with thousandths of a frame."""
+    """Seconds since midnight as HH:MM:SS:FF.sss, with thousandths of a frame."""
     units = round((seconds % 86400.0) * base * 1000)
     frames, rest = divmod(units, 1000)
     whole, frame = divmod(frames, base)
@@ -71,7 +71,7 @@ def live_link_face(
 
 
 def capture(count: int, names: list[str] = COLUMNS) -> np.ndarray:
-    """Values [count, names] of 10 decimals, each column another; rotations to 0.6 both ways."""
+    """Values [count, names] with 10 decimals, different per column; rotations within 0.6."""
     at = np.arange(count)[:, None]
     column = np.arange(len(names))[None, :]
     values = 0.5 + 0.5 * np.sin(0.11 * at + 0.7 * column)
@@ -127,13 +127,13 @@ def unreal_animation(curves: dict[str, dict[float, float]], mode: str = "RCIM_Li
 
 
 def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
-    """Starts with hundredths, a tab, the shape; X closes at the end. LF."""
+    """Start times with two decimals, a tab, the shape; X at the end; line ends LF."""
     lines = [f"{start:.2f}\t{shape}\n" for start, _, shape in cues]
     return "".join(lines) + f"{cues[-1][1]:.2f}\tX\n"
 
 
 def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
-    """As Boost's property tree writes it, with 2 blanks a level."""
+    """In the form of Boost's property tree, with 2 spaces per level."""
     rows = [
         f'    <mouthCue start="{start:.2f}" end="{end:.2f}">{shape}</mouthCue>\n'
         for start, end, shape in cues
@@ -148,7 +148,7 @@ def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
 
 
 def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
-    """Formatted by hand, as the tool does: one cue a line."""
+    """Formatted as by the tool: one cue per line."""
     rows = [
         f'    {{ "start": {start:.2f}, "end": {end:.2f}, "value": "{shape}" }}'
         for start, end, shape in cues
@@ -161,7 +161,8 @@ def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
     )
 
 
-# Two words of a Papagayo document of 24 frames a second: (text, first frame, last frame, phonemes).
+# Two words of a Papagayo document with 24 frames per second: (text, first and last frame,
+# phonemes).
 WORDS = [
     ("hello", 6, 17, [(6, "AI"), (9, "L"), (13, "O")]),
     ("bob", 24, 35, [(24, "MBP"), (28, "O")]),
@@ -169,7 +170,10 @@ WORDS = [
 
 
 def papagayo_pgo() -> str:
-    """Version 1: tabs for the levels, "|" for line ends of the text."""
+    """A Papagayo file of version 1: tabs for levels, "
+
+    " for line ends of the text.
+    """
     out = ["lipsync version 1", "voice.wav", "24", "72", "1"]
     out += ["\tVoice 1", "\thello|bob", "\t1", "\t\thello bob", "\t\t6", "\t\t35", "\t\t2"]
     for text, first, last, phonemes in WORDS:
@@ -179,7 +183,7 @@ def papagayo_pgo() -> str:
 
 
 def papagayo_pgo_json() -> str:
-    """Version 2 of Papagayo-NG."""
+    """The same document in version 2, of Papagayo-NG."""
     words = [
         {
             "id": i, "text": text, "start_frame": first, "end_frame": last, "tags": [],
@@ -213,7 +217,7 @@ def papagayo_pgo_json() -> str:
 
 
 def moho_dat() -> str:
-    """The same words as Papagayo exports them: frames from 1, a rest at the end of each pause."""
+    """The same words in Papagayo's export for Moho: frames from 1, a rest ends each pause."""
     rows = [
         "1 rest",
         "6 rest",

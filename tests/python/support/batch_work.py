@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Jobs as workers of the tests run them: slow ones, and some that end their worker."""
+"""Work for the workers of tests: slow jobs, and jobs that kill their worker."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def slow(job, threads=1):
 
 
 def deadly(job, threads=1):
-    """One clip ends whoever gets it, as a fault of native code would, in the middle of a file."""
+    """One clip kills its worker in the middle of a file, as a fault in native code would."""
     if job.clip.stem == "deadly":
         path = job.outputs[0][1]
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,7 @@ def deadly(job, threads=1):
 
 
 def deadly_once(job, threads=1):
-    """The same, but one worker alone dies of it, also where two have such a job at once."""
+    """Like deadly, but only one worker dies, even if two run such a job at the same time."""
     if job.clip.stem == "deadly":
         with contextlib.suppress(FileExistsError):
             job.clip.with_suffix(".mark").touch(exist_ok=False)
@@ -40,7 +40,7 @@ def deadly_once(job, threads=1):
 
 
 def beside_deadly(job):
-    """The deadly job ends its worker each time, and the other lasts until it has done so thrice."""
+    """The deadly job kills its worker each time; the other job lasts until the third death."""
     deaths = job.clip.with_name("deaths")
     if job.clip.stem == "deadly":
         with deaths.open("ab") as file:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command line in this process: a process of its own takes longer to start than to work."""
+"""Runs the command line inside this process, because a new process starts slowly."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def run(*arguments: object, stdin: bytes = b"", text: bool = False) -> subproces
     """Run a command as a terminal would.
 
     Args:
-        arguments: what is typed after "risorius".
+        arguments: words after "risorius".
         stdin: the bytes of the standard input.
-        text: give the outputs as strings; else as bytes.
+        text: True: outputs are strings; False: bytes.
 
     Returns:
-        What subprocess.run gives. An exception that main does not catch is raised.
+        The same as subprocess.run. An exception that main does not catch passes through.
     """
     words = [str(argument) for argument in arguments]
     read, out, error = io.BytesIO(stdin), io.BytesIO(), io.BytesIO()
@@ -32,7 +32,7 @@ def run(*arguments: object, stdin: bytes = b"", text: bool = False) -> subproces
         mock.patch.object(sys, "stderr", io.TextIOWrapper(error, encoding="utf-8")) as said,
         warnings.catch_warnings(),
     ):
-        warnings.simplefilter("default")  # pytest keeps warnings; a process prints them
+        warnings.simplefilter("default")  # pytest collects warnings, a process prints them
         warnings.showwarning = _print_warning
         try:
             code = main(words)

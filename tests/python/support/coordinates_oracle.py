@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Coordinate systems by 3x3 and 4x4 matrices in double precision, without sharing code with the
-native module.
+"""Converts coordinate systems with matrices in double precision.
 
-Row vectors: a point of the source goes to p @ C, a matrix M to inverse(C) @ M @ C.
+It shares no code with the native module.
 """
 
 import itertools
@@ -26,7 +25,7 @@ ALL_SIGNS = list(itertools.product((1, -1), repeat=3))
 
 @dataclass(frozen=True)
 class System:
-    """How numbers are meant; the fields are spelled as Dna's."""
+    """Axes, rotations and units of a file, in Dna's spelling."""
 
     coordinate_system: tuple = ("right", "up", "front")
     rotation_sequence: str = "xyz"
@@ -36,7 +35,7 @@ class System:
     rotation_unit: str = "degrees"
 
     def arguments(self):
-        """Keywords of Dna.convert."""
+        """The system as keyword arguments of Dna.convert."""
         fields = dict(self.__dict__)
         fields["axes"] = fields.pop("coordinate_system")
         return fields
@@ -48,7 +47,7 @@ def system_of(dna):
 
 
 def random_system(rng):
-    """Any of the 48 axes, 6 sequences, 8 signs, 2 windings and 4 pairs of units."""
+    """A random system of all axes, sequences, signs, windings and units."""
     return System(
         ALL_AXES[rng.integers(48)],
         ALL_SEQUENCES[rng.integers(6)],
@@ -58,19 +57,19 @@ def random_system(rng):
 
 
 def change(source, target):
-    """The matrix C, float64[3, 3]."""
+    """The matrix C from source to target, float64[3, 3]."""
     rows = [np.array([DIRECTIONS[a] for a in s.coordinate_system], float) for s in (source, target)]
     return rows[0] @ rows[1].T
 
 
 def scale_of_unit(source, target):
-    """Factor of lengths."""
+    """The factor for lengths from source to target."""
     centimetres = {"cm": 1.0, "m": 100.0}
     return centimetres[source.translation_unit] / centimetres[target.translation_unit]
 
 
 def radians(system, angles):
-    """Stored angles as signed angles about the system's axes."""
+    """Convert stored angles to signed angles in radians about the system's axes."""
     unit = np.pi / 180 if system.rotation_unit == "degrees" else 1.0
     return np.asarray(angles, float) * system.rotation_signs * unit
 
@@ -92,21 +91,21 @@ def rotation(system, angles):
 
 
 def mapped_rotation(c, matrices):
-    """R' = transpose(C) R C."""
+    """The rotation matrices in the new axes: transpose(C) R C."""
     return c.T @ matrices @ c
 
 
 def order_stays(source, target):
-    """Whether angles go to one place each: the axes are turned in the same order."""
+    """Whether each angle becomes one angle, because the axes are rotated in the same order."""
     c = change(source, target)
     moved = ["xyz"[int(np.argmax(np.abs(c["xyz".index(a)])))] for a in source.rotation_sequence]
     return "".join(moved) == target.rotation_sequence
 
 
 def local_matrices(dna, deltas=None):
-    """float64[joints, 4, 4]: scale, then rotate, then translate, relative to the parent.
+    """Matrices relative to the parents, float64[joints, 4, 4]: scale, rotate, translate.
 
-    deltas: a pose's joints, float[joints, 9], added to neutral.
+    deltas: joints of a pose, float[joints, 9], added to the neutral pose.
     """
     system = system_of(dna)
     translations = np.asarray(dna.neutral_joint_translations, float)
@@ -125,7 +124,7 @@ def local_matrices(dna, deltas=None):
 
 
 def world_matrices(dna, deltas=None):
-    """float64[joints, 4, 4]; parents may come after their children."""
+    """World matrices, float64[joints, 4, 4]; parents may come after their children."""
     local = local_matrices(dna, deltas)
     parents = np.asarray(dna.joint_parents)
     world = [None] * len(local)
@@ -142,7 +141,7 @@ def world_matrices(dna, deltas=None):
 
 
 def mapped_world(source, target, matrices):
-    """inverse(C) M C, and translations in the target's unit."""
+    """World matrices in the target system: inverse(C) M C, with translations in its unit."""
     c = np.eye(4)
     c[:3, :3] = change(source, target)
     out = np.linalg.inv(c) @ matrices @ c

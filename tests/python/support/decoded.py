@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A Dna in the form of the reference's decoded golden files, and both by name.
+"""Converts a Dna to the form of the reference's decoded golden files, by index or by name.
 
-A LOD filter of the reference leaves some indices as they were in the whole file (design ruling 1),
-so filtered files are compared by the names behind the indices.
+A LOD filter of the reference keeps some indices of the complete file (design ruling 1), so filtered
+files are compared by the names of the elements.
 """
 
 import gzip
@@ -28,7 +28,7 @@ def listed(array):
 
 
 def lods(mapping, name, lod_count):
-    """The golden writes a mapping as its number of rows and what each LOD lists."""
+    """A LOD mapping in the form of the golden files: number of rows, and the list of each LOD."""
     rows = [listed(mapping[lod]) for lod in range(min(lod_count, len(mapping)))]
     return {
         f"{name}IndexListCount": len(mapping.rows),
@@ -61,7 +61,7 @@ def descriptor(dna):
 
 
 def pairs_in_lods(dna):
-    """Entries of the mesh/channel mapping whose mesh and channel are both listed at the LOD."""
+    """For each LOD the entries of the mesh/channel mapping whose mesh and channel it lists."""
     pairs = listed(dna.mesh_blend_shape_channel_mapping)
     return [
         [
@@ -300,7 +300,7 @@ def decoded(dna):
 
 
 def with_defaults(view, dna):
-    """Default values of the reference's getters for layers that are missing or not loaded."""
+    """Add the reference's default values for layers that are missing or not loaded."""
     joints, meshes = len(dna.joint_names), len(dna.mesh_names)
     for attribute in view["jointBehaviorMetadata"].values():
         attribute.extend([0] * (joints - len(attribute)))
@@ -311,13 +311,13 @@ def with_defaults(view, dna):
 
 
 def stride(keys, values):
-    """Numbers per joint of the ext layer's joints: 10 where rotations are quaternions."""
+    """Numbers per joint in the ext layer: 10 if rotations are quaternions, otherwise 9."""
     quaternions = any(k == 1 and v == 1 for k, v in zip(keys, values, strict=True))
     return 10 if quaternions else 9
 
 
 class Names:
-    """The names of a file's index spaces, in order."""
+    """The names of all elements in a file, in the order of their indices."""
 
     def __init__(self, view):
         d = view["definition"]
@@ -329,13 +329,13 @@ class Names:
 
 
 def by_name(view, unmapped=None):
-    """The view with names for indices.
+    """Replace indices in the view by names.
 
     Args:
-        view: as decoded() gives it, or a decode golden.
-        unmapped: the Names of the unfiltered file, where output indices of blend shape channels
-            and animated maps, the channels of targets and network numbers still count (in the
-            reference); default: the view's own.
+        view: result of decoded(), or a decoded golden file.
+        unmapped: Names of the unfiltered file, for indices that the reference does not change:
+            outputs of channels and animated maps, channels of targets, networks; default: the
+            view's own.
     """
     own = Names(view)
     old = unmapped or own
@@ -415,7 +415,7 @@ def _group_by_name(g, own):
 
 
 def _outputs_by_name(behavior, name, old, kept):
-    """Per LOD the entries whose output is kept: all fields of an entry, the output as a name."""
+    """The entries of each LOD whose output is kept, with the name of the output."""
     fields = [
         k
         for k in behavior
@@ -443,7 +443,7 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Networks by their content, without the rows for each LOD."""
+    """Operations with the content of their networks instead of indices, and without LODs' rows."""
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

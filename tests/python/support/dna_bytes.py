@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Vertices of a DNA file from its bytes alone: struct and NumPy, and nothing of Risorius.
+"""Computes vertices of a DNA file from its bytes, with struct and NumPy, without Risorius.
 
 Written from the description of the format (big-endian; an index table of layers; sections of
-lists), for files from 2.2 on whose joints turn by Euler angles in the order x y z with positive
-signs and whose behavior is raw controls, correctives (products), joint groups and blend shapes.
+lists), for files from version 2.2 on with Euler angles in the order x y z, positive signs, and a
+behavior of raw controls, correctives (products), joint groups and blend shapes.
 """
 
 import struct
@@ -48,7 +48,7 @@ class Cursor:
 
 
 class Face:
-    """A DNA file as arrays; vertices(controls, lod) poses it."""
+    """A DNA file as arrays; vertices(controls, lod) returns posed vertices."""
 
     def __init__(self, data):
         assert data[:3] == b"DNA"
@@ -132,7 +132,7 @@ class Face:
         self._ends("geom", c)
 
     def _controls(self, raw):
-        """Raw controls by name, and the correctives: clamped products of their inputs."""
+        """Raw controls by name, followed by correctives: clamped products of their inputs."""
         out = np.zeros(len(self.raw) + self.correctives)
         for name, value in raw.items():
             out[self.raw.index(name)] = value
@@ -145,7 +145,7 @@ class Face:
         return out
 
     def _world(self, delta):
-        """float64[J, 4, 4], row vectors: v' = v M."""
+        """World matrices of joints, float64[J, 4, 4], for row vectors: v' = v M."""
         angles = self.rotations + delta[:, 3:6]
         angles = np.radians(angles) if self.degrees else angles
         out = []
@@ -164,10 +164,10 @@ class Face:
         return np.array(out)
 
     def vertices(self, raw, lod=0):
-        """float64[V, 3]: where the vertices of a LOD's meshes are, one after the other.
+        """Vertices of all meshes of a LOD, joined, float64[V, 3].
 
         Args:
-            raw: values by the names of raw controls; all others are 0.
+            raw: raw control -> value; all others are 0.
             lod: the level of detail.
         """
         controls = self._controls(raw)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech whose phoneme times are known: espeak-ng's library reports them while it speaks."""
+"""Makes speech with known phoneme times, which the library of espeak-ng reports."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-# espeak's own names of the sounds of its American voice, by viseme class; by phonetics, independent
-# of a recogniser. A diphthong counts as its nucleus.
+# espeak's names of the sounds of its American voice, by viseme class. The classes follow phonetics,
+# independent of a recogniser. A diphthong has the class of its nucleus.
 CLASSES = {
     "sil": "_ _: _:: _! _| ?",
     "PP": "p b m m-",
@@ -33,8 +33,8 @@ CLASSES = {
 }
 CLASS_OF = {name: viseme for viseme, names in CLASSES.items() for name in names.split()}
 
-# Sounds that begin with a closed mouth: espeak marks where they burst open and counts the silence
-# of the closure to the sound before.
+# Sounds that begin with a closed mouth: espeak reports the time of the burst, and counts the
+# silence of the closure to the previous sound.
 STOPS = {"p", "b", "t", "d", "k", "g", "tS", "dZ", "t2"}
 
 
@@ -48,7 +48,7 @@ class Spoken:
     times: list[float]
 
     def classes(self, at: np.ndarray) -> np.ndarray:
-        """The viseme class at each time, as strings."""
+        """The viseme class at each time in seconds, as strings."""
         visemes = np.array([CLASS_OF[name] for name in self.names])
         place = np.searchsorted(self.times, at, side="right") - 1
         found = visemes[np.clip(place, 0, len(visemes) - 1)]
@@ -100,7 +100,10 @@ def is_installed() -> bool:
 
 
 def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> Spoken:
-    """Speak a text. Args: a voice with its variant (en-us+f2), words a minute, 0 to 100."""
+    """Speak a text.
+
+    Args: voice with its variant (en-us+f2), speed in words per minute, pitch 0 to 100.
+    """
     found = _library()
     assert found is not None
     library, rate = found
@@ -132,7 +135,7 @@ def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> S
 
 
 def _with_closures(samples, rate, names, times):
-    """The times, with the silence before a stop counted to the stop, unless a pause precedes."""
+    """The times of sounds; the silence before a stop belongs to it, except after a pause."""
     moved = list(times)
     for i in range(1, len(names)):
         if names[i] in STOPS and CLASS_OF[names[i - 1]] != "sil":

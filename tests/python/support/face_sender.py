@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A phone for the tests: a program that sends faces to a port of this machine.
+"""A simulated phone: a program that sends faces to a port of this machine.
 
     python face_sender.py PORT < STEPS
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face of 506 vertices and its expressions, by formula: half an ellipsoid of 20 x 26 cm."""
+"""A face with 506 vertices and its expressions, by formula: half an ellipsoid of 20 x 26 cm."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ ACROSS, DOWN = 23, 22
 
 
 def head():
-    """Positions float64[V, 3] in cm and the polygons."""
+    """Positions in cm, float64[V, 3], and the polygons."""
     u, v = np.meshgrid(np.linspace(-1.3, 1.3, ACROSS), np.linspace(1.3, -1.3, DOWN))
     x, y = 8 * np.sin(u) * np.cos(v), 13 * np.sin(v)
     z = 10 * np.cos(u) * np.cos(v)
-    x = (x - x[:, ::-1]) / 2  # to the last bit
+    x = (x - x[:, ::-1]) / 2  # makes the sides equal to the last bit
     positions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     corner = np.arange(ACROSS * DOWN).reshape(DOWN, ACROSS)
     faces = np.stack(
@@ -26,7 +26,7 @@ def bump(positions, x, y, size):
 
 
 def expressions(positions):
-    """Displacements float64[V, 3] in cm by ARKit's name."""
+    """ARKit unit -> displacement in cm, float64[V, 3]."""
     out = {}
     for side, sign in (("Left", 1), ("Right", -1)):
         pull = bump(positions, sign * 3, -5, 4)[:, None]
@@ -52,7 +52,7 @@ def write_obj(path, positions, faces):
 
 
 def write_all(folder, joints=40, more=""):
-    """neutral.obj, shapes/*.obj and spec.toml; gives the spec's path."""
+    """Write neutral.obj, shapes/*.obj and spec.toml. Returns the path of spec.toml."""
     positions, faces = head()
     (folder / "shapes").mkdir(parents=True)
     write_obj(folder / "neutral.obj", positions, faces)

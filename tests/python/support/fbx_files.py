@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Binary FBX in the layout of Autodesk's SDK, limited to the parts that the reader uses.
+"""Writes binary FBX in the layout of Autodesk's SDK, limited to the parts that the reader uses.
 
 Header, records of (end, count, length, name), values by type letter, arrays packed with zlib from
 128 bytes on, an empty record at the end of each list; 32 bit offsets to version 7.4, 64 bit from
@@ -21,7 +21,7 @@ USER, AUTO = 0x400, 0x100
 
 
 class I64(int):
-    """A 64 bit whole number (other ints are written with 32)."""
+    """A 64-bit integer; other integers are written with 32 bits."""
 
 
 def value(v) -> bytes:
@@ -63,7 +63,7 @@ def fbx(tops, version: int = 7400) -> bytes:
 
 
 def curve(identity: int, times, values, flags=LINEAR, slopes=None):
-    """AnimationCurve; slopes: [keys, 2], after the key and before the next."""
+    """An AnimationCurve; slopes: float[keys, 2], after the key and before the next key."""
     count = len(times)
     data = np.zeros((count if slopes is not None else 1, 4), "<f4")
     if slopes is not None:
@@ -85,7 +85,7 @@ def curve(identity: int, times, values, flags=LINEAR, slopes=None):
 
 
 def animation(tracks, *, version=7400, stacks=("Take 001",), time_mode=3):
-    """A file. Args: tracks: (kind, object, property, components {name: AnimationCurve}, stack)."""
+    """An FBX file. Args: tracks: (kind, object, property, {component: AnimationCurve}, stack)."""
     objects, links, ids = [], [], iter(range(1000, 9999))
     layers, owners = [], {}
     for name in stacks:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A small Dna in which no layer and no list is empty, and every way to change one field of it."""
+"""A small Dna without empty layers or lists, and all ways to change one of its fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import risorius
 
 
 def full() -> risorius.Dna:
-    """2 LODs, 3 joints, 2 meshes; controls: raw 0-4, corrective 5-6, network 7-8, pose 9-10."""
+    """2 LODs, 3 joints, 2 meshes; controls: raw 0-4, correctives 5-6, networks 7-8, poses 9-10."""
     dna = risorius.Dna(
         name="full", archetype="other", gender="female", age=30, metadata={"a": "1", "b": "2"},
         translation_unit="cm", rotation_unit="degrees", coordinate_system=("right", "up", "front"),
@@ -32,7 +32,7 @@ def full() -> risorius.Dna:
     dna.meshes = [_mesh(1.0, 2), _mesh(2.0, 1)]
     _networks(dna)
     _rotations(dna)
-    return risorius.load(dna.to_bytes())  # with the index of a file
+    return risorius.load(dna.to_bytes())  # loaded from bytes, so that it has an index
 
 
 def _table(outputs: list[int], inputs: list[int]) -> risorius.Conditionals:
@@ -184,7 +184,7 @@ def settable(owner: Any) -> list[str]:
 
 
 def fields(owner: Any, path: tuple[Step, ...] = ()) -> Iterator[tuple[tuple[Step, ...], Any]]:
-    """Every settable property, however deep, with its value."""
+    """(path, value) of every settable property, including nested ones."""
     for name in settable(owner):
         value = getattr(owner, name)
         yield (*path, name), value
@@ -205,7 +205,7 @@ def name_of(path: tuple[Step, ...]) -> str:
 
 
 def changed(dna: risorius.Dna, path: tuple[Step, ...], value: Any) -> risorius.Dna:
-    """A copy with another value of one field."""
+    """A copy of the face with another value of one field."""
     out = copy.deepcopy(dna)
     owner: Any = out
     for step in path[:-1]:
@@ -215,7 +215,7 @@ def changed(dna: risorius.Dna, path: tuple[Step, ...], value: Any) -> risorius.D
 
 
 def others(value: Any) -> Iterator[Any]:
-    """Values near this one, most of which make sense in its place."""
+    """Values that differ slightly from this one and are mostly valid in its place."""
     if isinstance(value, bool | int):
         yield from (value + 1, max(0, value - 1))
     elif isinstance(value, float):
@@ -240,7 +240,7 @@ def _other_arrays(value: np.ndarray) -> Iterator[np.ndarray]:
             if value.dtype.kind != "u":
                 out.flat[at] += change / 4
             elif 0 <= int(out.flat[at]) + change <= np.iinfo(value.dtype).max:
-                out.flat[at] = int(out.flat[at]) + change  # NumPy 2 adds no -1 to what has no sign
+                out.flat[at] = int(out.flat[at]) + change  # NumPy 2 adds no -1 to unsigned numbers
             else:
                 continue
             yield out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sums of morph targets as a client shows them, against the rig at the same pose."""
+"""Compares sums of morph targets in a client with the rig in the same poses."""
 
 import json
 
@@ -13,7 +13,7 @@ from risorius.gameface.targets import find_targets
 
 
 def units_of(take):
-    """The 52 units of each frame, {name: value}, of a take of Live Link Face."""
+    """ARKit unit -> value, for each frame of a take of Live Link Face."""
     clip = importing.read(take).clip
     lower = {name.lower(): row for name, row in zip(clip.names, clip.curves, strict=True)}
     rows = {unit: lower[unit.lower()] for unit in arkit.mapping()}
@@ -21,7 +21,7 @@ def units_of(take):
 
 
 def driven(weights, table):
-    """Weights with those of the combinations, as combinations.js sets them."""
+    """Add the weights of the combination targets, by the formulas of combinations.js."""
     out = dict(weights)
     for row in table["combinations"]:
         a, b, c = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0, 0.0)[:3]
@@ -37,7 +37,7 @@ def driven(weights, table):
 
 
 class Posed:
-    """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
+    """The meshes of a .glb for target weights, and the rig's meshes in the same order."""
 
     def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
@@ -52,11 +52,11 @@ class Posed:
             self._where[mesh] = _nearest(self._own(mesh, rig.initial_raw_controls), rest)
 
     def targets(self, groups):
-        """As the export finds them."""
+        """The morph targets as the export finds them."""
         return find_targets(self.rig, groups, "the face")[0]
 
     def sum(self, weights):
-        """Mesh -> float64[V, 3], metres: the neutral and the targets by their weights."""
+        """Mesh -> vertices in metres, float64[V, 3]: the neutral face plus weighted targets."""
         out = {}
         for mesh, deltas in self._deltas.items():
             on = np.array([weights.get(name, 0.0) for name in self.found.names(mesh)])
@@ -64,11 +64,11 @@ class Posed:
         return out
 
     def rig_at(self, raw):
-        """The same, of the evaluated rig."""
+        """Mesh -> vertices of the evaluated rig in metres, float64[V, 3]."""
         return {mesh: self._own(mesh, raw)[where] for mesh, where in self._where.items()}
 
     def raws_of(self, take):
-        """float32[frames, R] of a take, mapped as clips are."""
+        """The raw controls of a take, float32[frames, R], mapped like clips."""
         clip, _ = importing.import_file(take, self.rig.raw_control_names, mapping="arkit")
         raws = np.tile(self.rig.initial_raw_controls, (clip.frame_count, 1))
         column = {name: i for i, name in enumerate(self.rig.raw_control_names)}
@@ -84,7 +84,7 @@ class Posed:
 
 
 def frames(path, take, *, lod, every):
-    """For each looked-at frame: mm of the sum, and of the driven sum, against the rig."""
+    """For every `every`-th frame: errors of the sum and of the sum with combinations, in mm."""
     dna, rig = risorius.load(path), risorius.compile_cached(path)
     made = export(dna, rig, path, "face.glb", Wishes(shapes=("arkit",), lod=lod, within=0.5))
     table = json.loads(made.files["face.combinations.json"])
@@ -102,7 +102,7 @@ def _apart(a, b):
 
 
 def _nearest(points, wanted):
-    """int64[n]: the point at each wanted place; points of one place move alike."""
+    """The index of the point nearest to each wanted place, int64[n]."""
     out = np.empty(len(wanted), np.int64)
     for begin in range(0, len(wanted), 256):
         part = wanted[begin : begin + 256]

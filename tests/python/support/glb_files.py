@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""GLB files for tests: written piece by piece, packed or not; and the formula's head as one."""
+"""Writes GLB files for tests, with or without compression, and the formula's head as a GLB."""
 
 import json
 import struct
@@ -8,13 +8,13 @@ import face_shapes
 import numpy as np
 from risorius import _native
 
-TURN = [0.0, 0.6, 0.0, 0.8]  # a quaternion about y
+TURN = [0.0, 0.6, 0.0, 0.8]  # a quaternion, rotation about y
 SCALE, SHIFT = 2.0, [1.0, 2.0, 3.0]
 MESHOPT = "EXT_meshopt_compression"
 
 
 class Glb:
-    """A GLB that is written piece by piece."""
+    """A GLB that is built piece by piece."""
 
     def __init__(self):
         self.binary = b""
@@ -24,8 +24,10 @@ class Glb:
         }  # fmt: skip
 
     def packed(self, data, stride, mode="ATTRIBUTES", filter_name="NONE", seen=True):
-        """A view that meshoptimizer packed, as gltfpack writes it: its own place is in a buffer
-        that is not there. What `filter_name` says was done to the data already."""
+        """Add a view compressed by meshoptimizer, in gltfpack's form: its own buffer has no data.
+
+        `filter_name` names the filter that was already applied to the data.
+        """
         count = len(data) // stride
         packed = _native.pack_buffer(data, count, stride, mode, filter_name)
         own = self.json["bufferViews"][self.view(packed)]
@@ -101,7 +103,7 @@ def world(points):
 
 
 def egg(path, *, sparse=True, change=None, matrices=None):
-    """The formula's head: two primitives, every vertex of the second column twice."""
+    """Write the formula's head: two primitives, with each vertex of the second column twice."""
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

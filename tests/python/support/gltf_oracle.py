@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A reader of .glb files by the specification alone: positions of meshes at weights of targets."""
+"""Reads .glb files according to the specification: positions for weights of targets."""
 
 import json
 import struct
@@ -38,7 +38,7 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """[n, k] as floats; bounds that the file says are held against them."""
+        """The numbers of an accessor as float[n, k]; bounds in the file are checked."""
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]
         out = np.zeros((about["count"], width), kind)
@@ -66,7 +66,7 @@ class GlbFile:
         return values
 
     def meshes(self):
-        """Name -> (node, mesh)."""
+        """Name of a mesh -> (node, mesh)."""
         nodes = [node for node in self.json["nodes"] if "mesh" in node]
         return {node["name"]: (node, self.json["meshes"][node["mesh"]]) for node in nodes}
 
@@ -74,7 +74,7 @@ class GlbFile:
         return self.meshes()[name][1].get("extras", {}).get("targetNames", [])
 
     def positions(self, name, weights=None, kind="POSITION", world=None):
-        """float64[V, 3] of a mesh in the scene, its targets on by weights.
+        """Vertices of a mesh in the scene, float64[V, 3], for weights of its targets.
 
         Args:
             world: node -> float64[4, 4], where its joints are; None: at rest."""
@@ -119,7 +119,7 @@ class GlbFile:
 
 
 def _turn(x, y, z, w):
-    """float64[3, 3] of a unit quaternion."""
+    """The rotation matrix of a unit quaternion, float64[3, 3]."""
     assert abs(x * x + y * y + z * z + w * w - 1) < 1e-6
     a, b = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) * (w * w - a @ a) + 2 * np.outer(a, a) + 2 * w * b

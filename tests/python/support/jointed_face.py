@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A finished face by formula: 62 joints, 9 correctives, a neck solver, maps, 3 levels of detail."""
+"""A complete face by formula: 62 joints, 9 correctives, a neck solver, animated maps, 3 LODs."""
 
 import face_shapes
 import numpy as np
@@ -19,7 +19,7 @@ TURNS = [f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw"]
 
 
 def build() -> risorius.Dna:
-    """The face; all of its joints move alike on both sides."""
+    """Build the face; the joints of both sides move alike."""
     positions, _ = face_shapes.head()
     moved = face_shapes.expressions(positions)
     names = list(moved)
@@ -34,7 +34,7 @@ def build() -> risorius.Dna:
     skin = _skin_places(positions)
     dna.joint_names = [*NAMED, *(f"FACIAL_C_Skin{i}" for i in range(SKIN))]
     parents = [*_PARENTS, *[5] * SKIN]
-    parents[-1] = len(parents) - 2  # one hangs on another
+    parents[-1] = len(parents) - 2  # the last joint has another skin joint as its parent
     places = np.array([*_PLACES, *skin], float)
     places[0] = _PLACES[0]
     dna.joint_parents = parents
@@ -50,7 +50,7 @@ def build() -> risorius.Dna:
 
 
 def _skin_places(positions):
-    """Places on the skin, of both sides, and of the middle last."""
+    """Places on the skin in pairs of both sides, then places in the middle."""
     grid = positions.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)
     right = grid[2::4, 1:11:2].reshape(-1, 3)[:24]
     middle = grid[2::5, face_shapes.ACROSS // 2][:4]
@@ -75,7 +75,7 @@ def _meshes(dna, positions, places, moved):
         near = np.argsort(apart, axis=1, kind="stable")[:, :4]
         weights = 1 / (0.5 + np.take_along_axis(apart, near, axis=1)) ** 2
         weights /= weights.sum(axis=1, keepdims=True)
-        crown = points[:, 1] > 11.5  # hangs on the head alone
+        crown = points[:, 1] > 11.5  # weighted to the head only
         near[crown, 0], weights[crown] = 4, [1, 0, 0, 0]
         targets = [] if lod == 2 else [
             risorius.BlendShapeTarget(
@@ -109,7 +109,7 @@ def _meshes(dna, positions, places, moved):
 def _behavior(dna, positions, skin, moved, raw):
     names, first = list(moved), len(NAMED)
     dna.gui_to_raw = _ramp(range(len(names)), range(len(names)))
-    # Correctives of two and three factors; one is a factor of another, one needs a solver's pose.
+    # Correctives of two and three factors; one is a factor of another, one reads a solver's pose.
     on = [(0, 1), (2, 3), (4, 5), (0, 2), (1, 3), (0, 1, 6), (2, 3, 6), (raw + 1, 4), (raw + 9, 6)]
     dna.psd_count = len(on)
     dna.psds = risorius.Psds(
@@ -121,7 +121,7 @@ def _behavior(dna, positions, skin, moved, raw):
     rng = np.random.default_rng(1)
     nearest = [int(np.linalg.norm(positions - place, axis=1).argmin()) for place in skin]
     shifts = [moved[name][nearest] for name in names]
-    # A corrective moves the less the later it comes, but the last.
+    # Later correctives move less, except for the last one.
     shifts += [0.2 / (i + 1) * shifts[i % len(names)] for i in range(len(on) - 1)] + [shifts[0]]
     values = np.concatenate(shifts, axis=1).reshape(len(skin), len(shifts), 3).transpose(0, 2, 1)
     columns = [*range(len(names)), *range(raw, raw + len(on))]

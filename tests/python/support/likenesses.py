@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads as other programs save them, by formula: face, eyes, teeth, hair and body as meshes."""
+"""Heads made by formula, built like those of other programs from face, eyes, teeth and more."""
 
 import json
 import struct
@@ -7,7 +7,7 @@ import struct
 import face_shapes
 import numpy as np
 
-# What turns a head that looks along +z, y up, x left: rows are where its x, y and z go.
+# Rotations of a head that looks along +z, with y up and x left; rows are the images of x, y and z.
 STANDS = {
     "+z": np.eye(3),
     "-z": np.array([[-1, 0, 0], [0, 1, 0], [0, 0, -1]]),
@@ -59,7 +59,7 @@ def joined(*pieces):
 
 
 def skull(lopsided=False):
-    """The formula's face with a nose, a back of the head: positions, triangles and shapes."""
+    """The face of face_shapes with a nose and a back of the head: positions, triangles, shapes."""
     points, quads = face_shapes.head()
     moved = face_shapes.expressions(points)
     nose = face_shapes.bump(points, 0, -1, 2.0)[:, None] * [0, 0, 2.5]
@@ -78,7 +78,7 @@ def eyes():
 
 
 def teeth():
-    """Upper and lower ones, within the mouth."""
+    """Upper and lower teeth inside the mouth."""
     return slab([-2, -4.5, 5], [2, -3.2, 7]), slab([-2, -8, 5], [2, -6.8, 7])
 
 
@@ -89,7 +89,7 @@ def mesh(name, geometry, shapes=None, **more):
 
 
 def with_moving_teeth(shapes):
-    """Shapes of a mesh with both rows of teeth: the lower row moves with the jaw."""
+    """The teeth as one mesh with these shapes: the lower row moves with the jaw."""
     whole, faces = joined(*teeth())
     half = len(whole) // 2
     hinge, angle = np.array([0, 0, -2.0]), 0.3
@@ -104,7 +104,7 @@ def with_moving_teeth(shapes):
 
 
 def ready_player(lopsided=False):
-    """Head, two eyes and teeth with the same targets, hair and a body without any."""
+    """Head, two eyes and teeth that have all targets, hair and body that have none."""
     points, faces, shapes = skull(lopsided)
     left, right = eyes()
     none = {name: np.zeros_like(left[0]) for name in shapes}
@@ -124,7 +124,7 @@ def rename(shapes, names):
 
 
 def vroid():
-    """One face mesh of Fcl names with four materials, hair, teeth that stand still, and a body."""
+    """A face with three shapes that have VRoid's Fcl names, hair and a body."""
     points, faces, shapes = skull()
     told = {"jawOpen": "Fcl_MTH_A", "eyeBlinkLeft": "Fcl_EYE_Close_L",
             "eyeBlinkRight": "Fcl_EYE_Close_R"}  # fmt: skip
@@ -136,7 +136,7 @@ def vroid():
 
 
 def everything_in_one():
-    """A face with eyes and teeth as islands of its mesh, as ICT's."""
+    """One mesh whose separate parts are face, eyes and teeth, with names as in ICT's heads."""
     points, faces, shapes = skull()
     row, moved = with_moving_teeth(shapes)
     whole = joined((points, faces), *eyes(), row)
@@ -149,7 +149,7 @@ def everything_in_one():
 
 
 def face_cap():
-    """A head with names as browDown_L, eyes and teeth as meshes that have no shapes."""
+    """A head with names as browDown_L; eyes, teeth, tongue and glasses have no shapes."""
     points, faces, shapes = skull()
     spelled = {n: n.replace("Left", "_L").replace("Right", "_R") for n in shapes}
     return [
@@ -162,7 +162,7 @@ def face_cap():
 
 
 def placed(meshes, stand="+z", scale=0.01, shift=(0, 0, 0)):
-    """The same meshes turned as STANDS says, in other units and at another place."""
+    """The meshes rotated as STANDS says, then scaled and moved."""
     turn = STANDS[stand].T * scale
     return [
         {**m, "points": m["points"] @ turn.T @ np.eye(3) + shift,
@@ -172,13 +172,13 @@ def placed(meshes, stand="+z", scale=0.01, shift=(0, 0, 0)):
 
 
 def save_glb(path, meshes, materials=(), images=()):
-    """A GLB of meshes; each may say `material`, the number of one.
+    """Write meshes to a GLB file.
 
     Args:
-        path: of the file.
-        meshes: dictionaries of `mesh`.
-        materials: their JSON.
-        images: the bytes of PNG files, each of which is a texture too.
+        path: path of the file.
+        meshes: results of `mesh`; "material" is an optional index into materials.
+        materials: JSON of glTF materials.
+        images: bytes of PNG files; each is also added as a texture.
     """
     binary, views, accessors = bytearray(), [], []
 

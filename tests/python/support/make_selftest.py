@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Choose the reference values of the wheel's self-test from tests/data/golden.
+"""Choose reference values from tests/data/golden for the wheel's self-test.
 
     python tests/python/support/make_selftest.py
 
-Takes each face of COMES_FROM and the reference's values for some of its cases at every LOD. A case
-that the reference is known to evaluate differently (test_rig_behavior.py says which and why) is
-left out; how many are is printed, so that a mistake of ours would show as a number that grew.
+It takes some cases of each face in COMES_FROM at every LOD. It leaves out cases in which our value
+differs from the reference's (test_rig_behavior.py lists the known ones) and prints their number,
+because an error of ours would increase it.
 """
 
 import hashlib
@@ -26,11 +26,11 @@ PROJECT = Path(__file__).resolve().parents[3]
 SOURCE = PROJECT / "tests" / "data" / "golden"
 TARGET = PROJECT / "native" / "python" / "risorius" / "selftest" / "golden"
 COMES_FROM = {"core": "core", "units": "units", "solvers": "tiny_v28"}
-CASES = 12  # of each face, spread over those that there are
+CASES = 12  # about as many cases of each face, evenly spread
 
 
 def rows_of(name):
-    """(lod, raw, joints, shapes, maps) of the cases, and how many cases are left out."""
+    """Rows of float32 (lod, raw, joints, shapes, maps), and how many are left out."""
     dna = risorius.load(SOURCE / f"{name}.dna")
     rig = risorius.Rig(dna, simd="scalar")
     golden = Golden(SOURCE, name)
@@ -51,7 +51,7 @@ def rows_of(name):
 
 def main():
     TARGET.mkdir(exist_ok=True)
-    checks.content = lambda name: (TARGET / name).read_bytes()  # not those of the installed wheel
+    checks.content = lambda name: (TARGET / name).read_bytes()  # not the installed wheel's
     for name, source in COMES_FROM.items():
         rows, left = rows_of(source)
         (TARGET / f"{name}.dna").write_bytes((SOURCE / f"{source}.dna").read_bytes())

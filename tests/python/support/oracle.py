@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""A second evaluator in double precision, straight from the format's semantics.
+"""A second evaluator in float64, written only from the description of the format.
 
-It shares no code with the native one and knows no layout, SIMD or scheduling. For each value it
-also returns a bound of the float32 error: a sum of n products rounded in any order errs by at most
-(n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by (factors +
-1) * eps relative.
+It shares no code with the native evaluator and has no SIMD. For each value it also returns a bound
+of the float32 error: a sum of n products in any order errs by at most (n + 1) * eps * sum|k x|, and
+the correctives among its inputs already err by (factors + 1) * eps relative.
 """
 
 import numpy as np
 
 EPS = float(np.finfo(np.float32).eps)
-FACTORS = 16  # more factors than any corrective here has
+FACTORS = 16  # larger than the number of factors of any corrective in the tests
 
 
 def table(conditionals, rows, values, output_count):
-    """Conditional table -> outputs [O] and bounds [O]."""
+    """Values of a conditional table and their bounds, float64[O] each."""
     out = np.zeros(output_count)
     size = np.zeros(output_count)
     columns = [
@@ -38,7 +37,7 @@ def table(conditionals, rows, values, output_count):
 
 
 def correctives(dna, controls, used, settle):
-    """Fill the corrective part of controls in place (those in `used`)."""
+    """Calculate in place the correctives whose index is in `used`."""
     rows, columns, values = (
         np.asarray(a) for a in (dna.psds.rows, dna.psds.columns, dna.psds.values)
     )
@@ -55,7 +54,7 @@ def correctives(dna, controls, used, settle):
 
 
 def used_controls(dna, lod):
-    """Controls that something reads at the LOD."""
+    """Indices of the controls that an output of the LOD reads."""
     used = set()
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
@@ -85,7 +84,7 @@ def rotation_matrix(dna, angles):
 
 
 def matrix_to_quaternion(m):
-    """(axis * sin, cos) of half the angle, w >= 0, by the eigenvector of the rotation."""
+    """Quaternion (axis * sin, cos) of half the angle with w >= 0, as eigenvector of a matrix."""
     k = np.zeros((4, 4))
     k[:3, :3] = m.T + m - np.trace(m) * np.eye(3)
     k[3, :3] = k[:3, 3] = [m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]]
@@ -102,16 +101,16 @@ def quaternion_to_matrix(q):
 
 
 def is_quaternion(dna, joint):
-    """Declared so by the file's joint metadata."""
+    """Whether the file's joint metadata declares the joint's rotation to be a quaternion."""
     given = dna.joint_behavior_metadata.joint_representations
     return joint < len(given) and given[joint][1] == 1
 
 
 def column_order(dna, group):
-    """The columns that turn quaternion joints, as the reference's storage of LODs leaves them.
+    """Columns that rotate quaternion joints, in the order in which the reference stores them.
 
-    LOD by LOD, finest first: look down from the end for a column that is zero in all rotation rows
-    of the LOD; it changes places with the one at the end, and the end moves up by one.
+    For each LOD, finest first: the last column that is zero in all rotation rows of the LOD is
+    swapped with the column at the end, and the end moves forward by one, until there is none.
     """
     matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
     turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]
@@ -129,10 +128,10 @@ def column_order(dna, group):
 
 
 def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
-    """Overwrite the Euler angles of the joints that jbmd declares to be quaternions.
+    """Calculate in place the Euler angles of the joints that the file declares as quaternions.
 
-    The bound: float32 products of n unit quaternions err by some 8 (n + 2) eps, the reference's
-    arc sine by 1e-6; the cosine of the middle angle magnifies both.
+    Bound: float32 products of n unit quaternions err by about 8 (n + 2) eps, the reference's arc
+    sine by 1e-6; both are divided by the squared cosine of the middle angle.
     """
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)
@@ -164,9 +163,15 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
 
 
 def evaluate(dna, raw, lod, *, settle, controls=None, control_count=None):
-    """(joints, shapes, maps, controls), each (values, bounds), in float64.
+    """Evaluate in float64. Returns (values, bounds) of joints, shapes, maps and controls.
 
-    controls: the vector of the previous evaluation, for one-frame latency; changed in place.
+    Args:
+        dna: the Dna.
+        raw: raw controls.
+        lod: the LOD.
+        settle: repeat the correctives until they no longer change.
+        controls: vector of the previous evaluation, for one-frame latency; changed in place.
+        control_count: number of all controls; None: as many as the file has.
     """
     count = control_count or len(dna.raw_control_names) + dna.psd_count
     if controls is None:

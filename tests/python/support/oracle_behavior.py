@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A second evaluator of networks, solvers, setups and rotations in double precision.
+"""An independent evaluator of networks, solvers, setups and rotations in double precision.
 
-It knows no schedule: one frame is networks, then solvers, then correctives, in the order of the
-file, each reading the frame before of what comes after it. Settled is the frame that repeats
-itself. Quaternions are rows x y z w.
+It has no schedule: a frame runs networks, then solvers, then correctives, in the order of the file.
+Values that are computed later in a frame are read from the frame before. A pose is settled when a
+frame repeats itself. Quaternions are rows x y z w.
 """
 
 import numpy as np
@@ -15,8 +15,9 @@ SEQUENCES = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 
 
 def multiply(a, b):
-    """[..., 4] of [..., 4], [..., 4]."""
-    # Written out: np.cross of three numbers takes fifty times as long, numbers of NumPy ten times.
+    """The product of quaternions, [..., 4]."""
+    # Written out, because np.cross of three numbers takes fifty times as long, and NumPy scalars
+    # ten times.
     single = np.ndim(a) == np.ndim(b) == 1
     (ax, ay, az, aw), (bx, by, bz, bw) = (
         map(float, q) if single else np.transpose(q) for q in (a, b)
@@ -39,7 +40,7 @@ def unit(q):
 
 
 def from_euler(sequence, signs, angles):
-    """[..., 4] of angles [..., 3] in radians, turned about the first axis of the sequence first."""
+    """Quaternions [..., 4] of angles [..., 3] in radians, in the order of the sequence."""
     angles = np.asarray(angles, float)
     q = np.broadcast_to([0, 0, 0, 1.0], (*angles.shape[:-1], 4))
     for axis in ("xyz".index(a) for a in sequence):
@@ -51,7 +52,7 @@ def from_euler(sequence, signs, angles):
 
 
 def to_euler(dna, q):
-    """Angles in the file's unit from a rotation matrix whose rows are the rotated axes."""
+    """The Euler angles of a quaternion, in the file's unit and rotation sequence."""
     m = oracle.quaternion_to_matrix(q)
     i, j, k = ("xyz".index(a) for a in dna.rotation_sequence)
     parity = 1 if j == (i + 1) % 3 else -1
@@ -158,19 +159,19 @@ def run_networks(dna, lod, c, masks):
 
 
 def reduced(q, method, axis):
-    """Swing (method 2) or twist (3) of one quaternion."""
+    """The swing (method 2) or the twist (method 3) of a quaternion."""
     if method < 2:
         return q
     twist = np.zeros(4)
     twist[[axis, 3]] = q[[axis, 3]]
     length = np.linalg.norm(twist)
     if length == 0 and (method == 3 or not q.any()):
-        return np.full(4, np.nan)  # neither twist nor swing: no pose is near
+        return np.full(4, np.nan)  # without twist and swing, no pose is near
     if method == 3:
         return twist / length
     if length == 0:
         return q
-    # q times the inverse of its twist, with the sign of w turned
+    # q times the inverse of its twist, with the opposite sign
     return -multiply(q, conjugate(twist)) / length
 
 
@@ -190,7 +191,7 @@ def kernel(function, d, r):
 
 
 class Solver:
-    """A solver's targets and matrix, made once."""
+    """A solver's targets and matrix, computed once."""
 
     def __init__(self, dna, solver):
         self.solver = solver
@@ -233,7 +234,7 @@ def solvers_of(dna):
 
 def run_solvers(dna, solvers, lod, c):
     poses = dna.rbf_behavior_ext.poses
-    first = len(c) - len(dna.rbf_behavior.poses)  # of files without the layer rbfe
+    first = len(c) - len(dna.rbf_behavior.poses)  # of files without layer rbfe
     for i in listed(dna.rbf_behavior.lod_solver_mapping, lod):
         solver = solvers[i]
         x = c[solver.solver.raw_control_indices].copy()
@@ -263,7 +264,7 @@ def initial_controls(dna, count):
 
 
 def frame(dna, solvers, c, lod, masks=None):
-    """One frame on the controls c, whose raw part is new; in place."""
+    """Run one frame on the controls `c`, whose raw controls are set; changes `c` in place."""
     regions = sum(len(mesh) for mesh in dna.machine_learned_behavior.region_network_indices)
     run_networks(dna, lod, c, np.ones(regions) if masks is None else masks)
     run_solvers(dna, solvers, lod, c)
@@ -280,7 +281,7 @@ def used_controls(dna, lod):
 
 
 def settled(dna, solvers, raw, lod, count):
-    """The controls of the frame that repeats itself."""
+    """The controls of the settled pose."""
     c = initial_controls(dna, count)
     for _ in range(count + 2):
         c[: len(raw)] = raw
@@ -303,7 +304,7 @@ def ml_stride(dna):
 
 
 def blended(dna, group, joint, controls, order):
-    """Product of the columns' rotations of a joint, in this order of the columns."""
+    """The product of the rotations of a joint's columns, in this order."""
     matrix, outputs = np.asarray(group.values, float), np.asarray(group.output_indices)
     total = np.array([0, 0, 0, 1.0])
     for column in order:
@@ -332,7 +333,7 @@ def toward_identity(q, weight):
 
 
 def twist_swing_rotations(dna, c):
-    """joint -> quaternion."""
+    """joint -> quaternion of its twist or swing."""
     out = {}
     layer = dna.twist_swing_behavior
     swung = [s.input_control_indices.tolist() for s in layer.swings]
@@ -387,7 +388,7 @@ def ml_values(dna, c, lod):
 
 
 def joints(dna, c, lod, rotation):
-    """[J, 9 or 10] of the controls."""
+    """The joints of a pose from its controls, [J, 9] or [J, 10]."""
     count = len(dna.joint_names)
     linear = np.zeros(count * 9)
     turned, q_of = {}, {}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A plain face as formulas: a mask with two eyes between lids, a mouth and teeth, in cm.
+"""A simple face by formulas: a mask with two eyes and lids, a mouth and teeth, in cm.
 
-Its expressions are what a bad transfer gives: lids that stop short of each other, lips that do.
+Its expressions have the faults of a bad transfer: lids and lips that do not close completely.
 """
 
 from dataclasses import dataclass, field
@@ -10,8 +10,8 @@ import numpy as np
 from risorius.author.heads.parts import HeadPart
 from risorius.author.input.obj import ObjMesh
 
-EYE, RADIUS = np.array([3.2, 2.0, 7.2]), 1.2  # of the left one
-MOUTH, HALF = -4.0, 2.4  # its height, half of its width
+EYE, RADIUS = np.array([3.2, 2.0, 7.2]), 1.2  # centre and radius of the left eye
+MOUTH, HALF = -4.0, 2.4  # height of the mouth, and half of its width
 STEP = 0.2
 TOGETHER = tuple(f"mouthLipsTogether{lip}" for lip in ("UL", "UR", "DL", "DR"))
 
@@ -20,24 +20,24 @@ TOGETHER = tuple(f"mouthLipsTogether{lip}" for lip in ("UL", "UR", "DL", "DR"))
 class PlainHead:
     points: np.ndarray
     faces: list
-    ways: dict = field(default_factory=dict)  # float64[V, 3] by control
-    closed: np.ndarray | None = None  # of the open jaw with closed lips
+    ways: dict = field(default_factory=dict)  # control -> float64[V, 3]
+    closed: np.ndarray | None = None  # motion of the open jaw with closed lips
 
 
 def mask(short=0.3, apart=0.2, *, painted=False):
-    """The skin and its expressions.
+    """Make the skin and its expressions.
 
     Args:
-        short: share of the way that a blink lacks.
-        apart: cm between lips that are to meet.
-        painted: skin where the eyes are seen.
+        short: share of a complete blink that is missing.
+        apart: distance in cm between lips that should meet.
+        painted: True: skin covers the places of the eyes.
     """
     x, y = np.arange(-8, 8 + STEP / 2, STEP), np.arange(-9, 8 + STEP / 2, STEP)
     grid_x, grid_y = (g.ravel().copy() for g in np.meshgrid(x, y, indexing="ij"))
     hole = np.ones(len(grid_x), bool)
     for side in (1, -1):
         away = np.hypot((grid_x - side * EYE[0]) / 1.05, (grid_y - EYE[1]) / 0.5)
-        near = (away > 0.7) & (away < 1.35)  # the rim lies on the opening's edge
+        near = (away > 0.7) & (away < 1.35)  # the rim is at the edge of the opening
         scale = np.where(near, 1 / np.maximum(away, 1e-9), 1.0)
         grid_x = side * EYE[0] + (grid_x - side * EYE[0]) * scale
         grid_y = EYE[1] + (grid_y - EYE[1]) * scale
@@ -60,7 +60,7 @@ def mask(short=0.3, apart=0.2, *, painted=False):
 
 
 def _over_eye(points, side):
-    """Skin that lies over the ball, 0.6 mm at least."""
+    """Move skin in front of an eye at least 0.6 mm outside of the ball."""
     middle = EYE * [side, 1, 1]
     flat = points[:, :2] - middle[:2]
     inside = np.maximum((1.05 * RADIUS) ** 2 - (flat**2).sum(axis=1), 0)
@@ -70,7 +70,7 @@ def _over_eye(points, side):
 
 
 def _slit(points, faces):
-    """A mouth: the vertices of its line twice, the polygons below have the second ones."""
+    """Cut a mouth: the vertices of its line are doubled for the polygons below."""
     line = np.flatnonzero(
         (np.abs(points[:, 1] - MOUTH) < STEP / 4) & (np.abs(points[:, 0]) < HALF - STEP / 2)
     )
@@ -121,7 +121,7 @@ def part(name, points, faces):
 
 
 def ball(middle, radius, rings=14, around=18):
-    """Points and polygons of a sphere whose poles are in front and behind."""
+    """Points and polygons of a sphere with poles in front and behind."""
     t = np.linspace(0, np.pi, rings + 1)[1:-1]
     a = np.linspace(0, 2 * np.pi, around, endpoint=False)
     ring = np.stack(
@@ -142,7 +142,7 @@ def ball(middle, radius, rings=14, around=18):
 
 
 def arch(height, sign, depth=7.0):
-    """A row of teeth as one box that is bent: closed, seen from outside counter-clockwise."""
+    """A row of teeth as a closed, bent box with counter-clockwise polygons."""
     a = np.linspace(-1.2, 1.2, 13)
     rows = []
     for radius, y in ((2.2, 0), (2.2, 0.8), (1.7, 0.8), (1.7, 0)):
@@ -162,7 +162,7 @@ def arch(height, sign, depth=7.0):
 
 
 def eyes_and_teeth(named=True):
-    """Parts: two balls, two rows of teeth; not named they have names that say nothing."""
+    """Two eyeballs and two rows of teeth; without `named`, their names do not tell the kind."""
     out = []
     for side, word in ((1, "Left"), (-1, "Right")):
         out.append(

@@ -17,7 +17,7 @@ def _data():
 
 
 def data():
-    """The sample's CC0 data; without them the test reports NOT RUN."""
+    """The sample's CC0 data; without the data the test is skipped and reports NOT RUN."""
     try:
         return _data()
     except source.SourceError as error:
@@ -27,10 +27,10 @@ def data():
 
 @functools.cache
 def assembled(name):
-    """(dna, parts, body) of one of the cast, as a face of shapes without hair."""
+    """(dna, parts, body) of a sample person, as a face of blend shapes without hair."""
     return blend_shape_face.assemble(data(), lambda _: None, people.PEOPLE[name])
 
 
 def body(name):
-    """The Body of one of the cast."""
+    """The Body of a sample person."""
     return assembled(name)[2]

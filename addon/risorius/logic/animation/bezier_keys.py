@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Samples to few keys with handles: curves that stay within a tolerance of every sample."""
+"""Fits Bezier curves with few keys to samples, within a tolerance of every sample."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 TOLERANCE = 0.005  # of the range 0 to 1 of a control
-_LONGEST = 1000  # samples from one key to the next
-_BETWEEN = 4.0  # times the tolerance: in the middle between samples
-_HALVES = 0.1  # what such a middle weighs beside a sample
+_LONGEST = 1000  # most samples between two keys
+_BETWEEN = 4.0  # factor of the tolerance that is allowed at midpoints between samples
+_HALVES = 0.1  # weight of a midpoint in the fit; a sample weighs 1
 _ROUNDING = 1e-6  # Blender keeps keys and handles as float32
-_ASIDE = np.array([1.0, 0.0])  # where no curve goes a handle lies a frame beside its key
+_ASIDE = np.array([1.0, 0.0])  # offset (frames, value) of the unused handles of outer keys
 
 
 @dataclass
@@ -48,28 +48,30 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """Values shared by cubics over the same number of samples: float64[m], samples first, then
-    midpoints."""
+    """Values of the Bernstein polynomials that all curves of the same frames share.
+
+    float64[m]: at the inner samples first, then at the midpoints between samples.
+    """
 
     near: Float
     far: Float
     begin: Float
     end: Float
     solve: Float
-    """float64[2, m]: what gives the handles of least squares."""
+    """float64[2, m]: the matrix from wanted values to the handle values of least squares."""
 
 
 class Fitter:
-    """Fits many curves; data shared by curves of the same frames are computed once."""
+    """Fits many curves; the matrix for n equally spaced samples is computed once."""
 
     def __init__(self, tolerance: float) -> None:
-        """Args: tolerance  how far a curve may be from a sample, absolute, above 0."""
+        """Args: tolerance  largest distance of a curve from a sample, above 0."""
         self._most = max(tolerance - _ROUNDING, _ROUNDING)
         self._bases: dict[int, _Basis] = {}
         self._done: dict[tuple[bytes, bytes], Bezier] = {}
 
     def keys(self, frames: Float, values: Float) -> Bezier:
-        """The keys and handles that samples need.
+        """Fits keys and handles to samples.
 
         From each key a cubic extends while it stays within the tolerance of all samples, and within
         four times the tolerance of straight lines at midpoints.
@@ -118,7 +120,7 @@ class Fitter:
     def _reach(
         self, frames: Float, values: Float, first: int, even: bool
     ) -> tuple[int, tuple[float, float]]:
-        """The furthest sample that one cubic from `first` reaches, and the ends of its handles."""
+        """The last sample that one cubic from `first` reaches, and the values of its handles."""
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)
         for last in range(first + 2, min(first + _LONGEST, len(frames) - 1) + 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a clip's seconds and radians to Blender's frames and quaternions, and back."""
+"""Converts a clip's seconds and radians to Blender's frames and quaternions, and back."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
-TARGET = ("eyes.x", "eyes.y", "eyes.z")  # where the gaze target stands, in its own axes
+TARGET = ("eyes.x", "eyes.y", "eyes.z")  # position of the gaze target in the gaze target's axes
 TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
-BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # all that layers move
+BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # curves that move bones
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
 
 class ClipError(FaceError):
-    """A clip cannot become an action, or an action has no control of this face."""
+    """A clip cannot become an action, or an action contains no control of this face."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """The place of a clip's time on Blender's frames.
+    """The conversion from a clip's time to Blender's frames.
 
     Attributes:
         rate: frames per second of the scene, fps / fps_base.
-        start: the scene's frame of the time `origin`.
-        origin: seconds on the clip's clock.
-        whole: True: keys on whole frames only, see onto_frames.
+        start: frame of the scene at the clip's time `origin`.
+        origin: time in seconds on the clip's clock.
+        whole: True: keys are placed on whole frames only, see onto_frames.
     """
 
     rate: float
@@ -43,7 +43,7 @@ class Timing:
     whole: bool = False
 
     def frames(self, seconds: Float) -> Float:
-        """Frames of the scene, with their subframes, for seconds on the clip's clock."""
+        """Frames of the scene, as fractions, for seconds on the clip's clock."""
         return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
 
     def seconds(self, frames: Float) -> Float:
@@ -51,7 +51,7 @@ class Timing:
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
-        """Keys in the scene: at their own times, or on whole frames.
+        """Keys at their own times, or moved to whole frames if `whole` is True.
 
         Args:
             frames: float[keys], frames of the scene.
@@ -63,8 +63,8 @@ class Timing:
 def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
     """Convert samples at any time to keys on whole frames.
 
-    Each sample has a key on the frame before it and on the one after it. So there are at most twice
-    as many keys as samples, also with long pauses, and the lines between keys equal the lines
+    Each sample gives a key on the whole frame before it and one on the frame after it. So there are
+    at most twice as many keys as samples, also with long pauses, and lines between keys equal lines
     between samples at every whole frame.
 
     Args:
@@ -93,12 +93,12 @@ class Curve:
 
 @dataclass
 class Keys:
-    """The keys of an action of a clip.
+    """The keys of the action that a clip becomes.
 
     Attributes:
         controls: keys of the sliders, by their property names.
-        turns: bone -> frames float64[n] and quaternions float64[n, 4], w first, in the axes of the
-            control armature.
+        turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
+            the control armature.
         unknown: names of the clip without a control of this face.
         dropped: number of samples that were not finite.
     """
@@ -131,21 +131,21 @@ def keys_of(
     sliders: dict[str, str],
     with_eyes: bool = True,
 ) -> Keys:
-    """Arrange a clip as keys.
+    """Convert a clip to keys.
 
     Args:
-        names: of the clip's curves.
+        names: names of the clip's curves.
         curves: float32[names, frames].
         times: float64[frames], seconds, ascending.
-        timing: their place in the scene.
+        timing: conversion from the clip's time to frames of the scene.
         sliders: curve name -> property name, see property_names.
-        with_eyes: take curves of eye rotation too.
+        with_eyes: True: curves of eye rotation become keys too.
 
     Returns:
-        Keys. Samples that are not finite are left out; a curve without any sample has no keys.
+        Keys. Samples that are not finite are left out; a curve without finite samples has no keys.
 
     Raises:
-        ClipError: its frames lie outside Blender's range.
+        ClipError: frames of the clip lie outside Blender's range.
     """
     frames = timing.frames(times)
     if frames.size and not np.abs(frames).max() <= LAST_FRAME:
@@ -206,20 +206,20 @@ def _add_turns(
         if good.any():
             moving = good if (angles[good] != angles[good][0]).any() else np.flatnonzero(good)[:1]
             at, turns = timing.placed(frames[moving], quaternions(angles[moving]))
-            if timing.whole:  # on a straight line between two turns, which is shorter than either
+            if timing.whole:  # an interpolated quaternion is shorter than 1
                 turns /= np.linalg.norm(turns, axis=1, keepdims=True)
             keys.turns[bone] = at, turns
 
 
 def quaternions(angles: Float) -> Float:
-    """Turns of a head, a neck or an eye.
+    """Rotations of a head, a neck or an eye as quaternions.
 
     Args:
         angles: float64[n, 2 or 3], radians: yaw to the face's own left, pitch up, and roll towards
             its own left shoulder; the face looks along -y, z is up.
 
     Returns:
-        float64[n, 4], w first; neighbours have the sign that makes them near.
+        float64[n, 4], w first; each has the sign that is nearest to its predecessor.
     """
     half = np.zeros((len(angles), 3))
     half[:, : angles.shape[1]] = angles / 2
@@ -230,7 +230,7 @@ def quaternions(angles: Float) -> Float:
 
 
 def angles_of(turns: Float) -> Float:
-    """The inverse of `quaternions`. Returns: float64[n, 3], yaw, pitch, roll in radians."""
+    """The inverse of `quaternions`. Returns: float64[n, 3], yaw, pitch and roll in radians."""
     w, x, y, z = np.moveaxis(np.asarray(turns, np.float64), -1, 0)
     pitch = -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0))
     yaw = np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z))
@@ -239,7 +239,7 @@ def angles_of(turns: Float) -> Float:
 
 
 def multiply(a: Float, b: Float) -> Float:
-    """The turns b, then a: float64[n or 1, 4], w first."""
+    """The product a * b: rotation b, followed by rotation a. float64[n or 1, 4], w first."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -254,7 +254,7 @@ def multiply(a: Float, b: Float) -> Float:
 
 
 def near_signs(turns: Float) -> Float:
-    """The same turns, each with the sign that is nearest to the one before."""
+    """The same rotations, each quaternion with the sign that is nearest to its predecessor."""
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     signs = np.concatenate([[1.0], np.cumprod(flips)]) if len(turns) else np.ones(0)
     return turns * signs[:, None]

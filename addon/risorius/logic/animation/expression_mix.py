@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blending an expression into a face's sliders: strength, regions, flip, addition."""
+"""Blends an expression into the slider values of a face: strength, regions, flip, addition."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ class Way:
     """Options of blending an expression.
 
     Attributes:
-        strength: 1 sets it, 0 changes nothing; with `additive` a value below 0 subtracts it.
-        others_to_rest: move other sliders to rest by the same share.
-        flip: swap left and right.
-        additive: add it to the current pose, without moving other sliders to rest.
-        regions: move sliders of these regions only; none: all.
+        strength: 1 sets the expression, 0 changes nothing; below 0 it is subtracted if `additive`
+            is True.
+        others_to_rest: True: other sliders are blended to rest by `strength`.
+        flip: True: left and right of the expression are swapped.
+        additive: True: the expression is added to the current pose; other sliders do not move.
+        regions: only sliders of these regions move; empty for all regions.
     """
 
     strength: float = 1.0
@@ -28,7 +29,7 @@ class Way:
     regions: frozenset[str] = frozenset()
 
     def at(self, strength: float) -> Way:
-        """The same with another strength."""
+        """The same options with another strength."""
         return replace(self, strength=strength)
 
 
@@ -40,16 +41,16 @@ def mixed(
     regions: FaceRegions,
     held: Collection[str] = (),
 ) -> dict[str, float]:
-    """The new values of an expression's sliders, without limits.
+    """The blended values of the sliders that move; they may exceed the sliders' limits.
 
     Args:
-        present: values of the existing sliders by name.
-        weights: weights of the expression by slider; missing sliders are left out.
+        present: current values of the sliders, by name.
+        weights: slider -> weight of the expression; sliders that the face lacks are left out.
         rests: values of the sliders at rest.
         way: options of blending.
-        regions: of the face.
-        held: regions of the expression: other regions stay, and unmoved sliders of these regions go
-            to rest.
+        regions: regions of the face.
+        held: regions that a partial expression sets: sliders of these regions that have no weight
+            go to rest, other regions stay; empty for a whole expression.
     """
     goals = {name: value for name, value in weights.items() if name in present}
     if way.flip:
@@ -71,7 +72,7 @@ def mixed(
 def _flipped(
     goals: Mapping[str, float], present: Collection[str], regions: FaceRegions
 ) -> dict[str, float]:
-    """Swap left and right; a slider without a partner on this face keeps its value."""
+    """Swap left and right; a slider without a partner on this face keeps its weight."""
     found = {}
     for name, value in goals.items():
         other = regions.mirrored(name)
@@ -82,23 +83,23 @@ def _flipped(
 def regions_in_use(
     values: Mapping[str, float], rests: Mapping[str, float], regions: FaceRegions
 ) -> set[str]:
-    """The regions of sliders that are not at rest.
+    """The regions of all sliders that are not at rest.
 
     Args:
-        values: of the sliders, by name.
-        rests: their values at rest.
-        regions: of the face.
+        values: current values of the sliders, by name.
+        rests: values of the sliders at rest, by name.
+        regions: regions of the face.
     """
     moved = (name for name, value in values.items() if abs(value - rests[name]) > 1e-6)
     return {regions.of_slider(name) for name in moved}
 
 
 def dragged(pixels: float, per_unit: float, fine: bool) -> float:
-    """How much strength a drag of the mouse is.
+    """The change of strength for a drag of the mouse.
 
     Args:
-        pixels: to the right since the last event.
+        pixels: distance to the right since the last event, in pixels.
         per_unit: pixels that a strength of 1 takes.
-        fine: a tenth as much, as with Blender's sliders.
+        fine: True: the change is a tenth, as with Blender's sliders.
     """
     return pixels / per_unit * (0.1 if fine else 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked values to keys: the frames that a curve needs for straight lines near all values."""
+"""Removes keys of baked curves that straight lines between the other keys replace."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _EPS = float(np.finfo(np.float32).eps)
 
 
 def frame_list(start: float, end: float, step: float) -> Times:
-    """The frames to bake, float64[N]: from start in steps, none after the end.
+    """The frames to bake, float64[N]: from `start` to at most `end`, with distance `step`.
 
     Raises:
         ValueError: the end lies before the start, or the step is not above 0.
@@ -35,7 +35,7 @@ def frame_list(start: float, end: float, step: float) -> Times:
 
 
 def continuous(quaternions: Floats) -> Floats:
-    """Quaternions with consistent signs, so that interpolation takes the short way.
+    """Quaternions with signs that make neighbouring frames interpolate the short way.
 
     Args:
         quaternions: float32[frames, ..., 4].
@@ -46,11 +46,11 @@ def continuous(quaternions: Floats) -> Floats:
 
 
 def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
-    """The keys that curves need.
+    """Find the keys that each curve has to keep.
 
-    All curves are processed together. From the last key of each curve, a cone of slopes is kept
-    that passes all later values within the error. If a value lies outside, the value before it
-    becomes a key.
+    All curves are processed together. Each curve keeps the range of slopes for which a line from
+    its last key passes all later values within the error. If a value lies outside this range, the
+    value before it becomes a key.
 
     Args:
         frames: float[N], ascending.
@@ -67,7 +67,7 @@ def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kep
     still = np.abs(values - values[:1]).max(axis=0, initial=0.0) <= error
     if error > 0.0 and len(times) > 2:
         keep = _cones(times, values.astype(np.float64), error)
-        # Where float32 lines are coarser than the error, all keys stay.
+        # All keys stay if rounding of the lines in float32 exceeds the error.
         keep[:, np.abs(rebuilt(times, values, keep) - values).max(axis=0) > error] = True
     keep[1:, still] = False
     return keep
@@ -94,15 +94,16 @@ def _cones(frames: Times, values: Times, error: float) -> Kept:
 
 
 def rebuilt(frames: Times, values: Floats, keep: Kept) -> Floats:
-    """Values of straight lines between the keys at every frame.
+    """Values at every frame of straight lines between the kept keys.
 
     Args:
         frames: float[N].
         values: float32[N, curves].
-        keep: bool[N, curves]; values are constant before the first and after the last key.
+        keep: bool[N, curves], kept keys; values are constant before the first and after the last
+            key.
 
     Returns:
-        float32[N, curves], computed as Blender does, in float32.
+        float32[N, curves], computed in float32 as Blender does.
     """
     count = len(frames)
     rows = np.arange(count)[:, None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of animation without Blender: the controls and the time of a layer."""
+"""Finds the controls that a layer of animation may move, and the frames at which it plays."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from ..character import slider_words
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
-_LIMIT = 100_000  # samples of one source
+_LIMIT = 100_000  # most samples of one source
 _NEAR = 1e-7  # frames
 
 
 def masked(
     controls: Iterable[str], regions: FaceRegions, chosen: Iterable[str], words: str = ""
 ) -> list[str]:
-    """The controls that a layer may move, in their order.
+    """The controls that a layer may move, in the order of `controls`.
 
     Args:
-        controls: names.
-        regions: of the face.
-        chosen: regions that the layer moves; none means all.
-        words: names or patterns, separated by spaces or commas: `jawOpen mouth*`, without their
-            prefix and in any case. A word with `-` in front excludes names. If all words have it,
-            they are excluded from all controls.
+        controls: full names of controls.
+        regions: regions of the face.
+        chosen: regions that the layer moves; empty for all regions.
+        words: names or patterns such as `jawOpen mouth*`, separated by spaces or commas, in any
+            case and with or without the controls' prefix. A word with `-` in front excludes
+            controls. If all words begin with `-`, the other controls are kept.
     """
     wanted = set(chosen)
     patterns = [w.lower() for w in re.split(r"[\s,;]+", words) if w.strip("-")]
@@ -52,16 +52,16 @@ def masked(
 
 @dataclass(frozen=True)
 class Span:
-    """The time of a layer, in frames of the scene and of the source.
+    """The time of a layer: frames of its source and of the scene.
 
     Attributes:
-        start: the scene's frame of the source's frame `first`, or of `last` if reversed.
-        first, last: played frames of the source.
-        scale: factor of the length; 2 is half as fast.
+        start: frame of the scene that shows the source's frame `first`, or `last` if reversed.
+        first, last: first and last played frame of the source.
+        scale: factor of the duration; 2 plays at half speed.
         repeat: number of repeats.
-        reverse: True: from last to first.
-        warp: float64[n] frames of the scene and of the source, which replace the other settings; or
-            None.
+        reverse: True: plays from `last` to `first`.
+        warp: frames of the scene and frames of the source, float64[n] each, which replace the other
+            settings; or None.
     """
 
     start: float
@@ -74,7 +74,7 @@ class Span:
 
     @property
     def period(self) -> float:
-        """Frames of the scene that the source takes once."""
+        """Frames of the scene that one repeat lasts."""
         return (self.last - self.first) * self.scale
 
     def scene_range(self) -> tuple[float, float]:
@@ -84,7 +84,7 @@ class Span:
         return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames that are shown at frames of the scene."""
+        """The source's frames that the layer shows at these frames of the scene."""
         if self.warp is not None:
             return np.interp(frames, *self.warp)
         if not self.period > 0.0:
@@ -96,13 +96,13 @@ class Span:
 def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
     """The frames of a source to sample, so that straight lines between them reproduce it.
 
-    Whole frames of the scene are always exact. Curves with bends between keys get four samples a
-    frame, for subframes.
+    Samples on whole frames of the scene are exact. Sources with curves that are not straight
+    between keys get four samples per frame, for subframes.
 
     Args:
         span: time of the layer.
-        keys: float64[n], frames of all its keys.
-        bent: whether a curve has handles, steps or modifiers.
+        keys: frames of all keys of the source, float64[n].
+        bent: whether a curve of the source has curved handles, steps or modifiers.
 
     Returns:
         float64[n], ascending; at least one.
@@ -123,6 +123,6 @@ def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
 
 
 def place_of(path: str) -> int | None:
-    """The place of the layer that a data path leads into, as `risorius_layers[2].weight`."""
+    """The index of the layer in a data path such as `risorius_layers[2].weight`, or None."""
     found = _PATH.match(path)
     return int(found.group(1)) if found else None

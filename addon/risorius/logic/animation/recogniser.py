@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package that recognises speech: its known files, and reasons of a failed installation."""
+"""The speech recognition package: hashes of accepted files, and reasons why pip failed."""
 
 import re
 
 PACKAGE = "pocketsphinx==5.1.1"
-# Hashes of its checked wheels for Blender's Python versions; no other file is accepted.
+# SHA-256 of the checked wheels for Blender's Python versions; pip rejects other files.
 HASHES = (
     "bb8fd0fc7fb08dd8f85da21f5121f34ebf4186a5bee91ce85e2d358e69a448bf",  # cp311, Linux x86_64
     "4742dc42c010caf5a2558cac910b0856d85c94e9bb0357ed4ff32f1f0d0837f9",  # cp311, Linux aarch64
@@ -30,14 +30,14 @@ def requirements() -> str:
 
 
 def reason(said: str, running: str) -> str:
-    """The reason why pip failed. Its last line is often only a consequence.
+    """The reason why pip failed. The last line of its output is often only a consequence.
 
     Args:
         said: the whole output of pip.
-        running: this Python and machine, as "Python 3.14 on Linux aarch64".
+        running: this Python and machine, such as "Python 3.14 on Linux aarch64".
 
     Returns:
-        The rest of a sentence, without a full stop.
+        The reason as the end of a sentence, without a full stop.
     """
     if "DO NOT MATCH THE HASHES" in said:
         return "what was downloaded is not the file that this add-on knows; it was left out"

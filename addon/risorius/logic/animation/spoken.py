@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sounds of a voice as a list, and corrections; each correction returns a new list.
+"""Corrections of the list of sounds in a spoken sentence; each returns a new list.
 
-Sounds follow each other without gaps: each lasts until the next one begins. So corrections make no
-    gaps and no overlaps.
+A sound lasts until the next one begins. So corrections make no gaps and no overlaps.
 """
 
 from __future__ import annotations
@@ -16,31 +15,31 @@ from typing import NamedTuple
 from ..base.errors import FaceError
 from ..base.sentences import told
 
-SHORTEST = 0.25  # frames that a sound keeps, whatever is moved
+SHORTEST = 0.25  # shortest duration of a sound, in frames
 SILENCE = "SIL"
 
 
 class Sound(NamedTuple):
-    """A phoneme, or silence."""
+    """A phoneme or silence, with the frame at which it begins."""
 
     begin: float
     """Frame."""
     name: str
-    """As in the CMU dictionary; SIL for silence."""
+    """A phoneme of the CMU dictionary; SIL for silence."""
     word: str = ""
-    """The word that begins with it."""
+    """The word that begins with this sound; empty for other sounds."""
 
 
 class SpokenError(FaceError):
-    """A correction that cannot be made."""
+    """A correction is not possible."""
 
 
 @dataclass(frozen=True)
 class Placing:
-    """The place of an action's frames in a scene.
+    """The conversion from frames of an action to frames of the scene.
 
     Attributes:
-        offset: the scene's frame of the action's frame 0.
+        offset: frame of the scene at the action's frame 0.
         scale: frames of the scene for one frame of the action; below 0 if it runs backwards.
     """
 
@@ -48,7 +47,7 @@ class Placing:
     scale: float = 1.0
 
     def shown(self, frame: float) -> float:
-        """The scene's frame of a frame of the action."""
+        """The frame of the scene at which a frame of the action plays."""
         return self.offset + self.scale * frame
 
     def own(self, frame: float) -> float:
@@ -60,19 +59,19 @@ def end_of(sounds: Sequence[Sound], place: int, end: float) -> float:
     """The frame at which a sound ends.
 
     Args:
-        sounds: the list.
-        place: of the sound.
-        end: of the whole.
+        sounds: the list of sounds.
+        place: index of the sound.
+        end: frame at which the list ends.
     """
     return sounds[place + 1].begin if place + 1 < len(sounds) else end
 
 
 def word_of(sounds: Sequence[Sound], place: int) -> range | None:
-    """The places of the sounds of a sound's word; None for silence and sounds without a word.
+    """The indices of all sounds in the word of a sound; None for silence and sounds without a word.
 
     Args:
-        sounds: the list.
-        place: of the sound.
+        sounds: the list of sounds.
+        place: index of the sound.
     """
     first = place
     while first > 0 and not sounds[first].word and sounds[first].name != SILENCE:
@@ -86,11 +85,11 @@ def word_of(sounds: Sequence[Sound], place: int) -> range | None:
 
 
 def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[float, float] | None:
-    """The first and last frame of the difference between two lists, or None.
+    """The first and last frame at which two lists differ, or None if they are equal.
 
     Args:
         old, new: lists of sounds.
-        end: of both.
+        end: frame at which both lists end.
     """
     before = [(s.begin, s.name) for s in old]
     after = [(s.begin, s.name) for s in new]
@@ -109,15 +108,16 @@ def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[flo
 def moved(
     sounds: Sequence[Sound], wanted: Mapping[int, float], end: float
 ) -> tuple[list[Sound], list[int]]:
-    """Move the starts of sounds; order and other sounds stay.
+    """Move the starts of sounds. The order and the starts of other sounds stay.
 
     Args:
         sounds: the list.
-        wanted: place -> new start frame.
-        end: of the whole.
+        wanted: index of a sound -> its new start frame.
+        end: frame at which the list ends.
 
     Returns:
-        The new list, and the places of sounds that stopped at a neighbour.
+        The new list, and the indices of sounds that could not reach the new frame. If there is no
+        room, no sound moves.
     """
     begins = [wanted.get(i, s.begin) for i, s in enumerate(sounds)]
     low, high = -float("inf"), end - SHORTEST
@@ -129,14 +129,14 @@ def moved(
         if i in wanted:
             begins[i] = min(begins[i], high)
         high = begins[i] - SHORTEST
-    if any(b <= a for a, b in pairwise(begins)):  # no room between neighbours that stay
+    if any(b <= a for a, b in pairwise(begins)):  # no room between sounds that were not moved
         begins = [s.begin for s in sounds]
     held = [i for i in sorted(wanted) if abs(begins[i] - wanted[i]) > 1e-4]
     return [s._replace(begin=b) for s, b in zip(sounds, begins, strict=True)], held
 
 
 def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
-    """The list with another phoneme at a place. Args: sounds  the list, name  the phoneme."""
+    """The list with the phoneme `name` for the sound at index `place` of `sounds`."""
     out = list(sounds)
     word = "" if name == SILENCE else out[place].word
     out[place] = out[place]._replace(name=name, word=word)
@@ -144,13 +144,13 @@ def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
 
 
 def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> list[Sound]:
-    """Insert a sound; it takes the rest of the sound at its start.
+    """Insert a sound at a frame; it lasts until the end of the sound that it divides.
 
     Args:
         sounds: the list.
-        begin: frame.
-        name: phoneme.
-        end: of the whole.
+        begin: frame at which the sound begins.
+        name: phoneme of the sound.
+        end: frame at which the list ends.
 
     Raises:
         SpokenError: the list has no room for it.
@@ -166,11 +166,11 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 
 
 def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
-    """Remove sounds; the sound before each becomes longer, at the start the next one.
+    """Remove sounds. The sound before takes their time; at the start of the list, the next one.
 
     Args:
         sounds: the list.
-        places: places of the sounds to remove.
+        places: indices of the sounds to remove.
 
     Raises:
         SpokenError: no sound would be left.
@@ -192,13 +192,13 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
 def respelled(
     sounds: Sequence[Sound], place: int, said: Sequence[tuple[str, Sequence[str]]], end: float
 ) -> list[Sound]:
-    """Replace the word at a place by one or more words within its time.
+    """Replace a word by the sounds of one or more words, spread evenly over its time.
 
     Args:
         sounds: the list.
-        place: place of a sound of the word; a sound without a word is replaced alone.
-        said: each word with its phonemes.
-        end: of the whole.
+        place: index of a sound of the word; a sound without a word is replaced alone.
+        said: the new words, each with its phonemes.
+        end: frame at which the list ends.
 
     Raises:
         SpokenError: the phonemes do not fit into the time of the word.
@@ -222,31 +222,31 @@ def respelled(
 
 
 class Mark(NamedTuple):
-    """A marker of a timeline."""
+    """A marker of Blender's timeline."""
 
     frame: int
-    """Of the scene."""
+    """Frame of the scene."""
     name: str
 
 
 def label_of(sound: Sound, mouth: str) -> str:
-    """The name of a marker: the starting word, and the mouth.
+    """The name of a sound's marker: the word that begins with the sound, and the mouth shape.
 
     Args:
-        sound: sound of the marker.
-        mouth: name of the mouth, such as M B P.
+        sound: the sound of the marker.
+        mouth: name of its mouth shape, such as M B P.
     """
     return f"{sound.word}: {mouth}" if sound.word else mouth
 
 
 @dataclass(frozen=True)
 class Board:
-    """Markers of a scene that represent sounds.
+    """Timeline markers that show the sounds of a list.
 
     Attributes:
-        placed: markers as they were added, one for each sound.
-        own: the user's own markers at that time.
-        there: all current markers.
+        placed: markers as the add-on created them, one for each sound.
+        own: the user's own markers when `placed` was created.
+        there: all markers of the current scene.
     """
 
     placed: Sequence[Mark]
@@ -254,21 +254,21 @@ class Board:
     there: Sequence[Mark]
 
     def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
-        """The current marker of each sound. Markers store frame and name only.
+        """Find the current marker of each sound by frame and name, which is all that markers store.
 
         An unchanged marker belongs to its sound. Next come a marker with another name at its frame
         (renamed), a marker with its name at another frame (moved), and a marker named like a sound
         between its neighbours.
 
         Args:
-            named: text -> phoneme, or None.
+            named: converts a mouth shape's name to a phoneme, or None.
 
         Returns:
-            Place in `placed` -> its marker, and markers of added sounds. Other markers belong to
-            the user.
+            Index in `placed` -> current marker, and a list of markers for added sounds. All other
+            markers belong to the user.
         """
         there, found = Counter(self.there), dict[int, Mark]()
-        for place, mark in enumerate(self.placed):  # most are as they were, and may be thousands
+        for place, mark in enumerate(self.placed):  # most are unchanged; there may be thousands
             if there[mark]:
                 there[mark] -= 1
                 found[place] = mark
@@ -296,7 +296,7 @@ class Board:
 
 
 def _mouth_of(name: str) -> str:
-    """The mouth in a marker's name, behind the word."""
+    """The name of the mouth shape in a marker's name, after the word and colon."""
     return name.rpartition(":")[2].strip()
 
 
@@ -308,21 +308,22 @@ def from_marks(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> tuple[list[Sound], list[int]]:
-    """The list from the markers: moved, renamed, copied and deleted markers are corrections.
+    """Correct a list of sounds from its moved, renamed, copied and deleted markers.
 
     Args:
-        sounds: the list of the added markers.
+        sounds: the list for which the markers were created.
         board: the markers.
-        placing: where the list lies in the scene.
-        end: of the list.
-        label: phoneme -> what its mouth is called.
-        named: what somebody wrote -> phoneme, or None.
+        placing: the conversion from the list's frames to frames of the scene.
+        end: frame at which the list ends.
+        label: converts a phoneme to the name of its mouth shape.
+        named: converts a name of a mouth shape or phoneme to a phoneme, or None.
 
     Returns:
-        The new list; places in `sounds` of those that were moved past a neighbour and stay beside.
+        The new list; indices in `sounds` of moved sounds that were stopped by a neighbour.
 
     Raises:
-        SpokenError: no marker is left, or one has a name that stands for no sound.
+        SpokenError: no marker is left, or a marker's name contains no sound, or a sound has no
+            room.
     """
     found, more = board.paired(named)
     if not found or len(board.placed) != len(sounds):
@@ -348,7 +349,7 @@ def _renamed(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> Sound:
-    """The sound that a marker's name says. Raises: SpokenError."""
+    """The sound with the word and mouth shape of a marker's name; raises SpokenError if unknown."""
     if mark.name == before.name:
         return sound
     word, colon, _ = mark.name.rpartition(":")

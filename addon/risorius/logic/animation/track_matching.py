@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which NLA track is which, after tracks were added, removed, renamed or put in another order."""
+"""Finds NLA tracks again after tracks were added, removed, renamed or reordered."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-Known = tuple[str, Sequence[str]]  # a track's name, the names of its strips
+Known = tuple[str, Sequence[str]]  # name of a track, names of its strips
 
 
 def matched(noted: Sequence[Known], there: Sequence[Known]) -> dict[int, int]:
-    """Find tracks again.
+    """Find the known tracks among the current tracks.
 
-    First those of the same name and strips, then of the same strips, whose names Blender keeps
-    apart, then of the same name.
+    Tracks match first by name and strips, then by strips alone because Blender keeps the names of
+    strips unique, then by name alone.
 
     Args:
-        noted: the tracks of before.
-        there: those of now.
+        noted: the known tracks.
+        there: the current tracks.
 
     Returns:
-        Number of a track of now -> number of the track of before; those without one are new.
+        Index of a current track -> index of the known track; new tracks are left out.
     """
     found: dict[int, int] = {}
     old, new = list(range(len(noted))), list(range(len(there)))
@@ -42,7 +42,7 @@ def _name(track: Known) -> object:
 
 
 def _strips(track: Known) -> object:
-    return list(track[1]) or track  # tracks without strips are told apart by name
+    return list(track[1]) or track  # tracks without strips are compared by name
 
 
 _KEYS: tuple[Callable[[Known], object], ...] = (_both, _strips, _name)

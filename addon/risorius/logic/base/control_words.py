@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a control does, in words: a table with a row for each, and * for the side."""
+"""Descriptions and search words of controls, from a table in which * stands for L and R."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypedDict
 
-PREFIX = "CTRL_expressions."  # of every raw control of a standard file
+PREFIX = "CTRL_expressions."  # of the raw controls of a standard DNA file
 
 
 class WrittenRow(TypedDict):
-    """A row as a table has it."""
+    """A row of the table with the descriptions of controls."""
 
     does: str
     words: list[str]
@@ -19,11 +19,11 @@ class WrittenRow(TypedDict):
 
 @dataclass(frozen=True)
 class Row:
-    """What is said of one control.
+    """The description and the search words of one control.
 
     Attributes:
-        does: a sentence.
-        words: what it is searched by.
+        does: a sentence: the effect of the control.
+        words: words by which the control is found.
         side: the sentence on its side, or nothing.
     """
 
@@ -34,17 +34,17 @@ class Row:
 
 @dataclass(frozen=True)
 class ControlWords:
-    """A table: rows by the names of controls, without their prefix."""
+    """The rows of the table, by the names of controls without their prefix."""
 
     rows: Mapping[str, Row]
 
     def tooltip(self, control: str) -> str:
-        """What a control does, and its side; nothing of one that is not in the table.
+        """The effect of a control and its side; "" if the table lacks the control.
 
-        Blender puts the name before it and a full stop after it.
+        Blender writes the slider's name before the text and a full stop after it.
 
         Args:
-            control: its name, with the prefix or without.
+            control: name of the control, with or without its prefix.
         """
         row = self.rows.get(control.removeprefix(PREFIX))
         if row is None:
@@ -52,17 +52,17 @@ class ControlWords:
         return f"{row.does} {row.side}".rstrip(" .")
 
     def searched(self, control: str) -> str:
-        """The words that a control is found by, as one text."""
+        """The search words of a control, joined with spaces."""
         row = self.rows.get(control.removeprefix(PREFIX))
         return " ".join(row.words) if row is not None else ""
 
 
 def expand(table: Mapping[str, WrittenRow], sides: Mapping[str, str]) -> ControlWords:
-    """Rows for both sides of what has a * for its side.
+    """Make two rows, for L and R, of each row with a * in its name.
 
     Args:
-        table: rows by the name of the control.
-        sides: a sentence each for L and R.
+        table: rows by the names of controls, without their prefix.
+        sides: the sentences for L and R that name the side.
     """
     rows = {}
     for name, row in table.items():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The family of the add-on's own errors: what a user can mend, in one sentence.
+"""The base class of the add-on's errors that a user can mend.
 
 Operators catch these, the package's RisoriusError and OSError (native.user_errors), and nothing
-wider: what else is raised is a fault of the program, which Blender shows as such.
+else: any other exception is a fault of the program, which Blender shows with a traceback.
 """
 
 

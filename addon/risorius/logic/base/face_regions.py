@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The regions of a face, as the `risorius` package knows them."""
+"""The regions of a face and the functions that assign controls to them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ def _itself(name: str) -> str:
 
 @dataclass(frozen=True)
 class FaceRegions:
-    """What logic is handed to sort controls by.
+    """Regions and functions that come from the `risorius` package, which this room does not import.
 
     Attributes:
-        titles: heading of each region, in the order in which they are shown; empty without the
-            native module.
-        of_slider: the region that a control's slider is shown under, by the last part of its name.
-        of_control: the region that a control moves; that of head.yaw stands before the dot.
-        mirrored: the name of a control's partner in a mirror: eyeLookLeftL has eyeLookRightR; one
-            without a side is its own.
-        across: that of the same control of the other side: eyeLookLeftL has eyeLookLeftR.
+        titles: region -> heading, in the order of display; empty without the native module.
+        of_slider: name of a control -> region that shows its slider.
+        of_control: name of a control -> region that it moves.
+        mirrored: name of a control -> its partner in a mirror: eyeLookLeftL has eyeLookRightR; a
+            control without a side is its own partner.
+        across: name of a control -> the same control of the other side: eyeLookLeftL has
+            eyeLookLeftR.
     """
 
     titles: Mapping[str, str]

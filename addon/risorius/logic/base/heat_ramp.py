@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colours of heat maps: from blue-violet over green to yellow.
+"""The colours of heat maps (viridis): from blue-violet over green to yellow.
 
-Brightness alone gives the order, so colour-blind people and grey prints see the same ramp
-(viridis).
+Brightness grows from cool to hot, so colour-blind people and grey prints see the same order.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# sRGB, at equal steps.
+# sRGB, 0 to 1, at equal steps from cool to hot.
 ANCHORS = (
     (0.267, 0.005, 0.329),
     (0.283, 0.141, 0.458),
@@ -44,7 +43,7 @@ def colours(shares: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def linear(srgb: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Scene-linear colours of sRGB ones, float32[n, 4]; alpha stays.
+    """Convert sRGB colours to scene-linear colours, float32[n, 4]; alpha stays.
 
     Args:
         srgb: float32[n, 4].

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 MAX_BYTES = 63
-LISTED = 8  # so many labels of a row a sentence names
+LISTED = 8  # most labels that a sentence lists
 
 
 def cut(name: str, limit: int = MAX_BYTES) -> str:
@@ -25,11 +25,11 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
 
 
 def listed(labels: Sequence[str], most: int = LISTED) -> str:
-    """Labels for a sentence: the first ones, and the number of others.
+    """A list of labels for a sentence: the first ones, and the number of others.
 
     Args:
         labels: at least one.
-        most: largest number of named labels.
+        most: largest number of listed labels.
     """
     shown = ", ".join(labels[:most])
     return f"{shown} and {len(labels) - most} more" if len(labels) > most else shown
@@ -40,10 +40,10 @@ def unique_labels(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
 
     Args:
         names: names in index order; long and repeated ones are allowed.
-        taken: labels that must not be given.
+        taken: labels that already exist and must not be used again.
 
     Returns:
-        Labels in the same order. A name that is short and first of its kind stays as it is.
+        Labels in the same order. The first short name of several equal names stays unchanged.
     """
     used = set(taken)
     labels = []
@@ -69,12 +69,12 @@ def without_lod(mesh_name: str) -> str:
 
 
 def printable(text: str, limit: int = 400) -> str:
-    """A text of a file for display: one line, with `?` for unprintable characters.
+    """A text from a file for display: one line, with `?` for unprintable characters.
 
     A zero byte would end the text where Blender shows it.
 
     Args:
-        text: as the file has it.
+        text: the text of the file.
         limit: largest number of letters; a longer text ends in "...".
     """
     shown = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)

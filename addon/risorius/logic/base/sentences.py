@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences that can be translated later, because they store template and values."""
+"""Sentences that store their template and values, so that they can be translated later."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class Sentence(str):
 
     Attributes:
         template: English text with {names} of values, as in the translation table.
-        values: values of the names.
+        values: name in the template -> value.
     """
 
     template: str
@@ -19,11 +19,11 @@ class Sentence(str):
 
 
 def told(template: str, **values: object) -> Sentence:
-    """Make a sentence.
+    """Make a Sentence from a template.
 
     Args:
         template: English text with {names} of values.
-        values: values: numbers, names, or sentences.
+        values: name in the template -> number, name or Sentence.
     """
     sentence = Sentence(template.format(**values) if values else template)
     sentence.template, sentence.values = template, values

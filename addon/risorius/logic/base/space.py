@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All conversion of coordinates and units from DNA file space to Blender space.
+"""Conversion of coordinates and units between DNA files and Blender.
 
 Blender: z up, a face looks along -y, its left is +x, right-handed, metres / scene unit scale.
 Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
-    also if `axes` mirrors.
+also if `axes` mirrors.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SpaceError(FaceError):
 
 @dataclass(frozen=True)
 class Space:
-    """How one file's numbers become Blender's.
+    """The conversion from one file's coordinates and units to Blender's.
 
     Attributes:
         axes: float64[3, 3], columns are the file's x, y and z axes in Blender's axes.
@@ -57,31 +57,31 @@ class Space:
     flip_faces: bool
 
     def points(self, values: NDArray[np.float32] | Float) -> Float:
-        """Convert positions, offsets or deltas, [n, 3] file units to Blender units."""
+        """Convert positions, offsets or deltas, float[n, 3], from file units to Blender units."""
         return np.asarray(values, np.float64) @ (self.axes.T * self.scale)
 
     def directions(self, values: NDArray[np.float32] | Float) -> Float:
-        """Convert normals, [n, 3], length kept."""
+        """Convert normals, float[n, 3]; their lengths stay."""
         return np.asarray(values, np.float64) @ self.axes.T
 
     def rotations(self, angles: NDArray[np.float32] | Float) -> Float:
-        """Convert Euler angles of the file, [n, 3], to rotation matrices float64[n, 3, 3]."""
+        """Convert Euler angles of the file, float[n, 3], to rotation matrices float64[n, 3, 3]."""
         matrices = euler_matrices(
             np.asarray(angles, np.float64) * self.radians * self.signs, self.sequence
         )
         return self.axes @ matrices @ self.axes.T
 
     def file_points(self, values: NDArray[np.float32] | Float) -> Float:
-        """The inverse of `points`: [n, 3] Blender units to file units."""
+        """The inverse of `points`: float[n, 3], from Blender units to file units."""
         return np.asarray(values, np.float64) @ self.axes / self.scale
 
     def file_rotations(self, matrices: Float, near: Float) -> Float:
-        """The inverse of `rotations`: float64[n, 3, 3] to Euler angles of the file, [n, 3].
+        """The inverse of `rotations`: float64[n, 3, 3] to Euler angles of the file, float64[n, 3].
 
         Args:
             matrices: rotations in Blender's axes.
-            near: float64[n, 3] file angles; of all equal rotations, the angles nearest to these are
-                returned.
+            near: float64[n, 3], angles in the file's unit; of all equivalent angles, those nearest
+                to `near` are returned.
         """
         turned = self.axes.T @ matrices @ self.axes
         units = self.radians * self.signs
@@ -89,7 +89,7 @@ class Space:
 
     @property
     def delta_matrix(self) -> NDArray[np.float32]:
-        """float32[3, 3] that takes a shape delta of the file to Blender units."""
+        """float32[3, 3] that converts a shape delta from file units to Blender units."""
         return np.ascontiguousarray(self.axes * self.scale, np.float32)
 
 
@@ -102,22 +102,22 @@ def make_space(
     face_winding_order: str,
     unit_scale: float = 1.0,
 ) -> Space:
-    """Read a file's conventions.
+    """Make the Space of a file from the conventions in its descriptor.
 
     Args:
         coordinate_system: directions of the file's x, y and z axes.
         translation_unit: "cm" or "m".
         rotation_unit: "degrees" or "radians".
-        rotation_sequence: such as "xyz"; the first rotation is applied first.
-        rotation_signs: one per axis.
+        rotation_sequence: order of rotations such as "xyz", the first one first.
+        rotation_signs: sign of the rotation about each axis; below 0 means that it is reversed.
         face_winding_order: "ccw" or "cw".
         unit_scale: metres per Blender unit of the scene.
 
     Returns:
-        The Space of that file in that scene.
+        The Space of the file in the scene.
 
     Raises:
-        SpaceError: a word that is not known, or axes that do not span space.
+        SpaceError: unknown word, or axes that lie in one plane.
     """
     for what, word, known in (
         ("translation unit", translation_unit, tuple(_METRES)),
@@ -146,7 +146,7 @@ def make_space(
 
 
 def _axes(coordinate_system: Sequence[str]) -> Float:
-    """float64[3, 3]: the columns are the file's axes in Blender's. Raises: SpaceError."""
+    """float64[3, 3]: the columns are the file's axes in Blender's axes. Raises: SpaceError."""
     if any(word not in _DIRECTIONS for word in coordinate_system):
         raise SpaceError(
             told(
@@ -194,13 +194,13 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
     Args:
         matrices: float64[n, 3, 3] rotations for column vectors.
         sequence: three axis numbers; sequence[0] is applied first.
-        near: float64[n, 3] radians; the solution nearest to them is chosen.
+        near: float64[n, 3] radians; of all equivalent angles, those nearest to `near` are returned.
 
     Returns:
         float64[n, 3] radians about x, y and z.
     """
     i, j, k = sequence
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # even or odd order of axes
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # even or odd permutation of the axes
     m = matrices
     flat = np.hypot(m[:, i, i], m[:, j, i])  # the cosine of the middle angle
     result = np.empty((len(m), 3))
@@ -209,7 +209,7 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
         if flat[n] > 1e-7:
             first = np.arctan2(sign * m[n, k, j], m[n, k, k])
             last = np.arctan2(sign * m[n, j, i], m[n, i, i])
-        else:  # the first and last axis coincide: keep the first angle, the last takes the rest
+        else:  # gimbal lock: take the first angle from `near` and solve for the last
             first = near[n, i]
             known = np.zeros((1, 3))
             known[0, i], known[0, j] = first, middle
@@ -225,15 +225,15 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
 
 
 def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]) -> Float:
-    """Chain parent-relative rotations and offsets to world matrices.
+    """Combine parent-relative rotations and offsets into world matrices.
 
     Args:
         rotations: float64[J, 3, 3] parent-relative.
         offsets: float64[J, 3] parent-relative.
-        parents: parent of each joint; a root is its own.
+        parents: int[J], parent of each joint; a root is its own parent.
 
     Returns:
-        float64[J, 4, 4]. Parents may stand after their children.
+        float64[J, 4, 4]. Parents may have higher indices than their children.
     """
     count = len(parents)
     local = np.tile(np.eye(4), (count, 1, 1))
@@ -256,7 +256,7 @@ def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]
 
 
 class Direction(Protocol):
-    """Three numbers: an array, or a vector of another library."""
+    """Three numbers, x, y and z: an array, or a vector of another library."""
 
     def __getitem__(self, axis: int, /) -> float: ...
 
@@ -265,10 +265,10 @@ def yaw_pitch(direction: Direction | Float) -> tuple[float, float]:
     """Angles of a direction from straight ahead (-y): yaw to the face's left (+x), pitch up.
 
     Args:
-        direction: x, y, z of any length but 0.
+        direction: x, y, z of any length except 0.
 
     Returns:
-        Radians.
+        Yaw and pitch in radians.
     """
     x, y, z = float(direction[0]), float(direction[1]), float(direction[2])
     return float(np.arctan2(x, -y)), float(np.arctan2(z, np.hypot(x, y)))

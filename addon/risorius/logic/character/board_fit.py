@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GUI controls that give wanted raw controls, as near as the board comes to them.
+"""Fits GUI controls to wanted raw controls.
 
-The way back is not unique: a least-squares fit within the controls' ranges. Each control in turn
-goes to its best value while the others stay; between the breaks of its lines that is a formula, so
-each step is exact and none makes it worse.
+Several settings may give the same raw controls. The fit minimises squared differences within the
+controls' ranges: it sets one GUI control after another to its best value, which a formula gives for
+each linear piece. So no step makes the fit worse.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from .board_table import BoardTable, Doubles
 
-_SWEEPS = 40  # of controls that share outputs each halves what is left
-_ENOUGH = 1e-7  # a sweep that moves nothing further ends it
-_RIGHT = 1e-9  # a raw control that is off by less is right
-_REST = 1e-10  # of two values that are as good, the one nearer to rest
+_SWEEPS = 40  # most sweeps; controls that share outputs halve their error in each
+_ENOUGH = 1e-7  # a sweep that moves no control by more ends the fit
+_RIGHT = 1e-9  # raw controls closer than this to their goal count as reached
+_REST = 1e-10  # cost per unit of distance from rest: decides between equal values
 
 
 @dataclass(frozen=True)
 class Loss:
-    """The loss of a conversion: the raw controls that differ most.
+    """The accuracy of a conversion: the raw controls that differ most.
 
     Attributes:
-        largest: the largest difference of a raw control at any frame.
-        worst: names with their largest difference, the worst first, without invisible differences.
+        largest: largest difference of a converted raw control at any frame.
+        worst: names with their largest difference, the largest first; invisible differences are
+            left out.
     """
 
     largest: float = 0.0
@@ -36,15 +37,15 @@ class Loss:
 
 
 def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
-    """Bounded least squares over the GUI controls.
+    """Fit GUI controls to raw controls by least squares, within their ranges.
 
     Args:
-        table: of the face.
-        raw: float[N, R], wanted raw controls.
-        start: float[N, G], start of the search.
+        table: GUI controls of the face.
+        raw: float[N, R], wanted raw controls of N poses.
+        start: float[N, G], GUI controls at which the search starts.
 
     Returns:
-        float64[N, G] within the ranges.
+        float64[N, G], fitted GUI controls.
     """
     wanted = np.asarray(raw, np.float64)
     gui = np.clip(np.asarray(start, np.float64), table.lowest, table.highest)
@@ -60,7 +61,7 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
 
 
 def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
-    """Bring each control in turn to its best value until none moves. Args: gui  is changed."""
+    """Set each control in turn to its best value until none moves. Args: gui  is changed."""
     totals = table.sums(gui)
     movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
     for _sweep in range(_SWEEPS):
@@ -69,7 +70,7 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
             outputs = table.outputs_of(index)
             given = np.clip(totals[:, outputs], 0.0, 1.0)
             if np.abs(given - wanted[:, outputs]).max(initial=0.0) <= _RIGHT:
-                continue  # it gives what is wanted: while a hand drags, most do
+                continue  # outputs are reached: during a drag, most are
             own = table.part(index, gui[:, index])
             others = totals[:, outputs] - own
             best = _best(table, index, wanted[:, outputs], others)
@@ -81,8 +82,10 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
 
 
 def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
-    """Of two GUI controls with a common output, one may have taken a value that the other needs.
-    Restart the search with each of them first. Args: gui changed if the result is better."""
+    """Retry two GUI controls with a common output; one may hold a value that the other needs.
+
+    Both are set to 0, and each of them is fitted first once. Args: gui changed in place if better.
+    """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):
         tried = gui.copy()
@@ -97,13 +100,13 @@ def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int
 
 
 def _cost(table: BoardTable, wanted: Doubles, gui: Doubles) -> Doubles:
-    """float64[N]: the remaining sum of squares of the controls in the table."""
+    """float64[N]: the sum of squared differences of the raw controls that the table drives."""
     off = (table.raw(gui) - wanted)[:, table.reached]
     return np.asarray((off**2).sum(axis=1), np.float64)
 
 
 def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:
-    """float64[N]: the best value of one control with the others fixed."""
+    """float64[N]: the best value of one GUI control if the others stay."""
     breaks = table.breaks_of(index)
     tried = [np.full(len(wanted), end) for end in breaks]
     for low, high in pairwise(breaks):
@@ -127,13 +130,13 @@ def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Do
 def loss(
     labels: list[str], wanted: ArrayLike, given: ArrayLike, which: NDArray[np.bool_], seen: float
 ) -> Loss:
-    """The loss of a conversion.
+    """Measure how far converted raw controls are from the wanted ones.
 
     Args:
         labels: names of the raw controls.
-        wanted, given: float[N, R] before and after.
+        wanted, given: float[N, R], raw controls before and after the conversion.
         which: bool[R], the controls that were converted.
-        seen: smallest difference to name.
+        seen: smallest visible difference; smaller ones are not listed.
     """
     off = np.abs(np.asarray(wanted, np.float64) - np.asarray(given, np.float64))
     most = np.where(which, off.max(axis=0, initial=0.0), 0.0)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places of the handles of a face board, and the lines drawn around them.
+"""Lays out the handles of a face board and the lines around them.
 
-Lengths are in units of the board: moving a handle by 1 changes its GUI control by 1. The board is
-    seen from the front, x to the viewer's right, y up; the character's left is on the right.
-    Handles with known names lie as on a face; all others lie in rows by region.
+Lengths are in board units: moving a handle by 1 changes its GUI control by 1. The board is seen
+from the front, x to the viewer's right, y up; the character's left is on the right. Handles with
+known names are arranged like a face; all others are placed in rows by region.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ Direction = tuple[int, int]
 _TEXT, _TITLE = 0.29, 0.46  # heights of letters
 _TRACK = 0.34  # width of a slider's frame
 _GAP = 0.3  # between sliders
-_MARGIN = 0.6  # around all
-_LONGEST = 10  # letters of a label in one line
-_WIDEST, _LINES = 14, 4  # letters of a word, and lines, that are shown of a long name
-_NARROWEST = 31.0  # of the board
+_MARGIN = 0.6  # around the board
+_LONGEST = 10  # letters in one line of a label
+_WIDEST, _LINES = 14, 4  # longest word in letters, and most lines of a label
+_NARROWEST = 31.0  # smallest width of the board
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One way in which a handle goes.
+    """One direction in which a handle moves.
 
     Attributes:
         gui: index of the GUI control.
-        low, high: how far the handle goes, in the board's units; 0 is rest.
-        unit: value of the GUI control for one unit: 1, but for controls of another size.
-        way: where the handle goes on the board when the value grows.
+        low, high: range of the handle in board units; 0 is rest.
+        unit: value of the GUI control for one board unit: 1 unless its range is far from 1.
+        way: direction on the board in which the value grows.
     """
 
     gui: int
@@ -56,11 +56,11 @@ class Handle:
 
     Attributes:
         bone: name of its bone.
-        side: "L" or "R", the character's own, or "" for the middle.
-        region: of the face.
-        stem: its name without prefix and side: eye_blink.
-        x, y: directions of its bone's own axes; None for an unused axis.
-        place: rest place.
+        side: "L" or "R" of the character, or "" for the middle.
+        region: region of the face.
+        stem: name of the bone without prefix and side, such as eye_blink.
+        x, y: movements along the bone's x and y axis; None for an unused axis.
+        place: rest place on the board.
     """
 
     bone: str
@@ -76,7 +76,7 @@ class Handle:
         return tuple(axis for axis in (self.x, self.y) if axis is not None)
 
     def box(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right, top of the handle's range, from its rest place."""
+        """Left, bottom, right and top of the handle's range, relative to its rest place."""
         left = bottom = right = top = 0.0
         for axis in self.axes:
             for end in (axis.low, axis.high):
@@ -88,13 +88,13 @@ class Handle:
 
 @dataclass(frozen=True)
 class Board:
-    """A complete face board.
+    """A complete face board, centred at 0, 0.
 
     Attributes:
         handles: its handles.
-        lines: frames and labels around them.
-        border: outline of the board with its title, for selecting the board.
-        width, height: of its outline; its centre is at 0, 0.
+        lines: frames and labels of the handles.
+        border: outline of the board, for selecting the board.
+        width, height: size of the outline.
     """
 
     handles: tuple[Handle, ...]
@@ -104,7 +104,8 @@ class Board:
     height: float
 
 
-# Columns from the outer side of the face inwards, each from the top down, then the middle columns.
+# Title, columns for each side, middle columns. Side columns are ordered from the outer side of the
+# face inwards, and the handles of a column from the top down.
 _Columns = tuple[tuple[str, ...], ...]
 _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
     (
@@ -188,13 +189,13 @@ _PREFIX = re.compile(r"^CTRL_(?:([LRC])_)?")
 _LAST_SIDE = re.compile(r"[LR](?=$|Ph\d$)")
 _BESIDE = re.compile(r"(Left|Right)(?=[A-Z_]|$)")
 _DOWNWARDS = re.compile(r"(Down|Depress|Open|Blink)(?=[A-Z_]|$)")
-_CLEAR = 0.05  # a movement to one side that is less tells nothing
+_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
 _LIP = re.compile(r"[UD]$")
 
 
 @dataclass
 class _Cell:
-    """Handles with one label below them, and the place of the corner of each handle's frame."""
+    """Handles above a common label, each with the offset of its rest place from the corner."""
 
     width: float
     height: float
@@ -204,7 +205,7 @@ class _Cell:
 
 @dataclass
 class _Block:
-    """A titled block: cells at places from its upper left corner."""
+    """A titled block of cells, each with the offset from the block's upper left corner."""
 
     title: str
     width: float = 0.0
@@ -217,8 +218,8 @@ def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
 
     Args:
         table: the GUI controls.
-        raw_names: of all raw controls.
-        gui: index of the control.
+        raw_names: names of all raw controls.
+        gui: index of the GUI control.
     """
     if table.names[gui].endswith(".tx"):
         return True
@@ -227,23 +228,24 @@ def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
 
 
 def is_middle(table: BoardTable, gui: int) -> bool:
-    """Whether a GUI control is of no side. Args: table  the controls; gui  index of one."""
+    """Whether a GUI control belongs to no side. Args: table  all GUI controls; gui  an index."""
     return not _side_of(_bone_of(table.names[gui])[0])
 
 
 def ways_of(
     table: BoardTable, raw_names: Sequence[str], sideways: Mapping[int, float]
 ) -> list[Direction]:
-    """The direction in which the handle of each GUI control moves when its value grows, as on the
-    face.
+    """The direction in which the handle of each GUI control moves when its value grows.
+
+    It follows the motion of the face.
 
     Args:
         table: the GUI controls.
-        raw_names: of all raw controls; words in them give most directions.
-        sideways: control -> measured motion of the face to its own left, -1 to 1.
+        raw_names: names of all raw controls; words in them give most directions.
+        sideways: GUI control -> measured motion of the face to its own left, -1 to 1.
 
     Returns:
-        RIGHT, LEFT, UP or DOWN for each, as seen by the viewer.
+        RIGHT, LEFT, UP or DOWN for each GUI control, as seen by the viewer.
     """
     raised: dict[int, str] = {}
     for row in table.rows:
@@ -270,16 +272,16 @@ def handles_of(
     region_of: Callable[[str], str],
     taken: Iterable[str] = (),
 ) -> list[Handle]:
-    """The handles of a table: tx and ty of one name share a handle.
+    """Make the handles of a table; tx and ty of one name share a handle.
 
     Args:
         table: the GUI controls.
-        ways: direction of each, from ways_of.
-        region_of: the region of a stem.
-        taken: names that bones must not get.
+        ways: direction of each GUI control, from ways_of.
+        region_of: stem of a handle -> region.
+        taken: bone names that are in use.
 
     Returns:
-        Handles without places; controls without outputs get none.
+        Handles without places. GUI controls without outputs or range get no handle.
     """
     found: dict[str, Handle] = {}
     for gui, name in enumerate(table.names):
@@ -301,7 +303,7 @@ def handles_of(
 
 
 def _upright(handle: Handle) -> Handle:
-    """A handle whose two directions are at right angles."""
+    """The handle with y upwards if both axes would be horizontal."""
     if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
         return handle
     return replace(handle, y=replace(handle.y, way=UP))
@@ -332,12 +334,13 @@ def _stem_of(bone: str) -> str:
 
 
 def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool = False) -> Board:
-    """Lay out a board.
+    """Place handles on a board and draw the lines around them.
 
     Args:
-        handles: its handles.
-        titles: title of each region, in their order.
-        is_own: True: the table was made from raw controls, so all handles lie in rows by region.
+        handles: handles without places.
+        titles: region -> title, in the order of the blocks.
+        is_own: True: the table was made from raw controls, so all handles are placed in rows by
+            region.
     """
     left = list(handles)
     blocks = []
@@ -356,7 +359,7 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
 
 
 def _label(stem: str, region: str) -> list[str]:
-    """A label in short lines."""
+    """The label of a handle, in short lines."""
     words = _LABELS.get(stem.lower()) or slider_words.title_in_region(stem, region, sided=False)
     text = words.upper()
     rows: list[str] = []
@@ -369,7 +372,10 @@ def _label(stem: str, region: str) -> list[str]:
 
 
 def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
-    """Sliders in rows with a label below. Args: rows  from the top down, from left to right."""
+    """Place handles in centred rows with a label below.
+
+    Args: rows  from the top down, left to right.
+    """
     boxes = [[frame_of(h) for h in row] for row in rows]
     widths = [sum(f[2] - f[0] for f in row) + _GAP * (len(row) - 1) for row in boxes]
     heights = [max(f[3] - f[1] for f in row) for row in boxes]
@@ -387,8 +393,10 @@ def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
 
 
 def frame_of(handle: Handle) -> tuple[float, float, float, float]:
-    """Left, bottom, right, top of a handle's frame, from its rest place. Args: handle the
-    handle."""
+    """Left, bottom, right and top of a handle's frame, relative to its rest place.
+
+    Args: handle the handle.
+    """
     left, bottom, right, top = handle.box()
     half = _TRACK / 2
     return left - half, bottom - half, right + half, top + half
@@ -397,7 +405,7 @@ def frame_of(handle: Handle) -> tuple[float, float, float, float]:
 def _face_block(
     title: str, sides: _Columns, middle: _Columns, left: Sequence[Handle]
 ) -> _Block | None:
-    """A block of known names, or None if the face has none of them."""
+    """A block of the handles with known names, or None if the face has none of them."""
     by_name = {(h.side, h.stem.lower()): h for h in left}
 
     def columns(side: str, wanted: _Columns) -> list[list[_Cell]]:
@@ -427,7 +435,7 @@ def _face_block(
 
 
 def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block | None:
-    """A block of the other handles of a region in rows, or None."""
+    """A block of the remaining handles of a region in rows, or None if there are none."""
     if not handles:
         return None
     block = _Block(title)
@@ -445,7 +453,7 @@ def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block
 
 
 def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
-    """Cells in as few rows as there is room for, none much longer than the others."""
+    """Distribute cells evenly over the fewest rows that fit into a width."""
     total = sum(cell.width + _GAP for cell in cells)
     share = total / max(1.0, np.ceil(total / width))
     rows: list[list[_Cell]] = [[]]
@@ -460,7 +468,7 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 
 
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
-    """Both sides of a control, and the upper and lower lip, in one cell; tall ones last."""
+    """Cells for handles with one stem, and for upper and lower lip together; tall cells last."""
     groups: dict[str, list[Handle]] = {}
     stems = {h.stem for h in handles}
     for handle in handles:
@@ -479,7 +487,7 @@ def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
 
 
 def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
-    """Arrange blocks in rows of a given width."""
+    """Arrange blocks in rows up to a given width."""
     rows: list[list[_Block]] = []
     for block in blocks:
         taken = sum(b.width + 2 * _MARGIN for b in rows[-1]) if rows else width
@@ -491,7 +499,7 @@ def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
 
 
 def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
-    """Places and lines of all that is in the blocks."""
+    """Make a centred board of rows of blocks: places of handles, and all lines."""
     handles: list[Handle] = []
     lines: list[Line] = []
     down = -_MARGIN
@@ -518,7 +526,7 @@ def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
 
 
 def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Line]) -> None:
-    """Add a cell's handles and lines at its upper left corner."""
+    """Add the handles and lines of a cell whose upper left corner is at x, y."""
     for handle, across, down in cell.inside:
         place = (x + across, y + down)
         handles.append(replace(handle, place=place))
@@ -530,7 +538,7 @@ def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Li
 
 
 def track_of(handle: Handle) -> list[Line]:
-    """A handle's frame, with marks at rest. Args: handle with its rest at 0, 0."""
+    """A handle's frame with marks at rest, relative to the rest place. Args: handle  the handle."""
     left, bottom, right, top = frame_of(handle)
     frame = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
     if handle.x is not None and handle.y is not None:
@@ -546,7 +554,7 @@ def _moved(line: Sequence[Point], by: Point) -> Line:
 
 
 def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
-    """float64[H, 2]: the least and the greatest places of handles along their own axes."""
+    """float64[H, 2] each: lowest and highest place of every handle along its own two axes."""
     ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
     both = np.array(ends, np.float64).reshape(-1, 2, 2)
     return both[:, :, 0], both[:, :, 1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Letters as lines, for labels on the face board: a font of strokes, four wide and six high."""
+"""A stroke font for labels on the face board: letters 4 units wide and 6 units high."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 Point = tuple[float, float]
 
-# Of each letter its lines; of each line its corners, two digits each: across and up.
+# For each letter its lines, separated by commas; for each corner of a line two digits, x and y.
 _STROKES = {
     "A": "00 05 16 36 45 40,03 43", "B": "00 06 36 45 44 33 03,33 42 41 30 00",
     "C": "45 36 16 05 01 10 30 41", "D": "00 06 26 44 42 20 00", "E": "46 06 00 40,03 33",
@@ -25,27 +25,27 @@ _STROKES = {
     "9": "10 30 41 45 36 16 05 04 13 43", "-": "13 33", ".": "20 21", "+": "13 33,22 24",
     "/": "00 46",
 }  # fmt: skip
-_WIDTH = 0.62  # of a letter's own width, as it is drawn
-_ADVANCE = 5.6 / 6.0 * _WIDTH  # from a letter to the next, for letters of height 1
+_WIDTH = 0.62  # factor that narrows the letters
+_ADVANCE = 5.6 / 6.0 * _WIDTH  # distance between letters of height 1
 
 
 def width(text: str, height: float) -> float:
     """The width of a text.
 
     Args:
-        text: one line.
-        height: of its letters.
+        text: the text, in one line.
+        height: height of the letters, in the unit of the result.
     """
     return max(0.0, (len(text) * _ADVANCE - 1.6 / 6.0 * _WIDTH) * height)
 
 
 def lines(text: str, x: float, y: float, height: float) -> Iterator[list[Point]]:
-    """The lines of a text.
+    """The strokes of a text as lines.
 
     Args:
         text: one line; unknown letters leave a gap.
-        x, y: place of its lower left corner.
-        height: of its letters.
+        x, y: lower left corner of the text.
+        height: height of the letters.
     """
     unit = height / 6.0
     for place, letter in enumerate(text.upper()):

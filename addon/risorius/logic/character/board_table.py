@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GUI controls as a table: the raw controls and the range of each.
+"""The table of GUI controls: which raw controls each drives, and its range.
 
 The table comes from the file. For a file without GUI controls it is made from the names of raw
-controls: one slider for each, opposites (Up and Down, Wide and Narrow) on one slider, and all four
-directions on one handle.
+controls: one GUI control for each, or one for two opposites (Up and Down, Wide and Narrow), and a
+shared handle for all four directions.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Row:
 
     Attributes:
         gui, raw: indices of the GUI control and of the raw control.
-        low, high: range of the GUI control.
+        low, high: range of the GUI control's value.
         slope, cut: coefficients of the line.
     """
 
@@ -51,14 +51,14 @@ class Row:
 
 @dataclass(frozen=True)
 class BoardTable:
-    """GUI controls of a face.
+    """The GUI controls of a face.
 
     Attributes:
-        names: of the GUI controls: CTRL_L_eye_blink.ty.
-        rows: in the file's order; of rows with the same control and output the first matching one
-            counts.
+        names: names of the GUI controls, such as CTRL_L_eye_blink.ty.
+        rows: in the file's order; of several rows with the same control and output, the first whose
+            range contains the value is used.
         raw_count: R, number of raw controls of the face.
-        is_own: True: made from names of raw controls, with lines through 0.
+        is_own: True: the table was made from names of raw controls; its lines pass through 0.
     """
 
     names: tuple[str, ...]
@@ -77,7 +77,7 @@ class BoardTable:
 
     @cached_property
     def lowest(self) -> Doubles:
-        """float64[G]: the least value of each control; 0 is always among its values."""
+        """float64[G]: lowest value of each GUI control, at most 0."""
         out = np.zeros(len(self.names))
         for row in self.rows:
             out[row.gui] = min(out[row.gui], row.low)
@@ -85,7 +85,7 @@ class BoardTable:
 
     @cached_property
     def highest(self) -> Doubles:
-        """float64[G]: the greatest value of each control."""
+        """float64[G]: highest value of each GUI control, at least 0."""
         out = np.zeros(len(self.names))
         for row in self.rows:
             out[row.gui] = max(out[row.gui], row.high)
@@ -93,38 +93,41 @@ class BoardTable:
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
-        """bool[R]: the raw controls that some GUI control leads to; others stay with sliders."""
+        """bool[R]: the raw controls that a GUI control drives; the others have only sliders."""
         out = np.zeros(self.raw_count, bool)
         out[[row.raw for row in self.rows]] = True
         return out
 
     @cached_property
     def sharing(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of GUI controls that lead to one raw control, but not to the same ones only."""
+        """Pairs of GUI controls whose sets of raw controls overlap but are not equal."""
         led = [set(self.outputs_of(gui)) for gui in range(len(self.names))]
         pairs = combinations(range(len(led)), 2)
         return tuple((a, b) for a, b in pairs if led[a] & led[b] and led[a] != led[b])
 
     def outputs_of(self, gui: int) -> list[int]:
-        """The raw controls that a GUI control leads to. Args: gui  its index."""
+        """The raw controls that a GUI control drives. Args: gui  index of the GUI control."""
         return [raw for raw, _rows in self._pieces[gui]]
 
     def breaks_of(self, gui: int) -> list[float]:
-        """Where the lines of a GUI control begin and end, with 0. Args: gui  its index."""
+        """Values at which a GUI control's lines begin or end, and 0.
+
+        Args: gui  index of the control.
+        """
         ends = {0.0, float(self.lowest[gui]), float(self.highest[gui])}
         for _raw, rows in self._pieces[gui]:
             ends.update(end for row in rows for end in (row.low, row.high))
         return sorted(ends)
 
     def part(self, gui: int, values: ArrayLike) -> Doubles:
-        """The contribution of one GUI control to its outputs, before clamping to 0..1.
+        """The contribution of one GUI control to its raw controls, before clamping to 0..1.
 
         Args:
-            gui: its index.
-            values: float[N].
+            gui: index of the GUI control.
+            values: float[N], values of the GUI control.
 
         Returns:
-            float64[N, its outputs].
+            float64[N, driven raw controls].
         """
         v = np.asarray(values, np.float64)
         out = np.zeros((len(v), len(self._pieces[gui])))
@@ -137,19 +140,19 @@ class BoardTable:
         return out
 
     def raw(self, gui: ArrayLike) -> Doubles:
-        """Raw controls of GUI values.
+        """Convert GUI controls to raw controls.
 
         Args:
-            gui: float[N, G].
+            gui: float[N, G], GUI controls of N poses.
 
         Returns:
-            float64[N, R] in 0..1; 0 for raw controls without a GUI control.
+            float64[N, R] in 0..1; 0 for raw controls that no GUI control drives.
         """
         return np.clip(self.sums(np.asarray(gui, np.float64)), 0.0, 1.0)
 
     @cached_property
     def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
-        """Inputs, outputs, lowest, highest and slopes of a made table, whose lines go through 0."""
+        """Arrays of rows for own_raw: GUI and raw indices, lowest and highest values, slopes."""
         rows = self.rows
         numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
         low, high, slopes = numbers.reshape(-1, 3).T
@@ -157,14 +160,14 @@ class BoardTable:
         return inputs, np.array([row.raw for row in rows], np.intp), low, high, slopes
 
     def own_raw(self, gui: NDArray[np.float32]) -> NDArray[np.float32]:
-        """`raw` of one pose for a table that is_own, at once. Args: gui  float32[G]."""
+        """The raw controls of one pose, for tables with is_own. Args: gui  float32[G]."""
         inputs, outputs, low, high, slopes = self._straight
         given = np.clip(gui[inputs], low, high) * slopes
         raw = np.bincount(outputs, given, self.raw_count)
         return np.clip(raw, 0.0, 1.0).astype(np.float32)
 
     def sums(self, gui: Doubles) -> Doubles:
-        """float64[N, R] as `raw`, before they are held in 0..1. Args: gui  float64[N, G]."""
+        """float64[N, R]: raw controls before clamping to 0..1. Args: gui  float64[N, G]."""
         out = np.zeros((len(gui), self.raw_count))
         for index in range(len(self.names)):
             if self._pieces[index]:
@@ -173,15 +176,16 @@ class BoardTable:
 
 
 def of_file(names: Sequence[str], columns: ArrayLike, raw: int) -> BoardTable:
-    """The table of a file.
+    """Make the table of a file's GUI controls.
 
     Args:
-        names: its GUI controls.
-        columns: float[6, rows] of its conditionals: inputs, outputs, from, to, slopes, cuts.
+        names: names of the GUI controls.
+        columns: float[6, rows] of the file's conditionals: inputs, outputs, from, to, slopes, cuts.
         raw: number of raw controls.
 
     Returns:
-        BoardTable; without rows that are not finite or have an empty range.
+        BoardTable; rows with numbers that are not finite, an empty range or a bad index are left
+        out.
     """
     rows = []
     for numbers in np.asarray(columns, np.float64).T:
@@ -192,12 +196,12 @@ def of_file(names: Sequence[str], columns: ArrayLike, raw: int) -> BoardTable:
 
 
 def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTable:
-    """A table for a file without GUI controls.
+    """Make a table for a file without GUI controls.
 
     Args:
-        labels: the names of its raw controls.
-        lowest: lowest value of each; controls below 0 are components of a rotation and are left
-            out.
+        labels: names of the raw controls.
+        lowest: lowest value of each raw control; controls below 0 are components of a rotation and
+            are left out.
 
     Returns:
         BoardTable of GUI controls with names such as `CTRL_jawOpen.ty`, `CTRL_eyeLookL.tx`.
@@ -221,8 +225,10 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """The control that raises a slider, the one that lowers it or "", and the slider's name with
-    its axis."""
+    """The raw controls that raise and lower a GUI control, and its name with the axis.
+
+    The second is "" if no raw control lowers it.
+    """
     for pair in _OPPOSITES:
         for one, other in (pair, pair[::-1]):
             for found in re.finditer(rf"{one}(?=[A-Z_]|$)", name):

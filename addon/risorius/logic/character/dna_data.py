@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The used members of a DNA file as protocols, which risorius.Dna and test classes implement.
+"""Protocols with the members of a DNA file that the add-on reads.
 
-Arrays are in the file's units and axes.
+`risorius.Dna` and test classes implement them. Arrays are in the file's units and axes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ class TargetData(Protocol):
 
 
 class MeshData(Protocol):
-    """One mesh: V positions, L layouts that faces are made of, offsets into flat lists."""
+    """One mesh: V positions, L layouts, and offsets into flat lists.
+
+    A layout joins the indices of a position, a UV coordinate and a normal.
+    """
 
     @property
     def positions(self) -> NDArray[np.float32]: ...
@@ -54,14 +57,14 @@ class MeshData(Protocol):
 
 
 class LodRows(Protocol):
-    """For each level of detail the numbers of its meshes, uint16[n]."""
+    """For each LOD the indices of its meshes, uint16[n]."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, lod: int, /) -> NDArray[np.uint16]: ...
 
 
 class DnaData(Protocol):
-    """A file with definition, behavior and geometry."""
+    """A DNA file with definition, behavior and geometry."""
 
     @property
     def name(self) -> str: ...

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sliders that are shown first in their region."""
+"""Chooses the sliders that each region shows first; the others are under More."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 from . import slider_words
 from .slider_rows import Row
 
-# At most ten lines for each region, in the order of the panel; other sliders are under More. * is
-# the side. A control to the left shares its line with the one to the right. The choice follows
-# their use in expressions of Risorius, then in captures.
+# Most used controls of each region, in the order of the panel, at most ten rows; * stands for the
+# sides L and R. Left and right share a row. The choice follows the use of controls in the
+# expressions of Risorius, then in captures.
 _FIRST = {
     "brow": (
         "browRaiseIn*",
@@ -90,14 +90,14 @@ _FIRST = {
 
 
 class Parted(NamedTuple):
-    """The lines of a region: shown at once, and under More."""
+    """The rows of a region: shown first, and under More."""
 
     first: list[Row]
     more: list[Row]
 
 
 def table() -> Mapping[str, tuple[str, ...]]:
-    """Region -> names of controls without their prefix, both sides of each, in their order."""
+    """Region -> names of the first controls without prefix, both sides, in the order of display."""
     return _TABLE
 
 
@@ -111,14 +111,14 @@ _TABLE = {region: tuple(_both_sides(names)) for region, names in _FIRST.items()}
 
 
 def part(rows: Sequence[Row], region: str) -> Parted:
-    """The lines of a region, the most used ones first.
+    """Split the rows of a region into most used and other rows.
 
     Args:
-        rows: all lines, in the order of the file.
-        region: their region.
+        rows: all rows of the region, in the order of the file.
+        region: name of the region.
 
     Returns:
-        All rows once. If the table knows none of them, all are shown at once.
+        All rows, each once. If none is among the most used, all are shown first.
     """
     ranks = {name: rank for rank, name in enumerate(table().get(region, ()))}
 

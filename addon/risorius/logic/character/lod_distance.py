@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which level of detail a distance asks for."""
+"""Chooses the level of detail for a distance from the camera."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-SLACK = 0.1  # of a distance: how far beyond it the viewport waits before it switches
+SLACK = 0.1  # share of a distance: the viewport switches levels this much beyond it
 
 
 def default_distances(count: int, size: float) -> list[float]:
-    """Distances at which each level changes to the next: doubling from six times the size of the
-    face.
+    """The distances at which a level changes to the next.
+
+    The first is six sizes of the face, and each of the others is twice its predecessor.
 
     Args:
-        count: of levels.
-        size: of the face, in Blender units.
+        count: number of levels.
+        size: largest extent of the face, in Blender units.
 
     Returns:
-        count - 1 distances, at least one.
+        count - 1 distances in Blender units, at least one.
     """
     return [size * 6.0 * 2.0**level for level in range(max(1, count - 1))]
 
@@ -28,13 +29,13 @@ def level_at(
     built: Sequence[int],
     current: int | None = None,
 ) -> int:
-    """The level to show.
+    """The level of detail to show.
 
     Args:
-        distance: from the camera.
+        distance: distance of the face from the camera, in Blender units.
         distances: distances at which level n changes to level n + 1, ascending.
         built: existing levels, ascending, at least one.
-        current: the level shown now, for hysteresis; None for a plain function of the distance.
+        current: the level that is shown, for hysteresis; None for no hysteresis.
 
     Returns:
         One of `built`: the wanted level, or the next coarser one, or the coarsest.
@@ -42,7 +43,7 @@ def level_at(
     rising = sorted(distances)
     wanted = sum(distance >= d for d in rising)
     if current is not None and wanted != current:
-        # Towards finer levels it must come clearly nearer, towards coarser ones clearly farther.
+        # The level changes only if the distance clearly exceeds or falls below its threshold.
         factor = 1.0 + SLACK if wanted > current else 1.0 - SLACK
         eased = sum(distance >= d * factor for d in rising)
         wanted = max(current, eased) if wanted > current else min(current, eased)

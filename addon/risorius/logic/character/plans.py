@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans of Blender data from a Dna, before any data exist."""
+"""Plans the Blender data of a DNA file: armature, meshes, sliders and textures."""
 
 from __future__ import annotations
 
@@ -44,14 +44,15 @@ class PlanError(FaceError):
 
 @dataclass(frozen=True)
 class ArmaturePlan:
-    """The deforming armature.
+    """The armature that deforms the meshes.
 
     Attributes:
-        labels: bone names, by joint.
-        parents: parent joint, -1 for a root.
-        rest: float64[J, 4, 4] in Blender units, columns are axes.
+        labels: bone names, by joint index.
+        parents: index of each joint's parent, -1 for a root.
+        rest: float64[J, 4, 4], world matrices at rest, in Blender units; the columns are the bone's
+            axes.
         lengths: float64[J] display length of each bone.
-        order: joints with parents first.
+        order: joint indices, with parents before their children.
     """
 
     labels: list[str]
@@ -66,18 +67,19 @@ class MeshPlan:
     """One mesh of the file, in Blender units.
 
     Attributes:
-        index: number in the DNA.
-        label: the name after `<character>_`.
-        base: the name without its LOD: meshes with one base share a material.
+        index: index of the mesh in the DNA file.
+        label: name of the mesh; Blender's object is `<character>_<label>`.
+        base: name without LOD; meshes with the same base share a material.
         kind: skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
-        lods: levels of detail that show it.
+        lods: levels of detail that show the mesh.
         positions: float32[V, 3].
         face_starts: int32[F], first corner of each face.
         corners: int32[N], vertex of each corner.
         uvs: float32[N, 2] per corner, or None.
         normals: float32[N, 3] per corner, or None.
-        skin_offsets, skin_joints, skin_weights: influences of vertex v are offsets[v]..[v + 1].
-        channels: channel index of each target.
+        skin_offsets, skin_joints, skin_weights: skin_offsets[v] to skin_offsets[v + 1] are the
+            influences of vertex v.
+        channels: blend shape channel index of each of the mesh's targets.
     """
 
     index: int
@@ -98,7 +100,7 @@ class MeshPlan:
 
 @dataclass(frozen=True)
 class ControlPlan:
-    """One slider: its property name, and the words that it is shown with."""
+    """One slider: its index, property name, tooltip, rest value and lowest value."""
 
     index: int
     label: str
@@ -109,7 +111,7 @@ class ControlPlan:
 
 @dataclass(frozen=True)
 class Anchors:
-    """Joints that the bones of the control armature turn; empty or None if missing."""
+    """The joints that bones of the control armature rotate; empty or None if missing."""
 
     neck: tuple[int, ...]
     head: int | None
@@ -118,7 +120,7 @@ class Anchors:
 
 @dataclass(frozen=True)
 class CharacterPlan:
-    """Everything that is built for one file."""
+    """All data that the add-on builds for one file."""
 
     name: str
     space: Space
@@ -144,7 +146,7 @@ def kind_of(mesh_name: str) -> str:
 
 
 def layer_warnings(layers: Sequence[str]) -> list[str]:
-    """Warnings about layers that are not evaluated."""
+    """Warnings about the file's layers that the evaluator leaves out."""
     words = [_LAYER_WORDS.get(layer) or told("layer '{name}'", name=layer) for layer in layers]
     return [told("Not evaluated yet: {what}", what=word) for word in dict.fromkeys(words)]
 
@@ -154,7 +156,7 @@ def space_of(dna: DnaData, unit_scale: float) -> Space:
 
     Args:
         dna: the face.
-        unit_scale: metres per unit of the scene.
+        unit_scale: metres per Blender unit of the scene.
     """
     return make_space(
         dna.coordinate_system,
@@ -168,7 +170,7 @@ def space_of(dna: DnaData, unit_scale: float) -> Space:
 
 
 def find_anchors(joint_names: Sequence[str]) -> Anchors:
-    """The neck, head and eye joints by their usual names, whatever their case."""
+    """Find the neck, head and eye joints by their usual names, in any case."""
     where: dict[str, int] = {}
     for index, name in enumerate(joint_names):
         where.setdefault(name.lower().replace(".", "_"), index)
@@ -192,20 +194,21 @@ def plan_character(
     unit_scale: float = 1.0,
     rests: Sequence[float] | NDArray[np.float32] = (),
 ) -> CharacterPlan:
-    """Describe the character of a file.
+    """Plan the character of a file.
 
     Args:
         dna: a risorius.Dna with definition, behavior and geometry.
         fallback_name: used if the file has no name.
         lods: levels of detail to build.
         unit_scale: metres per Blender unit.
-        rests: raw controls at rest, see plan_controls.
+        rests: values of raw controls at rest, see plan_controls.
 
     Returns:
-        The plan; nothing in it refers to `dna`.
+        The plan; it keeps no reference to `dna`.
 
     Raises:
-        PlanError: the file has nothing to build, or an index is outside its array.
+        PlanError: the file has no geometry, joints, meshes at these LODs or vertices, or its data
+            are invalid.
         SpaceError: unknown axes or units.
     """
     if not dna.meshes or not dna.mesh_names:
@@ -255,7 +258,7 @@ def _mesh_lods(dna: DnaData) -> list[tuple[int, ...]]:
 
 
 def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
-    """The levels of `wanted` with meshes in a file, or its finest one.
+    """The levels of `wanted` for which the file has meshes, or the file's finest level.
 
     Args:
         dna: the face.
@@ -272,8 +275,8 @@ def plan_controls(
 
     Args:
         raw_names: names of all raw controls.
-        rests: their rest values, 0 beyond its end. A 1 marks the w of a quaternion for the file's
-            solvers: all components of that quaternion range from -1 to 1.
+        rests: their rest values; missing ones are 0. A rest other than 0 marks the w of a
+            quaternion for the file's solvers: all components of that quaternion range from -1 to 1.
     """
     labels = names.unique_labels(raw_names)
     values = [float(r) for r in rests] + [0.0] * (len(raw_names) - len(rests))
@@ -306,7 +309,7 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # A very short bone would lose the direction of its axis in float32.
+    # A very short bone loses the direction of its axis in float32.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:
@@ -406,7 +409,10 @@ def _plan_mesh(
 def _faces(
     mesh: MeshData, layouts: NDArray[np.int64], flip: bool
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Face starts and the layout of each corner; faces that have no area are left out."""
+    """First corner of each face, and layout of each corner.
+
+    Faces with fewer than 3 corners or a repeated vertex are left out.
+    """
     bounds = np.asarray(mesh.face_offsets, np.int64)
     flat = np.asarray(mesh.face_layouts, np.int64)
     _check(flat, len(layouts), "faces")
@@ -425,7 +431,7 @@ def _faces(
 def _corner_values(
     values: NDArray[np.float32], layout: NDArray[np.uint32], corners: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Values per corner through the layout, or None where the file has none that fit."""
+    """Values of the face corners, or None if the file has none or the layout leaves its array."""
     if not len(values) or not len(corners) or int(corners.max()) >= len(layout):
         return None
     indices = np.asarray(layout, np.int64)[corners]

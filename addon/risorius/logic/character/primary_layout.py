@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The drawing of the primary board: a face, with frames and labels of its handles."""
+"""Draws the primary board: the outline of a face, with frames and labels of its handles."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from . import board_layout, board_letters, primary_table
 from .board_layout import DOWN, LEFT, RIGHT, UP, Board, Direction, Handle, Line
 from .board_table import BoardTable
 
-_TEXT, _LINE = 0.26, 0.36  # heights of letters and of lines
-_GAP, _DISC = 0.12, 0.32  # from a frame to its label, and from where a handle rests
-# A unit of the board and its distance, chosen so that head and board fill a view side by side.
+_TEXT, _LINE = 0.26, 0.36  # heights of letters and of lines, in board units
+_GAP, _DISC = 0.12, 0.32  # from a frame to its label; radius of a handle at rest
+# A board unit, and the distance of the board from the head, both as shares of the head's height. So
+# head and board fill a view side by side.
 _UNIT, _AWAY = 0.122, 0.07  # over the height of the head
-_MARGIN = 0.1  # around all
-_SMOOTH = 6  # pieces between two corners of an outline
-# One half of the face, from the forehead down to the chin.
+_MARGIN = 0.1  # around the board
+_SMOOTH = 6  # segments between two corners of an outline
+# Right half of the face's outline, from the forehead down to the chin, in board units.
 _FACE = (
     (0.0, 6.52), (1.6, 6.5), (3.35, 6.28), (4.45, 5.5), (4.82, 4.0), (4.8, 1.6), (4.72, -1.0),
     (4.55, -3.4), (4.15, -5.0), (3.3, -6.3), (2.2, -6.95), (0.0, -7.0),
 )  # fmt: skip
-# The middle of the tongue, half its width, its root, where its tip begins and how far that goes.
+# Tongue: x of its middle, half its width, y of its root, y at which the tip begins, length of the
+# tip.
 _TONGUE = (6.0, 1.05, 2.95, -5.2, 0.7)
 
 
@@ -49,14 +51,15 @@ def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
 
 
 def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], float]:
-    """The place of the board: close to the head, in the plane of the face.
+    """Place the board beside the head, in the plane of the face.
 
     Args:
-        low, high: float[3] bounding box of the head; the face looks along -y.
-        width: of the board.
+        low, high: float[3], corners of the bounding box of the head in Blender units; the face
+            looks along -y.
+        width: width of the board, in board units.
 
     Returns:
-        Its centre, and the length of one of its units.
+        Centre of the board, and the length of a board unit in Blender units.
     """
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     tall = float(high[2] - low[2]) or 1.0
@@ -65,13 +68,13 @@ def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], 
 
 
 def _words(text: str, side: str) -> str:
-    """Both ends of a label in their order on a side."""
+    """A label with both ends named: in reverse order on the right side."""
     ends = text.split(" | ")
     return "   ".join(reversed(ends) if side == "R" else ends)
 
 
 def _label(handle: Handle, rows: Sequence[str], at: Direction) -> Iterator[Line]:
-    """The words of a handle beside, above or below its frame."""
+    """The letters of a handle's label beside, above or below its frame."""
     left, bottom, right, top = board_layout.frame_of(handle)
     left, bottom = min(left, _GAP - _DISC), min(bottom, _GAP - _DISC)
     right, top = max(right, _DISC - _GAP), max(top, _DISC - _GAP)
@@ -99,7 +102,7 @@ def _outlines() -> Iterator[Line]:
 
 
 def _smooth(corners: Sequence[tuple[float, float]]) -> Line:
-    """A curve through corners (Catmull and Rom's)."""
+    """A smooth curve through all corners (Catmull-Rom)."""
     points = np.array([corners[0], *corners, corners[-1]])
     out = [corners[0]]
     for a, b, c, d in zip(points, points[1:], points[2:], points[3:], strict=False):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The primary board: some 30 handles arranged like a face, each for several controls.
+"""The primary board: about 30 handles arranged like a face, each for several controls.
 
-A handle's location on its own axes is a value from -1 to 1, and each half of an axis sets controls
-with weights. So it is a table of GUI controls like that of a file, made from names of raw controls.
-Missing controls are left out, and so are halves, axes and handles without controls. Controls
-without a handle keep their sliders.
+A handle's location along each of its axes is a value from -1 to 1, and each half of an axis drives
+raw controls with weights. The result is a table of GUI controls like a file's, made from names of
+raw controls. Raw controls that a face lacks are left out, and so are halves, axes and handles
+without controls. Raw controls without a handle keep their sliders.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from .board_layout import DOWN, LEFT, RIGHT, UP, Axis, Direction, Handle
 from .board_letters import Point
 from .board_table import BoardTable, Row
 
-Led = Mapping[str, float]  # raw controls without prefix and side, and what of a value each gets
-_CLEAR = 0.05  # a movement to one side that is less tells nothing
+Led = Mapping[str, float]  # raw control without prefix and side -> weight
+_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,14 @@ class Part:
     """A handle of the face, or a pair of handles.
 
     Attributes:
-        stem: its name without the side.
-        label: its words on the board, in short lines; `inwards | outwards` names both ends.
-        region: of the face.
-        place: its rest place on the board; for a pair the one on the character's left.
+        stem: name of the handle without its side.
+        label: words on the board, in short lines; `inwards | outwards` names both ends.
+        region: region of the face.
+        place: rest place on the board; for a pair, the place of the handle on the character's left.
         paired: True: one handle for each side; False: one handle for both sides.
-        up, down, out, inward: controls of the halves of its axes; for a single handle `out` is the
-            character's left.
-        label_at: the side of the label; for a pair that of the left handle.
+        up, down, out, inward: raw controls of each half of the axes; for a single handle, `out` is
+            the character's left.
+        label_at: side of the frame on which the label is placed; for a pair, of the left handle.
     """
 
     stem: str
@@ -53,8 +53,7 @@ PARTS = (
     Part("brow_inner", ("Brow", "Inner"), "brow", (1.75, 5.2), True,
          up={"browRaiseIn": 1.0}, down={"browDown": 1.0}, inward={"browLateral": 1.0},
          label_at=RIGHT),
-    # The face has one control that lowers a brow; this handle combines it with the raised inner
-    # end.
+    # The face has only one control that lowers a brow, so both brow handles drive it.
     Part("brow_outer", ("Brow Outer",), "brow", (3.35, 5.2), True,
          up={"browRaiseOuter": 1.0}, down={"browDown": 1.0}),
     Part("gaze", ("Gaze",), "eye", (0.0, 2.75), False,
@@ -106,7 +105,7 @@ PARTS = (
 
 @dataclass(frozen=True)
 class _Way:
-    """An axis of a handle: its name as a GUI control's, and the weights of its two halves."""
+    """An axis of a handle: name of its GUI control, raw control -> weight of its two halves."""
 
     name: str
     rises: dict[int, float]
@@ -114,19 +113,19 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The bone of a handle. Args: part the handle; side "L" or "R", "" for none.
+    """The name of a handle's bone. Args: part the handle; side "L" or "R", "" for none.
 
-    The side is in the middle of the name, where Blender does not find it, because Blender mirrors
-    about the centre of the armature and not of the board.
+    The side is in the middle of the name, where Blender does not recognise it, because Blender
+    would mirror about the centre of the armature and not of the board.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
 
 def table_of(labels: Sequence[str]) -> BoardTable:
-    """The table of a face.
+    """Make the table of the primary board.
 
     Args:
-        labels: the names of its raw controls.
+        labels: names of the face's raw controls.
 
     Returns:
         BoardTable with GUI controls named after the bones: `face_L_mouth_corner.ty`.
@@ -152,7 +151,7 @@ def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
 
 
 def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
-    """Indices of the controls that a half leads to, with their weights."""
+    """Index of each raw control that half an axis drives -> weight."""
     out: dict[int, float] = {}
     for stem, share in led.items():
         wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")
@@ -163,12 +162,12 @@ def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
 def handles_of(
     table: BoardTable, sideways: Mapping[int, float], taken: Iterable[str] = ()
 ) -> list[Handle]:
-    """The handles of a table with their places on the board.
+    """Make the handles of the primary board with their places.
 
     Args:
         table: from table_of.
-        sideways: GUI control -> measured motion of the face to its own left.
-        taken: names that bones must not get.
+        sideways: GUI control -> measured motion of the face to its own left, -1 to 1.
+        taken: bone names that are in use.
     """
     index = {name: gui for gui, name in enumerate(table.names)}
     found = []
@@ -191,7 +190,7 @@ def handles_of(
 
 
 def sides_of(table: BoardTable) -> Iterator[tuple[Part, str]]:
-    """The parts that a table has handles of, with the side of each. Args: table  from table_of."""
+    """The parts whose handles are in a table, each with its side. Args: table  from table_of."""
     there = {name.rpartition(".")[0] for name in table.names}
     for part in PARTS:
         for side in "LR" if part.paired else ("",):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sliders in rows, with left and right."""
+"""Arranges sliders in rows, with left and right side by side; mirrors and copies their values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ class Row:
 
     Attributes:
         title: text before the sliders.
-        sliders: controls from left to right; two are the sides of a control, or its two directions.
+        sliders: controls from left to right; a pair is left and right of one control, or its two
+            directions.
     """
 
     title: str
@@ -27,19 +28,19 @@ class Row:
 
     @property
     def is_pair(self) -> bool:
-        """Whether one of the sliders is the left one, and one the right."""
+        """Whether the row shows two sliders, a left one and a right one."""
         return len(self.sliders) == 2
 
 
 def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bool) -> list[Row]:
-    """The rows of a region.
+    """Arrange the controls of a region in rows.
 
     Args:
-        names: controls of the region, in their order.
-        region: their region.
+        names: names of the region's controls, in their order.
+        region: name of the region.
         regions: regions of the face, which know partners.
-        as_seen: True: left is as seen by the viewer; False: the character's own left. Names and
-            places follow it.
+        as_seen: True: left is the viewer's left; False: the character's left. Titles and order of
+            the sliders follow it.
 
     Returns:
         Each control once: the two sides of a control, or its left and right direction, share a row.
@@ -77,7 +78,8 @@ def is_left(name: str, by_side: bool = True) -> bool:
 
     Args:
         name: name of a control with a partner.
-        by_side: True: use the side at the end of the name, so that eyeLookLeftR is not left.
+        by_side: True: use the side at the end of the name, so eyeLookLeftR is not left; False: use
+            the direction, so it is left.
     """
     last = slider_words.short_name(name)
     found = _LEFT.findall(last)
@@ -87,15 +89,15 @@ def is_left(name: str, by_side: bool = True) -> bool:
 def across_from(
     values: Mapping[str, float], regions: FaceRegions, from_left: bool
 ) -> dict[str, float]:
-    """The values of the other side that make both sides alike.
+    """Copy the values of one side to the other.
 
     Args:
         values: values of existing controls by name.
-        regions: of the face.
-        from_left: True: copy the character's left side.
+        regions: regions of the face.
+        from_left: True: copy the character's left to its right; False: right to left.
 
     Returns:
-        The new values of the other side; the gaze stays. Controls without a side are left out.
+        The new values of the other side. Controls without a side are left out.
     """
     found = {}
     for name, value in values.items():
@@ -106,34 +108,34 @@ def across_from(
 
 
 def mirrored(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
-    """Values with left and right swapped.
+    """Swap the left and right values of a face's controls.
 
     Args:
-        values: of controls, by name.
-        regions: of the face.
+        values: values of controls by name.
+        regions: regions of the face.
 
     Returns:
-        The same controls; a control without an existing partner keeps its value.
+        The same controls; a control whose partner has no value keeps its value.
     """
     return {name: values.get(regions.mirrored(name), value) for name, value in values.items()}
 
 
 def flipped(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
-    """A copied pose with left and right swapped, for a face that may have other controls.
+    """Swap left and right in a copied pose; the names may include controls that the face lacks.
 
     Args:
-        values: of controls, by name.
-        regions: of the face.
+        values: values of controls by name.
+        regions: regions of the face.
     """
     return {regions.mirrored(name): value for name, value in values.items()}
 
 
 def pairs(names: Collection[str], regions: FaceRegions) -> list[tuple[str, str]]:
-    """Pairs of controls of the character's left and right side.
+    """Pairs (left, right) of controls on the two sides of the character.
 
     Args:
-        names: of all controls.
-        regions: of the face.
+        names: names of all controls.
+        regions: regions of the face.
     """
     found = ((name, regions.across(name)) for name in names if is_left(name))
     return [(left, right) for left, right in found if left != right and right in names]

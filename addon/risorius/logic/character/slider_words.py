@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words for sliders, and the regions that they are shown under."""
+"""Titles of sliders, their search, and their assignment to regions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..base.face_regions import FaceRegions
 
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
-# Endings of names: upper and lower lip or teeth, inner and outer part, phase.
+# Meanings of endings of names: upper and lower, centre, inner and outer, phase, forward.
 _WORDS = {
     **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
     **{"Ph": "Phase ", "Fwd": "Forward"},
@@ -32,13 +32,13 @@ def title(control: str) -> str:
 
 
 def title_in_region(control: str, region: str, sided: bool = True, swapped: bool = False) -> str:
-    """The label of a slider in its region, without the name of the region: `Corner Pull L`.
+    """The title of a slider under its region's heading, without the region's name: `Corner Pull L`.
 
     Args:
-        control: the control's name.
-        region: its region.
-        sided: keep a final L or R; False: both sides share the label.
-        swapped: swap left and right, for the viewer.
+        control: name of the control.
+        region: name of the region.
+        sided: True: keep a final L or R; False: both sides share the label.
+        swapped: swap left and right, as seen by the viewer.
     """
     text, side = _without_side(title(control))
     if swapped:
@@ -49,18 +49,21 @@ def title_in_region(control: str, region: str, sided: bool = True, swapped: bool
 
 
 def title_of_directions(control: str, region: str) -> str:
-    """The common label of a control to the left and its partner to the right.
+    """The common label of two controls that move to the left and to the right.
 
     Args:
-        control: one of them.
-        region: their region.
+        control: one of the two controls.
+        region: region of both.
     """
     words = ["Sideways" if word in _OTHER else word for word in title(control).split()]
     return _below(" ".join(words), region)
 
 
 def _without_side(text: str) -> tuple[str, str]:
-    """`Press UL` gives `Press U`, `L`; `Lips Sticky LPh1` gives `Lips Sticky Ph1`, `L`."""
+    """Split off the side: `Press UL` gives (`Press U`, `L`).
+
+    `Lips Sticky LPh1` gives (`Lips Sticky Ph1`, `L`).
+    """
     found = _SIDE.search(text)
     if not found:
         return text, ""
@@ -68,21 +71,21 @@ def _without_side(text: str) -> tuple[str, str]:
 
 
 def _below(text: str, region: str) -> str:
-    """A title without its region's name, and with abbreviations in words."""
+    """A title without the name of its region, and with abbreviations written out."""
     first, _, rest = text.partition(" ")
     text = rest if rest and first.lower() == region else text
     return " ".join(_SHORT.sub(lambda part: _WORDS[part[0]], text).split())
 
 
 def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, list[int]]:
-    """Indices of the controls of each region.
+    """Group the indices of controls by region.
 
     Args:
         controls: control names in index order.
-        regions: of the face.
+        regions: regions of the face.
 
     Returns:
-        Region -> indices in their order, regions in their order, none empty.
+        Region -> indices in ascending order; regions in the order of display, without empty ones.
     """
     groups: dict[str, list[int]] = {region: [] for region in regions.titles}
     for index, control in enumerate(controls):
@@ -91,13 +94,13 @@ def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, l
 
 
 def matches(control: str, search: str, known: str = "") -> bool:
-    """Whether every word of the search occurs in the names of a control.
+    """Whether a control matches every word of a search.
 
     Args:
-        control: its name; a word may occur anywhere in it or in its title.
-        search: typed text.
-        known: further words of animators; these must begin with the typed text, so that "ear" does
-            not find "fear".
+        control: name of the control; a search word may occur anywhere in the name or its title.
+        search: the typed search.
+        known: further search words of the control; the typed word must be the beginning of one, so
+            that "ear" does not find "fear".
     """
     text, more = f"{control} {title(control)}".casefold(), known.casefold().split()
     return all(

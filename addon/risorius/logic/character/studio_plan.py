@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places of camera, lights and backdrop of a portrait around a head.
+"""Places camera, lights and backdrop of a portrait around a head.
 
-All places are in the head's own axes: the face looks along -y, z is up, the origin is between the
-eyes. Numbers follow portrait photography, in metres for an adult head, and scale with the distance
-between the eyes.
+All places are in the head's axes: the face looks along -y, z is up, the origin is between the eyes.
+The numbers are in metres for an adult head, and scale with the distance between the eyes.
 """
 
 from __future__ import annotations
@@ -14,19 +13,19 @@ from dataclasses import dataclass
 
 Triple = tuple[float, float, float]
 
-GROWN = 0.063  # metres between the eyes of the head that the numbers are made for
+GROWN = 0.063  # metres between the eyes of the adult head
 LENS = 100.0  # mm: a portrait lens on SENSOR
-SENSOR = 24.0  # mm, height of a full frame; the frame's height is what is fitted
-_HEIGHT = 0.39  # of the picture at the eyes: head and shoulders
-_HEADROOM = 0.014  # at least, above the hair
-_EDGE = 0.02  # the picture ends so far above the mesh's lower end
-_CHIN = 0.13  # below the eyes, and in any picture
-_NECK = 0.185  # below the eyes: what ends above it has no neck, and is shown whole
-_THIRD = 1.0 / 3.0  # the eyes' place from the upper edge
-_ASIDE = 8.0  # degrees: the camera sees more of the side that the key leaves to the fill
-_ABOVE = 0.045  # the camera's height above the eyes
-_DEPTH = 0.075  # from the eyes back to the middle of the head, which stands in the middle
-_WALL = 1.7  # from there to the backdrop
+SENSOR = 24.0  # mm: height of a full frame sensor
+_HEIGHT = 0.39  # metres: height of the picture at the eyes, head and shoulders
+_HEADROOM = 0.014  # metres above the hair, at least
+_EDGE = 0.02  # metres from the lower edge of the picture to the lower end of the mesh
+_CHIN = 0.13  # metres below the eyes that every picture contains
+_NECK = 0.185  # metres below the eyes: a mesh that ends above has no neck
+_THIRD = 1.0 / 3.0  # distance of the eyes from the upper edge, as a share of the picture
+_ASIDE = 8.0  # degrees: turns the camera to the side of the fill light
+_ABOVE = 0.045  # metres: height of the camera above the eyes
+_DEPTH = 0.075  # metres from the eyes back to the middle of the head
+_WALL = 1.7  # metres from the middle of the head to the backdrop
 _WALL_SIZE = (6.0, 4.0)
 
 
@@ -35,11 +34,11 @@ class Lamp:
     """One softbox.
 
     Attributes:
-        name: its name in photography.
-        place: of its centre; it points at the origin.
-        size: width and height.
+        name: key, fill or rim light.
+        place: centre of the softbox; it points at the origin.
+        size: width and height, in Blender units.
         watts: radiant power.
-        colour: linear, in [0, 1].
+        colour: linear RGB, 0 to 1.
     """
 
     name: str
@@ -51,16 +50,16 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Studio:
-    """A portrait's setting.
+    """The setting of a portrait; lengths and places in Blender units.
 
     Attributes:
-        camera: its place.
+        camera: place of the camera.
         target: centre of the picture.
-        lens: mm, on a sensor SENSOR high.
+        lens: focal length in mm, for a sensor with a height of SENSOR mm.
         lamps: key, fill and rim.
         wall: centre of the backdrop, behind the head as seen from the camera.
-        wall_turn: rotation about z in radians towards the camera.
-        wall_size: its width and height.
+        wall_turn: rotation of the backdrop about z in radians, towards the camera.
+        wall_size: width and height of the backdrop.
         glow: radius of the lighter centre of the backdrop.
     """
 
@@ -75,8 +74,8 @@ class Studio:
 
 
 _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
-# Degrees to the viewer's right and up, distance in metres, width and height, light at the face as a
-# share of the key light, colour. Fill: two stops under the key.
+# Name, degrees to the viewer's right, degrees up, distance in metres, width and height in metres,
+# light at the face as a share of the key light, colour. The fill is two stops below the key.
 _LAMPS: tuple[_Row, ...] = (
     ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
@@ -86,14 +85,14 @@ _EXPOSURE = 4.6  # irradiance of the key at the face, in W/m2
 
 
 def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
-    """The setting of a head.
+    """Plan the setting for a head.
 
     Args:
         apart: distance between the eyes, in Blender units.
-        low, high: corners of the box around all meshes of the face.
+        low, high: corners of the bounding box of all meshes of the face, in the head's axes.
 
     Raises:
-        ValueError: a distance that is not above 0.
+        ValueError: `apart` is not above 0.
     """
     if not apart > 0.0 or not math.isfinite(apart):
         raise ValueError(f"apart: a distance above 0 was expected, found {apart!r}")
@@ -120,10 +119,10 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 
 
 def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
-    """Height of the picture, and the height of its centre above the eyes.
+    """Height of the picture, and height of its centre above the eyes.
 
-    The eyes lie on the upper third, unless hair needs more room. A face with a neck fills the
-    picture to its lower edge; a face that ends at the chin is shown whole.
+    The eyes are at the upper third, unless hair needs more room. The picture of a face with a neck
+    ends above the lower end of its mesh; a face without a neck is shown completely.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
     if -low <= _NECK * unit:
@@ -133,11 +132,11 @@ def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
 
 
 def has_neck(apart: float, low: float) -> bool:
-    """Whether there is a neck, or more, for the picture's lower edge to cut.
+    """Whether the mesh of a face includes a neck.
 
     Args:
         apart: distance between the eyes.
-        low: height of the lowest point over the eyes.
+        low: height of the lowest point relative to the eyes.
     """
     return -low > _NECK * apart / GROWN
 
@@ -150,6 +149,6 @@ def _lamp(row: _Row, unit: float) -> Lamp:
         -far * math.cos(lift) * math.cos(turn),
         far * math.sin(lift),
     )
-    # A softbox of W watts sends W / pi towards its axis, and W / (pi far^2) arrive.
+    # A softbox of W watts emits W / pi along its axis, and W / (pi far^2) arrive at the face.
     watts = share * _EXPOSURE * math.pi * far * far
     return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

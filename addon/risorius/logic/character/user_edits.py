@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's edits, relative to the import, and their transfer.
+"""Finds the user's edits of positions and shape keys, and prepares their transfer.
 
-A number counts as edited if it differs bit for bit from the import of the original file. Only where
-Blender moved a shape key with the basis, the rounding of two float32 additions is allowed.
+A number counts as edited if it differs bit for bit from the import of the original file. If Blender
+moved a shape key together with the basis, rounding of two float32 additions is allowed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Mask = NDArray[np.bool_]
 
 
 def changed(present: Float32, imported: Float32) -> Mask:
-    """Which coordinates of positions differ from the imported ones, bool[V, 3].
+    """Find the coordinates that differ from the imported ones, bool[V, 3].
 
     Args:
         present, imported: float32[V, 3].
@@ -27,12 +27,12 @@ def changed(present: Float32, imported: Float32) -> Mask:
 
 
 def shaped(basis: Float32, indices: NDArray[np.int64], deltas: Float32) -> Float32:
-    """Coordinates of a shape key as the import makes them: the basis plus sparse deltas.
+    """Positions of a shape key after import: the basis plus sparse deltas.
 
     Args:
         basis: float32[V, 3].
-        indices: int64[n], vertices that move.
-        deltas: float32[n, 3], by how much.
+        indices: int64[n], indices of vertices that move.
+        deltas: float32[n, 3], offsets of these vertices.
     """
     points = basis.copy()
     np.add.at(points, indices, deltas)
@@ -42,24 +42,23 @@ def shaped(basis: Float32, indices: NDArray[np.int64], deltas: Float32) -> Float
 def key_edits(
     basis: Float32, points: Float32, imported_basis: Float32, wanted: Float32
 ) -> tuple[Mask, Float]:
-    """The edits of a shape key.
+    """Find the vertices of a shape key that the user edited.
 
     Args:
         basis: float32[V, 3] the current basis.
         points: float32[V, 3] the current key.
         imported_basis: float32[V, 3] the imported basis.
-        wanted: float32[V, 3] `shaped(basis, ...)` of the key's channel.
+        wanted: float32[V, 3], `shaped(basis, ...)` with the deltas of the key's channel.
 
     Returns:
-        bool[V], and float64[V, 3]: difference between the key's delta and the channel's; 0
-        elsewhere.
+        bool[V], edited vertices, and float64[V, 3], the offset of each from `wanted`; 0 elsewhere.
     """
     differs = points != wanted
     if not differs.any():
         return np.zeros(len(points), np.bool_), np.zeros(points.shape)
-    # An edit of the basis moves a key by the same offset, in float32: four sums, here and
-    # there, are each rounded to half a unit in the last place: two units of the largest number
-    # among them.
+    # Blender moves a key by the same offset as the basis, in float32. Four sums are rounded, here
+    # and in Blender, each by at most half a unit in the last place: two units of the largest
+    # number.
     before = imported_basis + (wanted - basis)
     largest = np.max(np.abs([basis, imported_basis, points, wanted, before]), axis=0)
     rounding = 2.0 * np.spacing(largest)
@@ -77,14 +76,14 @@ def index_map(old: Sequence[str], new: Sequence[str]) -> list[int]:
 
 
 def barycentric(points: Float, corners: Float) -> Float:
-    """Weights of a triangle's corners at points of its plane.
+    """Barycentric weights of points in triangles.
 
     Args:
-        points: float64[n, 3].
-        corners: float64[n, 3, 3] a triangle for each point.
+        points: float64[n, 3], in the plane of their triangles.
+        corners: float64[n, 3, 3], corners of the triangle of each point.
 
     Returns:
-        float64[n, 3], each row at least 0 and of sum 1; a triangle without area gives thirds.
+        float64[n, 3], at least 0, with a sum of 1 per row; 1/3 each for a triangle without area.
     """
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = points - corners[:, 0]
@@ -100,14 +99,14 @@ def barycentric(points: Float, corners: Float) -> Float:
 
 
 def sizes(moves: Float, unit: float) -> tuple[int, float, float]:
-    """Number, largest and mean length of moves.
+    """Number, largest and mean length of offsets.
 
     Args:
-        moves: float64[n, 3] Blender units.
+        moves: float64[n, 3], offsets in Blender units.
         unit: metres per Blender unit.
 
     Returns:
-        n, largest and mean in millimetres; 0 without moves.
+        n, and largest and mean length in mm; 0 for an empty array.
     """
     if not len(moves):
         return 0, 0.0, 0.0
@@ -120,15 +119,16 @@ def replace_totals(
     vertices: NDArray[np.int64],
     totals: Float32,
 ) -> list[tuple[NDArray[np.uint32], Float32]]:
-    """Change the sparse targets of a channel to given sums at some vertices.
+    """Change the sparse targets of a channel so that its deltas have given sums at some vertices.
 
     Args:
         targets: (vertex indices, deltas float32[K, 3]) of each target, at least one.
         vertices: int64[n] ascending, where the sum changes.
-        totals: float32[n, 3] the new sums there.
+        totals: float32[n, 3], the new sums at these vertices.
 
     Returns:
-        The targets with all other deltas unchanged; new vertices are added to the first one.
+        The targets; deltas of other vertices stay, and vertices without a delta are added to the
+        first target.
     """
     row_of = {int(v): row for row, v in enumerate(vertices)}
     placed: set[int] = set()
@@ -137,7 +137,8 @@ def replace_totals(
         written = deltas.copy()
         for place, vertex in enumerate(indices.tolist()):
             if vertex in row_of:
-                # Write a repeated vertex once and 0 otherwise, because the sum counts.
+                # Write the total for the first occurrence of a vertex and 0 for others, because
+                # deltas add up.
                 written[place] = 0.0 if vertex in placed else totals[row_of[vertex]]
                 placed.add(vertex)
         result.append((indices, written))
@@ -147,7 +148,7 @@ def replace_totals(
         added = totals[[row_of[int(v)] for v in missing]]
         joined = np.concatenate([indices, missing.astype(indices.dtype)])
         rows = np.concatenate([deltas, added])
-        if np.all(indices[1:] > indices[:-1]):  # a file that keeps them in order stays so
+        if np.all(indices[1:] > indices[:-1]):  # keep ascending order
             order = np.argsort(joined, kind="stable")
             joined, rows = joined[order], rows[order]
         result[0] = (joined, rows)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which textures and animated maps a material has, read from names and shapes."""
+"""Textures and animated maps of materials, found by names and by the form of the face."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The effect of an animated map on the skin, from its name."""
+"""Reads the effect of an animated map on the skin from its name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# The order decides: cheekRaiseInner belongs to the smile, cheekRaiseUpper to the eye.
+# The first match decides: cheekRaiseInner belongs to the smile, cheekRaiseUpper to the eye.
 _AREA_WORDS = (
     ("forehead", ("browsraise", "browraise", "forehead")),
     ("glabella", ("brow", "frown", "glabella")),
@@ -19,7 +19,7 @@ _AREA_WORDS = (
     ("lips", ("lip", "purse", "pucker", "mouth", "funnel")),
 )
 AREAS = ("forehead", "glabella", "eye", "nose", "smile", "lips", "chin", "neck")
-# How the folds of an area run: lines along x, lines along z, rays from the
+# Course of the folds in each area: lines along x (level), lines along z (upright), rays from the
 # eye, an arc around the mouth, or dimples.
 FOLDS = {
     "forehead": "level",
@@ -44,13 +44,14 @@ class MapUse:
     """One animated map.
 
     Attributes:
-        index: number in the file.
+        index: index of the map in the file.
         label: its name.
-        color, normal: whether it changes the colour, the normals, or both.
+        color, normal: whether the map changes the colour and the normals.
         number: 1 to 3 for a wrinkle set, 0 for none.
-        region: as in `head_wm1_blink_l`, lower case; empty if the name has none.
-        area: one of AREAS, or all.
-        side: L, R or empty.
+        region: name of its mask such as `head_wm1_blink_l`, lower case; "" if the map's name has
+            none.
+        area: one of AREAS, or "all".
+        side: "L", "R" or "".
     """
 
     index: int
@@ -64,10 +65,10 @@ class MapUse:
 
 
 def use_of(index: int, label: str) -> MapUse:
-    """The effect of a map: `head_cm1_color.head_wm1_blink_L` tints the left eye with set 1.
+    """The effect of a map: `head_cm1_color.head_wm1_blink_L` tints the left eye's area with set 1.
 
     Args:
-        index: of the map in the DNA.
+        index: index of the map in the DNA file.
         label: name of the map.
     """
     word = label.lower()
@@ -80,7 +81,7 @@ def use_of(index: int, label: str) -> MapUse:
     if not (color or normal):
         color = normal = True
     elif color and not any(w in word for w in _NORMAL_WORDS):
-        normal = False  # head_cm1_color.head_wm1_...: the region bears the name of its mask
+        normal = False  # head_cm1_color.head_wm1_...: "wm" here is part of the mask's name
     return MapUse(
         index=index,
         label=label,
@@ -94,7 +95,7 @@ def use_of(index: int, label: str) -> MapUse:
 
 
 def area_of(name: str) -> str:
-    """The area of a face in a region's name; `all` if it names none."""
+    """The area of the face that a region's name indicates, or "all"."""
     word = name.lower()
     for area, starts in _AREA_WORDS:
         if any(s in word for s in starts):

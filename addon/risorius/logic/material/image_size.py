@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How large a picture is, read from the head of its file: before anybody makes room for it."""
+"""Reads the size of a picture from its file header, so that it can be checked before loading."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from collections.abc import Callable
 
 Read = Callable[[int, int], bytes]
 
-_JPEG_PARTS = 4000  # of which one says the size; real files have some twenty
+_JPEG_PARTS = 4000  # most segments to read; real files have about 20 before the size
 _EXR_ATTRIBUTES = 1000
 _TIFF_TAGS = 4000
 
 
 def size_of(read: Read) -> tuple[int, int, int] | None:
-    """Width, height, and Blender's bytes for a pixel.
+    """Width and height in pixels, and the bytes that Blender needs per pixel.
 
     Args:
         read: returns up to a given number of bytes of the file from an offset.
 
     Returns:
-        None if it is no PNG, JPEG, BMP, WebP, TIFF, OpenEXR or Targa, or its header is damaged.
+        None if the file is no PNG, JPEG, BMP, WebP, TIFF, OpenEXR or Targa, or its header is
+        damaged.
     """
     head = read(0, 32)
     try:
@@ -74,7 +75,7 @@ def _webp(_read: Read, head: bytes) -> tuple[int, int, int] | None:
 def _tiff(read: Read, head: bytes) -> tuple[int, int, int] | None:
     order = "<" if head[:2] == b"II" else ">"
     (kind,) = struct.unpack_from(f"{order}H", head, 2)
-    # Offset of the first directory; its count of tags, and each tag's length.
+    # Formats of the first directory's offset and of its tag count, and the bytes per tag.
     at_form, at, count_form, step = ("Q", 8, "Q", 20) if kind == 43 else ("I", 4, "H", 12)
     (start,) = struct.unpack_from(order + at_form, head, at)
     count_size = struct.calcsize(count_form)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folds of a face from its form: soft areas and coordinates for materials without maps."""
+"""Masks and coordinates for skin folds, computed from the form of a face without texture maps."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Points = Float | Float32
 
-# Area: ellipses as (x, z, half width, half height), x mirrored to both sides. x and z count from
-# between the eyes; x in eye distances, z in eye distances above and mouth distances below.
+# Area -> ellipses (x, z, half width, half height), mirrored in x. The origin is between the eyes;
+# the unit is the distance between the eyes, or below the eyes in z the distance to the mouth.
 _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
     "forehead": ((0.0, 0.82, 0.75, 0.42),),
     "glabella": ((0.0, 0.36, 0.26, 0.32),),
@@ -27,18 +27,18 @@ _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
     "chin": ((0.0, -1.45, 0.34, 0.22),),
     "neck": ((0.0, -2.6, 1.3, 0.75),),
 }
-_EYES_APART = 6.2  # centimetres
-_AT_ONCE = 2048  # points
-_NEVER_BEHIND = {"neck"}  # areas that reach farther back than the eyes
+_EYES_APART = 6.2  # centimetres between the eyes
+_AT_ONCE = 2048  # points per step, which limits memory
+_NEVER_BEHIND = {"neck"}  # areas that continue behind the eyes
 
 
 @dataclass(frozen=True)
 class FaceFrame:
-    """Place of a face in Blender units: it looks along -y, z is up, its left is +x.
+    """The place and size of a face in Blender units: it looks along -y, z is up, its left is +x.
 
     Attributes:
-        origin: float64[3] between the eyes' centres.
-        unit: distance of the eyes' centres.
+        origin: float64[3], the point between the centres of the eyes.
+        unit: distance between the centres of the eyes.
         drop: distance from the eyes down to the mouth.
     """
 
@@ -48,12 +48,12 @@ class FaceFrame:
 
 
 def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> FaceFrame:
-    """The frame of a face.
+    """Find the FaceFrame of a head.
 
     Args:
-        eyes: centres of one eye or both; empty if unknown.
+        eyes: float64[3] each, centres of one eye or both; empty if unknown.
         head: float[V, 3] vertices of the head.
-        mouth: a point inside the mouth, or None.
+        mouth: float[3], a point inside the mouth, or None.
     """
     low, high = head.min(axis=0).astype(float), head.max(axis=0).astype(float)
     middle, size = (low + high) / 2, np.maximum(high - low, 1e-9)
@@ -73,11 +73,11 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
 
 
 def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
-    """float64[V, 3]: x, depth and height of points, measured from between the eyes.
+    """float64[V, 3]: x, depth and height of points relative to the point between the eyes.
 
     Args:
-        points: float[V, 3], in the space of the frame.
-        frame: where the face is, and how large.
+        points: float[V, 3], in Blender units.
+        frame: place and size of the face.
     """
     local = (np.asarray(points, float) - frame.origin) / frame.unit
     below = local[:, 2] < 0
@@ -90,7 +90,7 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
     Args:
         points: float[V, 3] in Blender units.
-        frame: of the face.
+        frame: place and size of the face.
 
     Returns:
         Area -> float32[V], 0 to 1, soft at the border.
@@ -106,7 +106,7 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
             away = np.hypot((x - cx) / wide, (z - cz) / high)
             mask = np.maximum(mask, _smooth((1.35 - away) / 0.85))
         masks[area] = (mask * front).astype(np.float32)
-    # The lips themselves do not fold across the eyes' rims, nor does the nose's tip.
+    # The wings of the nose have no eye folds.
     masks["eye"] *= 1 - masks["nose"]
     return masks
 
@@ -115,8 +115,8 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
     """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth.
 
     Args:
-        points: float[V, 3], in the space of the frame.
-        frame: where the face is, and how large.
+        points: float[V, 3], in Blender units.
+        frame: place and size of the face.
     """
     local = face_coordinates(points, frame)
     x, z = local[:, 0], local[:, 2]
@@ -124,14 +124,14 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 
 
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
-    """float32[V]: 1 within a centimetre of an open border, 0 from two and a half on.
+    """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils count as none: light may go through them.
+    Rims of lids, lips and nostrils are not counted as borders, because light may pass there.
 
     Args:
-        points: float[V, 3], in the space of the frame.
+        points: float[V, 3], in Blender units.
         border: int[B], vertices on open borders.
-        frame: where the face is, and how large.
+        frame: place and size of the face.
     """
     local = face_coordinates(points, frame)
     ahead = np.abs(local[border])
@@ -147,17 +147,17 @@ def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) ->
 
 
 def left_share(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V]: 1 on the character's left, 0 on its right, soft between.
+    """float32[V]: 1 on the character's left, 0 on its right, with a soft transition.
 
     Args:
-        points: float[V, 3], in the space of the frame.
-        frame: where the face is, and how large.
+        points: float[V, 3], in Blender units.
+        frame: place and size of the face.
     """
     x = face_coordinates(points, frame)[:, 0]
     return _smooth(x / 0.3 + 0.5).astype(np.float32)
 
 
 def _smooth(values: Float) -> Float:
-    """The usual step from 0 to 1 with level ends."""
+    """Smoothstep: 0 below 0, 1 above 1, with horizontal ends."""
     t = np.clip(values, 0.0, 1.0)
     return t * t * (3 - 2 * t)

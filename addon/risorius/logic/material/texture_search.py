@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which texture file belongs to which mesh and input, read from names alone."""
+"""Finds the texture file of each mesh and material input by the names of files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from ..base import names
 
 EXTENSIONS = (".png", ".tga", ".exr", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".webp")
-# Folders beside the DNA file; `{stem}` is the name of the file without its ending.
+# Folders to search, relative to the DNA file; `{stem}` is its name without extension.
 FOLDERS = (
     "{stem}_textures",
     "Maps",
@@ -24,7 +24,7 @@ FOLDERS = (
     "../Textures",
     "../Masks",
 )
-FILE_LIMIT = 4000  # files looked at in one folder: a wrong choice, such as a home, stays harmless
+FILE_LIMIT = 4000  # most files read per folder, so that a home folder chosen by mistake is no harm
 
 _PART_WORDS = {
     "head": "head",
@@ -64,14 +64,14 @@ _ROLE_WORDS = {
     "alpha": "alpha",
     "opacity": "alpha",
 }
-# Words in names of textures without a meaning for their role.
+# Words in texture names that are ignored.
 _FILLERS = {"t", "tx", "map", "maps", "main", "base", "animated", "baked", "vt", "inst", "lod0"}
 _SIZE = re.compile(r"^(\d+|\d+k|u?1001)$")
 _SET = re.compile(r"^([cw]m)([1-9])$")
 _MASK = re.compile(r"^(?:t_)?(head_wm\d+_[a-z]+(?:_[a-z]{1,2})?)(?:_msk|_mask)?$")
 _PACKED = re.compile(r"^(?:t_)?head_(wm\d+)_msk_(\d\d)$")
 
-# The regions in the channels red, green, blue, alpha of the packed masks.
+# Regions in the red, green, blue and alpha channels of each packed mask file.
 PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
     "wm1_01": ("blink_L", "blink_R", "browsRaiseInner_L", "browsRaiseInner_R"),
     "wm1_02": ("browsRaiseOuter_L", "browsRaiseOuter_R", "chinRaise_L", "chinRaise_R"),
@@ -101,14 +101,14 @@ class Mask:
 
 @dataclass
 class TexturePlan:
-    """The found textures.
+    """The textures found for a face.
 
     Attributes:
         files: (mesh base, role) -> file. Roles: color, normal, roughness, specular, cavity, alpha,
             `color:1` to `color:3` and `normal:1` to `normal:3` for the wrinkle sets, `map:<animated
-            map>` for a mask named in the metadata of the file.
-        masks: region as in `head_wm1_blink_L`, in lower case -> Mask.
-        missing: one sentence for each named file that is missing.
+            map>` for a mask named in the DNA file's metadata.
+        masks: region such as `head_wm1_blink_l`, in lower case -> Mask.
+        missing: one sentence for each texture that the DNA file names but that was not found.
     """
 
     files: dict[tuple[str, str], Path] = field(default_factory=dict)
@@ -116,16 +116,16 @@ class TexturePlan:
     missing: list[str] = field(default_factory=list)
 
     def of(self, base: str, role: str) -> Path | None:
-        """The file of an input of a mesh's material; None if missing.
+        """The file for an input of a mesh's material; None if missing.
 
         Args:
-            base: of the mesh's name, as in `files`.
-            role: of the input.
+            base: mesh name without its LOD, as in `files`.
+            role: role of the input, as in `files`.
         """
         return self.files.get((base, role))
 
     def summary(self) -> str:
-        """A summary of found textures: `head: color, normal; teeth: color`; empty for nothing."""
+        """A summary of found textures: `head: color, normal; teeth: color`; "" if there is none."""
         found: dict[str, list[str]] = {}
         for base, role in self.files:
             found.setdefault(base, []).append(role.partition(":")[0])
@@ -152,14 +152,14 @@ def split_words(stem: str) -> list[str]:
 
 
 def read_name(stem: str) -> tuple[str, str, str] | None:
-    """The part, side and role in a texture's name.
+    """Read the part, side and role from a texture's name.
 
     Args:
         stem: the file's name without its ending.
 
     Returns:
         Part (head, body, eyes, teeth, tongue, lashes), side (left, right or empty) and role; None
-        for other names.
+        if the name does not follow these rules.
     """
     part = role = number = side = ""
     for word in split_words(stem):
@@ -173,16 +173,16 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
         elif word in ("left", "right") and part == "eyes":
             side = word
         elif part and not (word in _FILLERS or _SIZE.match(word)):
-            return None  # before the part any words may stand, such as a character's name
+            return None  # unknown words are allowed before the part, such as a character's name
     if not part and (number or stem.lower().endswith("_main")):
-        part = "head"  # exports that only know one face: Color_MAIN, Normal_WM1
+        part = "head"  # exports of a single face: Color_MAIN, Normal_WM1
     if not part or not role or (number and role not in ("color", "normal")):
         return None
     return part, side, f"{role}:{number}" if number else role
 
 
 def read_mask(stem: str) -> dict[str, int]:
-    """Regions of the masks in a file, in lower case, with their channels; often none."""
+    """Mask regions in a texture file -> channel; regions in lower case, often none."""
     word = stem.lower()
     packed = _PACKED.match(word)
     if packed:
@@ -201,8 +201,8 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
     Args:
         base: mesh name without its LOD.
-        kind: as in MeshPlan.
-        skins: bases of all skin meshes.
+        kind: kind of the mesh, see MeshPlan.
+        skins: base names of all skin meshes.
     """
     word = base.lower()
     if kind == "skin":
@@ -215,11 +215,11 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
 
 def folders_of(dna_path: Path, chosen: str = "") -> list[Path]:
-    """Existing folders to search, the user's own first.
+    """Existing folders to search, the user's folder first.
 
     Args:
-        dna_path: of the DNA file.
-        chosen: the user's own folder; "": none.
+        dna_path: path of the DNA file.
+        chosen: the folder that the user chose, or "".
     """
     places = [Path(chosen)] if chosen else []
     if chosen:
@@ -237,7 +237,7 @@ def folders_of(dna_path: Path, chosen: str = "") -> list[Path]:
 
 
 def list_files(folder: Path) -> list[Path]:
-    """Image files of a folder, the wanted one first where names differ only in their ending."""
+    """Image files of a folder, sorted by length of name, name, and the order of EXTENSIONS."""
     try:
         entries = [p for _, p in zip(range(FILE_LIMIT), folder.iterdir(), strict=False)]
     except OSError:
@@ -252,15 +252,15 @@ def find(
     meshes: Iterable[tuple[str, str]],
     folders: Sequence[Path],
 ) -> TexturePlan:
-    """Find textures: first those named by the file, then those with known names.
+    """Find textures: first those that the DNA file names, then files with known names.
 
     Args:
-        wanted: (mesh base, role) -> file name, from_metadata.
-        meshes: base and kind of each mesh.
-        folders: folders to search; the first with a match wins.
+        wanted: (mesh base, role) -> file name, from from_metadata.
+        meshes: base name and kind of each mesh.
+        folders: folders to search; a match in an earlier folder wins.
 
     Returns:
-        The plan. A name from the file that is not a plain file name is never followed.
+        The plan. A name in the DNA file that contains a folder is never followed.
     """
     plan = TexturePlan()
     known = dict(meshes)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UV layouts for baking a mesh: its UV map spread over the square, or a cell for each polygon."""
+"""UV layouts for baking a mesh: its UV map stretched over the square, or a cell per polygon."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Totals = NDArray[np.int32] | NDArray[np.int64]
 
-_FULL = 0.5  # of the square: a layout whose bounds cover this much is kept as it is
-_RIM = 0.08  # of a cell, left free on each side: no face shows its neighbour's colour
+_FULL = 0.5  # share of the square: a layout whose bounds cover more stays
+_RIM = 0.08  # of a cell, empty on each side, so that no face shows its neighbour's colour
 
 
 def spread(points: Float32) -> Float32 | None:
     """Stretch a UV layout over the unit square if it uses little of it or leaves it.
 
     Args:
-        points: float[N, 2] UV coordinates of all corners of a picture.
+        points: float[N, 2], UV coordinates of all face corners of one texture.
 
     Returns:
-        float32[N, 2], or None if the layout is good already.
+        float32[N, 2], or None if the layout already fits the square.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 1e-9)
@@ -31,11 +31,11 @@ def spread(points: Float32) -> Float32 | None:
 
 
 def overlaps(points: Float32, totals: Totals) -> bool:
-    """Whether polygons must overlap, because their area exceeds their bounding rectangle.
+    """Whether polygons must overlap, because their summed area exceeds their bounding rectangle.
 
     Args:
-        points: float[N, 2] UV coordinates of the corners, polygon by polygon.
-        totals: int[F] corners of each face.
+        points: float[N, 2], UV coordinates of the corners, face by face.
+        totals: int[F], number of corners of each face.
     """
     if not len(points):
         return False
@@ -50,13 +50,13 @@ def overlaps(points: Float32, totals: Totals) -> bool:
 
 
 def cells(totals: Totals) -> Float32:
-    """A layout for a mesh that has none: every face as a regular polygon in a cell of its own.
+    """Make a UV layout for a mesh without one: every face as a regular polygon in its own cell.
 
     Args:
-        totals: int[F] corners of each face.
+        totals: int[F], number of corners of each face.
 
     Returns:
-        float32[sum of totals, 2], in the order of the corners.
+        float32[sum of totals, 2], UV coordinates of all corners, face by face.
     """
     totals = np.asarray(totals, np.int64)
     side = int(np.ceil(np.sqrt(max(len(totals), 1))))
@@ -64,7 +64,7 @@ def cells(totals: Totals) -> Float32:
     first = np.repeat(np.cumsum(totals) - totals, totals)
     corner = np.arange(len(face)) - first
     angle = 2 * np.pi * (corner + 0.5) / totals[face]
-    # The corners of a unit square lie at the square root of a half from its centre.
+    # A unit square's corners are sqrt(1/2) from its centre.
     reach = np.where(totals[face] == 4, np.sqrt(0.5), 0.5) * (1 - 2 * _RIM)
     place = np.stack([face % side, face // side], axis=1) + 0.5
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions with baked curves, and the animation of an object before it played one."""
+"""Writes baked curves to actions, and restores the earlier animation of an object."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from ...logic.animation import track_matching
 from ..base import compat, saved
 from ..base.blender_types import Animated
 
-BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
-BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
-_DIGEST = "risorius_digest"  # on the same: of its keys as they were baked
-_LINEAR = 1
-_AT_ONCE = 1 << 21  # values that are reduced in one go
+BEFORE = "risorius_before"  # on a datablock with a baked action: its earlier animation
+BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
+_DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
+_LINEAR = 1  # number of Blender's interpolation "LINEAR"
+_AT_ONCE = 1 << 21  # values (frames times columns) that are reduced in one call
 
 
 @dataclass
@@ -31,12 +31,12 @@ class Track:
     """Baked values of one property.
 
     Attributes:
-        path: its data path.
-        group: name of its group of curves.
+        path: data path of the property.
+        group: name of the group of its F-curves.
         values: float32[frames, width].
         now: the current value of the original property, [width]. A property with this value at all
             frames needs no curve. None: always make a curve.
-        first: array index of the first column.
+        first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
 
@@ -50,7 +50,7 @@ class Track:
 
 @dataclass
 class Counts:
-    """Result of reducing keys: keys written, keys before the reduction, largest error."""
+    """Totals of written F-curves: keys, keys before the reduction, largest error, curves."""
 
     keys: int = 0
     all_keys: int = 0
@@ -58,7 +58,7 @@ class Counts:
     curves: int = 0
 
     def sentence(self) -> str:
-        """For a report."""
+        """The counts as text for a report."""
         return (
             f"{self.curves:,} curves, {self.keys:,} of {self.all_keys:,} keys, "
             f"largest error {self.error:.3g}"
@@ -78,10 +78,10 @@ def write(
     Args:
         name: of the action.
         owner: the datablock that will play it.
-        frames: float64[N].
-        tracks: Tracks.
-        error: see reduce_keys; 0 keeps a key at every frame.
-        counts: Counts, added to.
+        frames: float64[N], frames of the scene.
+        tracks: values of the properties at these frames.
+        error: largest error of the reduction, see reduce_keys; 0 keeps a key at every frame.
+        counts: totals, which this call increases.
 
     Returns:
         The Action and its slot (None before Blender 4.4).
@@ -103,14 +103,14 @@ def add_tracks(
     error: float,
     counts: Counts,
 ) -> None:
-    """Add a curve for each value of tracks.
+    """Add an F-curve for each column of the tracks' values.
 
     Args:
-        bag: the F-curves of an action, without curves of these tracks.
-        frames: float64[N].
-        tracks: Tracks.
-        error: see reduce_keys; 0 keeps a key at every frame.
-        counts: Counts, added to.
+        bag: receives the F-curves; must not contain curves of these properties.
+        frames: float64[N], frames of the scene.
+        tracks: values of the properties at these frames.
+        error: largest error of the reduction, see reduce_keys; 0 keeps a key at every frame.
+        counts: totals, which this call increases.
     """
     times = np.asarray(frames, np.float32)
     for track, values, keep in _reduced(frames, tracks, error, counts):
@@ -126,7 +126,7 @@ def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:
 def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
-    """Each track with its values and keys; many tracks are reduced at once."""
+    """Yields each track with its values and a mask of the kept keys, both [frames, width]."""
     most = max(_AT_ONCE // len(frames), 16)  # columns
     waiting, width = [], 0
     for number, track in enumerate(tracks):
@@ -150,7 +150,7 @@ def _reduced(
 def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
     rna: Any = bag.fcurves.bl_rna
     words = rna.functions["new"].parameters.keys()
-    for word in ("action_group", "group_name"):  # up to 4.3; since 5.0
+    for word in ("action_group", "group_name"):  # argument in Blender up to 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
     curve = bag.fcurves.new(track.path, index=index)
@@ -170,7 +170,7 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether somebody edited an action since `stamp`. One without a stamp is somebody's."""
+    """Whether the keys of an action changed since `stamp`; True if it has no stamp."""
     return action.get(_DIGEST) != _digest(action)
 
 
@@ -201,7 +201,7 @@ def play(
 
     Args:
         owner: object or Key, see `restore`.
-        action, slot: from `write`.
+        action, slot: the results of `write`.
         muted: data paths whose drivers are muted, since they are baked.
         strip: put the action on a new NLA track instead of making it the active one.
     """
@@ -235,7 +235,7 @@ def play(
 
 
 def keep(owner: Animated) -> None:
-    """Store the current animation of a datablock unless it is stored; create animation data."""
+    """Store the animation settings of a datablock for `restore`, unless they are stored already."""
     if BEFORE in owner:
         return
     had = owner.animation_data is not None
@@ -256,11 +256,11 @@ def keep(owner: Animated) -> None:
 
 
 def note_values(owner: Animated, paths: Iterable[str]) -> None:
-    """Store the values of properties that the baked action of `play` does not animate.
+    """Store the current values of properties that a baked action changes, for `restore`.
 
     Args:
-        owner: object that plays a baked action from now on.
-        paths: data paths that the baked action sets; only `restore` sets them back.
+        owner: object for which `play` was called.
+        paths: data paths of the properties.
     """
     lines = []
     for path in paths:
@@ -281,7 +281,7 @@ def _set_back(owner: Animated, lines: Iterable[str]) -> None:
                 for i, number in enumerate(numbers):
                     value[i] = number
         except (ValueError, TypeError, LookupError, AttributeError):
-            continue  # it is gone, or was never of ours
+            continue  # the property is missing, or the line is damaged
 
 
 def _set(owner: Animated, path: str, number: float) -> None:
@@ -333,7 +333,7 @@ def restore(owner: Animated) -> None:
 def _play_again(
     data: bpy.types.AnimData, state: Mapping[str, object], action: bpy.types.Action | None
 ) -> None:
-    """Give animation data the action and the settings that it had."""
+    """Restore the stored action, slot and blending settings of animation data."""
     data.action = action
     if action is not None and "slot" in state:
         slot = next((s for s in action.slots if s.identifier == state["slot"]), None)
@@ -348,7 +348,10 @@ def _play_again(
 
 
 def _is_used(action: bpy.types.Action) -> bool:
-    """Blender 4.3 counts a user too many of an action that was duplicated with its object."""
+    """Whether a datablock or a fake user uses an action.
+
+    `users` alone is not enough: Blender 4.3 counts one too many after an object is duplicated.
+    """
     return bool(
         action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
     )
@@ -369,7 +372,7 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Rewrite stored tracks with their names; form 0 stored them by their order.
+    """Rewrite NLA tracks that an old file stored by their order so that they have names.
 
     Returns:
         Whether any stored track was rewritten.
@@ -379,7 +382,7 @@ def note_tracks_by_name(owner: Animated) -> bool:
     if not lines or lines[0].startswith("["):
         return False
     data = owner.animation_data
-    if data is None:  # somebody took it away, and the tracks with it
+    if data is None:  # the user removed the animation data, and with it the tracks
         owner[BEFORE]["tracks"] = []
         return False
     own = data.nla_tracks.get(saved.text(state, "track"))
@@ -395,7 +398,10 @@ def note_tracks_by_name(owner: Animated) -> bool:
 def _remove_track(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[bpy.types.Action | None]:
-    """Take the baked strip away and give the other tracks their flags. Returns: its actions."""
+    """Remove the baked strips and restore mute and solo of the other tracks.
+
+    Returns: the actions of the removed strips.
+    """
     own = _baked_strips(data, state)
     played: list[bpy.types.Action | None] = []
     for _track, strip in own:
@@ -419,7 +425,7 @@ def _remove_track(
 def _baked_strips(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """The track and strip that `play` added, also after the user renamed or moved them."""
+    """The tracks and strips with the baked action, also if the user renamed or moved them."""
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")
     own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]
@@ -431,7 +437,7 @@ def _baked_strips(
 
 
 def busy(owner: Animated) -> str:
-    """Why the animation of a datablock cannot be exchanged now; empty when it can."""
+    """The reason why the animation of a datablock cannot be replaced now; "" if it can."""
     data = owner.animation_data
     if data is not None and data.use_tweak_mode:
         return f"{owner.name} is in the tweak mode of the NLA editor: leave it first."

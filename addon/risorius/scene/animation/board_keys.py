@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From sliders to the face board and back: the pose of now, and the keys of an action."""
+"""Converts the current pose and the keys of an action between sliders and the face board."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ..base.blender_types import ArmatureObject, Context
 from ..character import armatures, board, board_bones, runtime, shown_keys
 from . import actions, clip_actions
 
-TOLERANCE = 5e-4  # how far a straight line between two keys may be from what was converted
-_NAMED = 4  # controls that a sentence on a loss names
+TOLERANCE = 5e-4  # largest distance of the straight lines between keys from the converted values
+_NAMED = 4  # number of controls that a sentence on a loss names
 
 
 @dataclass
@@ -29,10 +29,10 @@ class Converted:
     """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: largest loss of raw controls over the pose and all frames.
-        kept: the earlier action, which nothing plays now; None if no action was converted.
+        loss: largest difference of raw controls by the conversion, over the pose and all frames.
+        kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
-        idle: other actions of the face whose keys have no effect now.
+        idle: names of other actions of the face whose keys have no effect after the switch.
     """
 
     loss: board_fit.Loss = field(default_factory=board_fit.Loss)
@@ -42,10 +42,10 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about the loss of a conversion; None if the loss is invisible.
+    """A sentence about the loss of a conversion; None if it is at most board.SEEN.
 
     Args:
-        loss: of a fit.
+        loss: differences of raw controls after a fit.
     """
     if loss.largest <= board.SEEN:
         return None
@@ -63,10 +63,10 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
     Args:
         rig: a character with a face board.
         by_board: True: the board leads; False: the sliders lead.
-        with_keys: convert the keys of the action that the face plays, in a copy of it.
+        with_keys: also convert the keys of the active action, in a copy of the action.
 
     Returns:
-        Converted.
+        The loss, the earlier action and the number of new F-curves.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     done = Converted()
@@ -95,15 +95,15 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
 
 
 def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
-    """Replace the board by the other kind. Pose and keys are converted as by `switch`.
+    """Replace the face board by the other kind. Pose and keys are converted as by `switch`.
 
     Args:
         context: with a view layer.
-        rig: a character with a face board, whose control armature is of this file.
-        kind: runtime.PRIMARY or runtime.COMPLETE.
+        rig: a character with a face board; its control armature must not be linked.
+        kind: of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        Converted, of the new board.
+        The result of the conversion to the new board; empty if the sliders lead.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)
@@ -116,14 +116,14 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         board_bones.show(controls, False)
         return done
     before, done = done, switch(rig, by_board=True, with_keys=True)
-    if done.kept is not None and before.kept is not None:  # of the way over the sliders
+    if done.kept is not None and before.kept is not None:  # the action with slider keys
         bpy.data.actions.remove(done.kept)
         done.kept = before.kept
     return done
 
 
 def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]:
-    """Convert a new action with keys of sliders to handles, if the face board leads.
+    """Convert the slider keys of a new action to keys of handles if the face board leads.
 
     Args:
         rig: the character that will play it.
@@ -140,7 +140,11 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
 
 def animates_sliders(rig: ArmatureObject) -> bool:
-    """Whether an action that a face plays has keys of sliders. Args: rig  the character."""
+    """Whether a played action of a face has keys of sliders that the board reaches.
+
+    Args:
+        rig: the character.
+    """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     return any(
         True
@@ -150,7 +154,7 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 
 
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
-    """Convert the current pose. Returns: its loss."""
+    """Convert the current pose to the board or to the sliders. Returns: the loss."""
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
     assert face is not None
@@ -167,7 +171,7 @@ def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
 def _leading_curves(
     action: bpy.types.Action, controls: ArmatureObject, live: runtime.Runtime, of_board: bool
 ) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of an action that move the board's handles, or the sliders that it leads to."""
+    """The F-curves of an action that move the board's handles, or the sliders that it reaches."""
     if of_board:
         paths = {board.path_of(handle.bone) for handle in live.handles}
     else:
@@ -179,15 +183,15 @@ def _leading_curves(
 def convert(
     rig: ArmatureObject, action: bpy.types.Action, by_board: bool
 ) -> tuple[board_fit.Loss, int]:
-    """Convert the keys of an action in place: straight lines within TOLERANCE of the earlier
-    curves.
+    """Convert the keys of an action in place between sliders and handles.
 
-    Controls without keys keep their current value.
+    The new keys are linear, within TOLERANCE of the earlier curves. Controls without keys keep
+    their current value.
 
     Args:
         rig: the character.
-        action: with keys on the sliders, or on the handles.
-        by_board: to keys on the handles, else to keys on the sliders.
+        action: with keys of the sliders or of the handles.
+        by_board: True: from sliders to handles; False: from handles to sliders.
 
     Returns:
         The loss of raw controls at whole frames and at the keys, and the number of new curves.
@@ -207,7 +211,7 @@ def convert(
         bag.fcurves.remove(curve)
     new = {(track.path, track.first) for track in tracks}
     stale = [c for c in bag.fcurves if (c.data_path, c.array_index) in new]
-    for curve in stale:  # of the other way, and not played: what is converted comes in its place
+    for curve in stale:  # had no effect until now; the converted curve replaces it
         bag.fcurves.remove(curve)
     actions.add_tracks(bag, frames, tracks, TOLERANCE, counts)
     for group in [group for group in bag.groups if not len(group.channels)]:
@@ -216,7 +220,7 @@ def convert(
 
 
 def _frames(curves: Iterable[bpy.types.FCurve]) -> NDArray[np.float64]:
-    """All whole frames of F-curves, and their keys."""
+    """The frames of all keys of F-curves, and all whole frames between them."""
     keys = np.concatenate([clip_actions.key_points(curve)[0] for curve in curves])
     whole = np.arange(np.floor(keys.min()), np.ceil(keys.max()) + 1.0)
     inside = whole[(whole >= keys.min()) & (whole <= keys.max())]

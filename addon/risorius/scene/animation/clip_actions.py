@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions of a character's controls, and actions become clips again."""
+"""Converts clips to actions of a character's controls, and actions to clips."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from . import curve_colours
 LINEAR = 1  # the number of the interpolation "LINEAR"
 _BEZIER = 2
 _FREE = 0  # the number of the handle type "FREE"
-_TURN = 0.1  # of the tolerance is that of a turn, whose numbers are small
+_TURN = 0.1  # factor on the tolerance for rotations of bones, whose values are small
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
@@ -36,9 +36,9 @@ class Report:
 
     Attributes:
         action: the new action.
-        first, last: its first and last frame.
-        curves: number of controls and bones that it moves.
-        unknown: names of the clip without a control of this face.
+        first, last: first and last frame of the action.
+        curves: number of controls and bones that the action moves.
+        unknown: names of the clip's curves that match no control of this face.
         notes: sentences for the user.
     """
 
@@ -50,7 +50,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
 
     def summary(self) -> Sentence:
-        """One line: its name, how much it moves, and when."""
+        """One line with the action's name, number of curves and frame range."""
         return told(
             "{action}: {curves} curves, frames {first:g} to {last:g}",
             action=self.action.name,
@@ -75,8 +75,8 @@ def timing_of(
     """Place a clip in the time of a scene.
 
     Args:
-        clip: risorius.Clip.
-        scene: gives the rate.
+        clip: the clip to place.
+        scene: gives the frames per second.
         start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
         keep_clock: count from second 0 of the clip, to keep several clips of one take in step.
         whole: True: keys on whole frames only.
@@ -86,7 +86,7 @@ def timing_of(
 
 
 def sliders_of(live: runtime.Runtime) -> dict[str, str]:
-    """The property of each control name. Args: live  the character's Runtime."""
+    """Control name -> name of its slider property. Args: live  the character's Runtime."""
     return clip_units.property_names(live.dna.raw_control_names, live.labels)
 
 
@@ -98,22 +98,22 @@ def make_action(
     with_eyes: bool = True,
     tolerance: float = 0.0,
 ) -> Report:
-    """Make an action of a clip. No datablock plays it yet.
+    """Make an action from a clip. The action is not assigned to any datablock.
 
     Args:
         rig: the character's deforming armature.
         clip: risorius.Clip; curves such as "head.yaw" turn the bones of head, neck and eyes.
-        timing: see timing_of.
+        timing: place of the clip in the scene, from timing_of.
         name: of the action.
-        with_eyes: turn the eye bones too, if the clip has eye rotations.
-        tolerance: largest distance of a slider from the clip, with few keys and handles; a tenth of
-            it for rotations of bones. 0: a key for each sample and straight lines.
+        with_eyes: animate the eye bones too if the clip has eye rotations.
+        tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a
+            tenth of this value for rotations of bones. 0: a linear key for each sample.
 
     Returns:
-        Report.
+        The action and notes for the user.
 
     Raises:
-        clip_units.ClipError: no curve fits this face, or its frames lie outside Blender's range.
+        clip_units.ClipError: no curve fits this face, or a frame is outside Blender's range.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     times = clip.frame_times()
@@ -143,7 +143,7 @@ def make_action(
 
 
 class _Groups:
-    """Groups of F-curves, each made when first asked for."""
+    """Groups of F-curves by name; a group is created at its first use."""
 
     def __init__(self, bag: bpy.types.ActionChannelbag) -> None:
         self.bag = bag
@@ -155,7 +155,7 @@ class _Groups:
         return self.made[name]
 
     def of_slider(self, label: str) -> bpy.types.ActionGroup:
-        """The group of a slider's region, in its colour."""
+        """The group of a slider's region, with the colour of the region."""
         group = self.named(armatures.key_group(label))
         if group.color_set == "DEFAULT":
             curve_colours.colour_group(group, native.regions().of_slider(label))
@@ -175,7 +175,7 @@ def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
 
     Args:
         scene: its range is changed.
-        report: Report.
+        report: result of the import, with the first and last frame.
         mode: "EXTEND" moves the end of the scene to the end of the animation if that is later;
             "FIT" begins and ends it with the animation; "KEEP" leaves it.
     """
@@ -209,8 +209,8 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 
     Args:
         curve: of an action.
-        keys: at frames without a key of the curve.
-        bent: True: Bezier handles; False: straight lines.
+        keys: new keys, at frames where the curve has no key.
+        bent: True: Bezier interpolation; False: linear.
     """
     points = curve.keyframe_points
     first, count = len(points), len(keys.co)
@@ -228,7 +228,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set a property of the keys from `first` on."""
+    """Set a property of all keys from index `first` to the end."""
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)
@@ -246,7 +246,10 @@ def _add_turn(
     turns: NDArray[np.float64],
     fitter: Fitter | None,
 ) -> None:
-    """The rotation of a bone, in the way that the bone is turned."""
+    """Add F-curves of a bone's rotation in its rotation mode.
+
+    turns: float64[n, 4], quaternions in the armature's axes.
+    """
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
     for index, values in enumerate(_as_rotation(bone.rotation_mode, own).T):
@@ -254,19 +257,19 @@ def _add_turn(
 
 
 def rotation_path(bone: bpy.types.PoseBone) -> str:
-    """The property that turns a pose bone."""
+    """The name of the rotation property that a pose bone's rotation mode uses."""
     return _ROTATIONS.get(bone.rotation_mode, "rotation_euler")
 
 
 def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns in the armature's axes as turns in the bone's own."""
+    """Quaternions float64[n, 4] in the armature's axes, converted to the bone's axes."""
     rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
     back = rest * [1.0, -1.0, -1.0, -1.0]
     return clip_units.multiply(clip_units.multiply(back, turns), rest)
 
 
 def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[n, 3 or 4] as a rotation mode writes it."""
+    """Quaternions as values of a rotation mode, float64[n, 3 or 4], angles in radians."""
     if mode == "QUATERNION":
         return turns
     if mode == "AXIS_ANGLE":
@@ -280,14 +283,14 @@ def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | None:
-    """Let a character play an action as its active one.
+    """Make an action the active action of a character.
 
     Args:
-        rig: its deforming armature.
+        rig: deforming armature of the character.
         action: any action; of an action with slots, the slot for the control armature is played.
 
     Returns:
-        The earlier action, kept by a fake user; None if there was none.
+        The earlier action, which gets a fake user; None if there was none.
     """
     controls = parts.controls_there(rig)
     data = controls.animation_data_create()
@@ -300,12 +303,12 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
 
 def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
-    """Play an action as a strip of a new NLA track at the frames of its keys.
+    """Add an action as a strip of a new NLA track, at the frames of its keys.
 
     Args:
         rig: deforming armature of the character.
         action: any action.
-        name: of the track and the strip; "" for the name of the action.
+        name: of the track and the strip; "": the name of the action.
 
     Returns:
         The strip.
@@ -340,8 +343,8 @@ def clip_of_action(
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
 
     Returns:
-        risorius.Clip with curves of the moved sliders by their property names, and of moved control
-        bones and gaze target by the names of `clip_units.BONES`. See dna_names.
+        A clip with curves of the animated sliders by their property names (see dna_names), and of
+        animated control bones and gaze target by the names of `clip_units.BONES`.
     """
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
@@ -371,16 +374,16 @@ def clip_of_action(
 
 
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
-    """Names of the DNA file instead of Blender's shortened names, for other characters.
+    """Replace Blender's shortened slider names by DNA names, so that other characters know them.
 
-    A slider keeps Blender's name if the DNA file has its name twice. Other names stay.
+    A slider keeps Blender's name if its DNA name occurs twice. Names that belong to no slider stay.
 
     Args:
         live: the character's Runtime.
-        names: Blender's property names of its sliders, and other names.
+        names: Blender's property names of sliders, and other names.
 
     Returns:
-        As many names, in the same order.
+        One name for each given name, in the same order.
     """
     own = {}
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
@@ -392,7 +395,7 @@ def sampled(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.
     """float64[n]: the values of an F-curve at frames."""
     if is_bent(curve) or not len(curve.keyframe_points):
         return np.array([curve.evaluate(frame) for frame in frames])
-    return np.interp(frames, *key_points(curve))  # fifty times as fast
+    return np.interp(frames, *key_points(curve))  # fifty times as fast as evaluate()
 
 
 def key_points(curve: bpy.types.FCurve) -> NDArray[np.float32]:
@@ -403,7 +406,8 @@ def key_points(curve: bpy.types.FCurve) -> NDArray[np.float32]:
 
 
 def is_bent(curve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve differs from straight lines between keys with constant extrapolation."""
+    """Whether an F-curve has modifiers, interpolation other than linear, or extrapolation other
+    than constant."""
     if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
         return True
     kinds = np.empty(len(curve.keyframe_points), np.int32)
@@ -412,11 +416,11 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
 
 
 def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action that move a datablock, without muted ones.
+    """The F-curves of an action that move a datablock. Muted curves are left out.
 
     Args:
         action: any action.
-        owner: the object or the shape keys; of an action with slots, its slot is read.
+        owner: the object or the shape keys; of an action with slots, only its slot is read.
     """
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
@@ -440,7 +444,7 @@ class Turning:
     rest: tuple[float, ...]
 
     def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64[frames, 3 or 4]: the property at frames; without a curve it rests."""
+        """float64[frames, 3 or 4]: the rotation at frames; at rest for missing curves."""
         return np.stack(_rows(self.curves, self.rest, frames), axis=1)
 
 
@@ -450,10 +454,10 @@ def turning(
     """The curves that rotate a control bone; None if there are none.
 
     Args:
-        bone: of the control armature.
+        bone: of the control armature; None gives None.
         curves: of an action, by data path and index.
     """
-    # Its own way first: an action of another face may turn the bone in another way.
+    # The bone's own mode comes first, because an action of another face may have another mode.
     if bone is None:
         return None
     for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
@@ -470,7 +474,7 @@ def turning_in(
 
     Args:
         bone: of the control armature.
-        mode: as PoseBone.rotation_mode.
+        mode: a value of PoseBone.rotation_mode.
         curves: of an action, by data path and index.
     """
     name = bpy.utils.escape_identifier(bone.name)
@@ -483,7 +487,7 @@ def turning_in(
 def _rows(
     curves: Sequence[bpy.types.FCurve | None], rest: Sequence[float], frames: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """float64[frames] of each channel of a property; one without a curve rests."""
+    """float64[frames] for each channel of a property; a channel without a curve is at rest."""
     return [
         np.full(len(frames), still) if curve is None else sampled(curve, frames)
         for curve, still in zip(curves, rest, strict=True)
@@ -497,8 +501,8 @@ def angles_in_armature(
 
     Args:
         bone: a control bone.
-        mode: how it is turned, as PoseBone.rotation_mode.
-        values: float64[n, 3 or 4], the property that turns it in this mode.
+        mode: a value of PoseBone.rotation_mode.
+        values: float64[n, 3 or 4], the bone's rotation property in this mode.
     """
     return clip_units.angles_of(_from_bone(bone, _from_rotation(mode, values)))
 
@@ -506,12 +510,12 @@ def angles_in_armature(
 def rotation_of(
     bone: bpy.types.PoseBone, mode: str, angles: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The inverse of `angles_in_armature`.
+    """float64[n, 3 or 4]: values of a bone's rotation property, from angles in the armature's axes.
 
     Args:
         bone: a control bone.
-        mode: how it is turned, as PoseBone.rotation_mode.
-        angles: float64[n, 3], radians.
+        mode: a value of PoseBone.rotation_mode.
+        angles: float64[n, 3], yaw, pitch and roll in radians.
     """
     return _as_rotation(mode, _into_bone(bone, clip_units.quaternions(angles)))
 
@@ -532,13 +536,13 @@ def _from_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def add_sound(
     scene: bpy.types.Scene, path: str | Path, frame: float, name: str = ""
 ) -> bpy.types.SoundStrip:
-    """Put a sound strip into the sequencer, on the first free channel.
+    """Add a sound strip to the sequencer, on the first free channel.
 
     Args:
         scene: the scene.
         path: of the sound file.
-        frame: frame of its first sample; strips lie on whole frames.
-        name: of the strip; empty for the name of the file.
+        frame: frame of the first sample, rounded to a whole frame.
+        name: of the strip; "": the name of the file.
 
     Returns:
         The strip.
@@ -562,6 +566,6 @@ def add_sound(
 
 
 def _free(strips: Iterable[bpy.types.Strip], start: int) -> int:
-    """The first channel without a strip at or after a frame."""
+    """The first channel whose strips all end at or before a frame; 128 if there is none."""
     taken = {s.channel for s in strips if s.frame_final_end > start}
     return next(c for c in range(1, 129) if c not in taken or c == 128)

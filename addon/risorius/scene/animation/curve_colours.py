@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""F-curves of a face in groups by region, each with the colour of its region."""
+"""Sorts the F-curves of a face into groups by region, and gives them the region's colour."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ _HUES = {
     "ear": 0.75,
     "other": 0.66,
 }
-_STEPS = 5  # brightnesses of a region's curves, so that one can tell them apart
+_STEPS = 5  # number of shades, so that the curves of a region can be told apart
 
 
 def colour_of(region: str, step: int = 0) -> Colour:
     """The colour of a region, red, green and blue from 0 to 1.
 
     Args:
-        region: its name; one that is not known has the colour of the others.
-        step: number of a curve in its region; each gets another brightness.
+        region: name of the region; an unknown name gives the colour of "other".
+        step: number of a curve in its region, from 0; neighbours get different saturation.
     """
     share = (step * 2 % _STEPS) / (_STEPS - 1)
     return colorsys.hsv_to_rgb(_HUES.get(region, _HUES["other"]), 0.75 - 0.3 * share, 0.95)
 
 
 def label_of(path: str) -> str:
-    """The slider that an F-curve moves, or "". Args: path  its data path."""
+    """The slider that an F-curve moves, or "". Args: path  data path of the F-curve."""
     start, _, end = parts.property_path("@").partition("@")
     if not path.startswith(start) or not path.endswith(end):
         return ""
@@ -54,11 +54,11 @@ def colour_group(group: bpy.types.ActionGroup, region: str) -> None:
 
     Args:
         group: of an action of the face.
-        region: its name.
+        region: name of the region.
     """
     group.color_set = "CUSTOM"
     colour = colour_of(region)
-    group.colors.normal = [0.55 * part for part in colour]  # white names stay readable on it
+    group.colors.normal = [0.55 * part for part in colour]  # dark: white names stay readable
     group.colors.select = [0.8 * part for part in colour]
     group.colors.active = colour
 
@@ -69,7 +69,7 @@ def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -
     Args:
         curve: of a slider, in its group.
         label: name of the slider.
-        step: number of the shade, see colour_of; None: the number of curves in its group.
+        step: number of the shade, see colour_of; None: from the number of curves in the group.
     """
     region = native.regions().of_slider(label)
     group = curve.group
@@ -82,7 +82,7 @@ def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -
 
 
 def colour_action(controls: ArmatureObject, action: bpy.types.Action) -> int:
-    """Sort the slider curves of an action into groups by region and colour all of them.
+    """Sort the slider curves of an action into groups by region, and colour curves and groups.
 
     Args:
         controls: control armature of the face.

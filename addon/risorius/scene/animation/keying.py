@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys as Blender's own edits insert them: auto-key, keying set, only needed, kind, group.
+"""Inserts keys by Blender's settings: auto-key, keying set, only needed, key type, group.
 
-Whoever moves sliders or bones of the controls for the animator does it within `by_hand`, or tells
-`changed` when it is done.
+Code that moves sliders or control bones for the animator passes the move to `by_hand`, or calls
+`changed` after the move.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
         KeyframeHandleTypeItems,
     )
 
-_NEAR = 1e-6  # values that are the same
-_AT = 1e-3  # frames that are the same
+_NEAR = 1e-6  # values that differ by no more count as equal
+_AT = 1e-3  # frames that differ by less count as equal
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Rules:
     """Blender's settings for new keys.
 
     Attributes:
-        insert: whether keys are inserted.
-        replace: only replace an existing key at the frame.
-        available: only on existing curves.
-        needed: only if the value differs from the curve.
+        insert: whether keys are inserted at all.
+        replace: only replace existing keys at the frame.
+        available: key only properties with an F-curve.
+        needed: key only if the value differs from the curve.
         kind: type of the key, such as KEYFRAME or EXTREME.
         interpolation, handles: for the first keys of a curve; a later key copies the key before it.
-        keying_set: the only set whose paths are keyed, or None.
+        keying_set: key only the paths of this set; None: no limit.
     """
 
     insert: bool = True
@@ -62,7 +62,7 @@ class Pose:
 
     Attributes:
         sliders: values by name.
-        bones: data path -> components of rotation and location of each control bone.
+        bones: data path of a control bone's rotation or location -> its components.
     """
 
     sliders: Mapping[str, float]
@@ -70,13 +70,12 @@ class Pose:
 
 
 def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
-    """The settings of the scene and the preferences.
+    """The rules for new keys, from the settings of the scene and the preferences.
 
     Args:
-        context: gives both.
-        auto: True: for keys of an edit, which need auto-key; False: for keys that the animator
-            asked for.
-        exact: insert unneeded keys too, because the keys of a shape belong together.
+        context: has the scene and the preferences.
+        auto: True: rules of auto-key; False: rules of an explicit insert.
+        exact: ignore "only needed", because the keys of a pose belong together.
     """
     tools, edit = context.scene.tool_settings, context.preferences.edit
     needed = getattr(edit, "use_keyframe_insert_needed", False)
@@ -98,7 +97,7 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 def pose_of(controls: ArmatureObject) -> Pose:
     """The current values of the controls, before drivers and layers.
 
-    It holds the leading ones of sliders and handles.
+    If the face board leads, the pose has its handles instead of the sliders that they reach.
     """
     rig = parts.rig_of(controls)
     assert rig is not None
@@ -117,8 +116,7 @@ def pose_of(controls: ArmatureObject) -> Pose:
 
 
 def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
-    """The sliders that the face board leads, and the bones of its handles. Both are empty if the
-    sliders lead."""
+    """The sliders that the face board leads (none if the sliders lead), and the handles' bones."""
     handles = {handle.bone for handle in live.handles}
     if not board.leads(controls, live):
         return set(), handles
@@ -134,7 +132,7 @@ def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
 
 
 def curves_by_path(controls: ArmatureObject) -> dict[str, list[bpy.types.FCurve]]:
-    """Data path -> its F-curves in the action of the controls."""
+    """Data path -> F-curves of this path in the active action of the controls."""
     data = controls.animation_data
     found: dict[str, list[bpy.types.FCurve]] = {}
     if data is not None and data.action is not None:
@@ -150,16 +148,16 @@ def by_hand(
     at_selected: bool = False,
     at: Callable[[float], object] | None = None,
 ) -> int:
-    """Move controls as Blender's own edits do, and key them by the user's settings.
+    """Move controls like an edit of the user, and key them by the user's settings.
 
     Args:
         context: has the settings and the current frame.
         rig: the character.
-        move: moves sliders and bones from their current values. It returns the names of the sliders
-            that it handled, or None if it did nothing.
-        at_selected: move at every frame with a selected key of this face instead of the current
-            frame, and key all changes.
-        at: called with the frame before each move.
+        move: a function that moves sliders and bones from their current values. It returns the
+            names of the sliders that it handled, or None if it did nothing.
+        at_selected: True: move at every frame with a selected key of this face, and key all
+            changes; False: move at the current frame.
+        at: a function that is called with the frame before each move.
 
     Returns:
         The number of keyed properties.
@@ -198,7 +196,7 @@ def by_hand(
 def changed(
     context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
 ) -> int:
-    """Key the changes of an edit at the current frame, if Blender's settings ask for it.
+    """Key the changes of an edit at the current frame if auto-key is on.
 
     While a tweak is on, the changes go into the tweak instead.
 
@@ -222,16 +220,16 @@ def changed(
 def key(
     context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
 ) -> int:
-    """Insert the keys that the animator asked for, at the current frame, or into the tweak.
+    """Key controls at the current frame even if auto-key is off; an active tweak gets the keys.
 
     Args:
         context: has the settings and the frame.
         rig: the character.
-        labels: its sliders.
-        bones: data paths of control bones, as Pose has them.
+        labels: names of the sliders to key.
+        bones: data paths of control bones to key, as in Pose.
 
     Returns:
-        How many properties were keyed.
+        The number of keyed properties.
     """
     controls, rules = parts.controls_there(rig), rules_of(context, auto=False)
     if tweaks.of(controls) is not None:
@@ -241,7 +239,7 @@ def key(
 
 
 def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
-    """The sliders and the bones' paths that differ."""
+    """The names of sliders and the data paths of bones whose values differ between two poses."""
     labels = [n for n, v in after.sliders.items() if abs(v - before.sliders.get(n, v)) > _NEAR]
     paths = [
         path
@@ -253,7 +251,7 @@ def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
 
 
 def selected_frames(controls: ArmatureObject) -> list[float]:
-    """The frames of the selected keys of a face, each once, in their order."""
+    """The frames with selected keys of a face, ascending."""
     found = {
         round(key.co.x, 3)
         for path, curves in curves_by_path(controls).items()
@@ -310,7 +308,7 @@ def _at_selected(
     move: Callable[[], Collection[str] | None],
     at: Callable[[float], object] | None,
 ) -> int:
-    """`by_hand` at the frames of selected keys."""
+    """The part of `by_hand` that moves at the frames of selected keys."""
     if tweaks.of(controls) is not None:
         raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
@@ -382,9 +380,9 @@ def insert(
 def _wanted(
     controls: ArmatureObject, labels: Iterable[str], bones: Iterable[str]
 ) -> list[tuple[str, str, list[int]]]:
-    """Data paths with their groups and the indices that are keyed, -1 for all.
+    """Data path, curve group and array indices (-1: all) of each property to key.
 
-    Of sliders that a face board leads its handles are keyed, each in the ways that it goes.
+    Sliders that the face board leads are replaced by its handles, with the axes of each handle.
     """
     rig = parts.rig_of(controls)
     assert rig is not None
@@ -413,7 +411,7 @@ def _driven(controls: ArmatureObject) -> set[str]:
 
 
 def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
-    """The curves of a property that had none, with the colour of its region."""
+    """The new curves of a property; curves of a slider get the colour of its region."""
     curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
     label = curve_colours.label_of(path)
     if label:
@@ -423,10 +421,9 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handles of the first keys of a curve by the preferences, as Blender
-    does for its own keys."""
+    """Set interpolation and handle types of the first two keys of a curve by the rules."""
     if len(curve.keyframe_points) > 2:
-        return  # a later key is like the one before it
+        return  # Blender copied them from the previous key
     for key in (
         curve.keyframe_points[-1:] if len(curve.keyframe_points) > 1 else curve.keyframe_points
     ):
@@ -442,7 +439,7 @@ def _may(
     frame: float,
     rules: Rules,
 ) -> bool:
-    """Whether a property is keyed at a frame."""
+    """Whether the rules allow a key of a property at a frame."""
     if rules.keying_set is not None and not in_set(controls, rules.keying_set, path):
         return False
     if not curves:
@@ -466,13 +463,13 @@ def _value(controls: ArmatureObject, path: str, index: int) -> float:
 
 
 def in_set(controls: ArmatureObject, keying_set: bpy.types.KeyingSet, path: str) -> bool:
-    """Whether a keying set has a property of the controls.
+    """Whether a keying set contains a property of the controls.
 
     Args:
         controls: the control armature.
-        keying_set: a keying set of the scene with paths, or a built-in one, whose name says which
-            channels of bones it keys.
-        path: a data path.
+        keying_set: a keying set of the scene with paths, or a built-in one, whose bl_idname gives
+            the channels of bones that it keys.
+        path: data path of the property.
     """
     if keying_set.is_path_absolute:
         return any(p.id == controls and p.data_path == path for p in keying_set.paths)

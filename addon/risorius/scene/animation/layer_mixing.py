@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layers of a character, compiled to native curves and mixed over its sliders and bones.
+"""Compiles the layers of a character to native curves, and mixes them over sliders and bones.
 
-The compiled layers are kept for each character and compared with their settings. A frame costs one
-comparison and one native call, and nothing without layers. No Blender object is kept.
+Compiled layers are cached for each character and compared with their settings. A frame costs one
+comparison and one native call, and nothing without layers. The cache holds no Blender object.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..character import runtime
 from . import clip_actions, layers
 from .layer_properties import RISORIUS_PG_layer
 
-TURNED = tuple(clip_logic.TURNS)  # the control bones whose turns are mixed
+TURNED = tuple(clip_logic.TURNS)  # names of the control bones whose rotations are mixed
 _OF_SOURCE = (
     "kind",
     "expression",
@@ -43,7 +43,7 @@ _OF_SOURCE = (
 _OF_PLAYING = ("name", "blend", "extend", "fade_in", "fade_out", "mute", "solo")
 _BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
 _MOST_FIRED = 4096
-_IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
+_IDLE_LOOP = 120.0  # seconds after which idle life without a length repeats
 
 
 Times = dict[str, object]  # keyword arguments of risorius.Layer that say when it plays
@@ -55,9 +55,9 @@ class Bones:
     """Rotations and gaze target of the control bones.
 
     Attributes:
-        turns: rotations of "head", "neck", "eye_L", "eye_R" in axes of the armature; bones at rest
-            are left out.
-        target: displacement of the gaze target in its own axes; None at rest.
+        turns: rotations of "head", "neck", "eye_L", "eye_R" in the axes of the armature; bones at
+            rest are left out.
+        target: location of the gaze target relative to rest, in its own axes; None at rest.
     """
 
     turns: dict[str, Quaternion] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Compiled sources and masks of layers, by the settings that they were made from."""
+    """Cache of compiled sources and masks; the keys are the settings they were made from."""
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
@@ -77,11 +77,11 @@ class Stack:
     """Compiled layers of a character.
 
     Attributes:
-        made_of: the settings that they were compiled from.
-        mixer: risorius.Mixer of the character's labels, then of `clip_units.BONES`.
-        layers: risorius.Layer, bottom to top, at full weight.
-        places: place of each layer among the settings.
-        weights: of all settings by place, as the mixer has them now.
+        made_of: the settings that the layers were compiled from.
+        mixer: its channels are the character's slider labels, then `clip_units.BONES`.
+        layers: risorius.Layer, bottom to top, at weight 1.
+        places: place of each compiled layer in the collection of settings.
+        weights: weights by place that the mixer uses at present.
         problems: place -> sentence about a layer that cannot be played.
         kept: compiled sources and masks.
     """
@@ -97,13 +97,16 @@ class Stack:
 
 # Session uid of a control armature -> Stack.
 _stacks: dict[int, Stack] = session.table("layer_mixing.stacks", ("undo", "load"))
-# Session uid of an action -> how often it was edited.
+# Session uid of an action -> number of its edits.
 _versions: dict[int, int] = session.table("layer_mixing.versions", ("undo", "load"))
 
 
 def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
-    """Drop compiled layers of deleted characters and actions. Args: there control armatures that
-    exist."""
+    """Drop compiled layers of deleted characters and edit counts of deleted actions.
+
+    Args:
+        there: the existing control armatures.
+    """
     kept = {controls.session_uid for controls in there if controls is not None}
     for uid in [uid for uid in _stacks if uid not in kept]:
         del _stacks[uid]
@@ -131,20 +134,20 @@ def mix(
     Args:
         seen: the evaluated control armature; its layers have the weights of this frame.
         live: the character's Runtime.
-        raw: float32[R], the sliders.
+        raw: float32[R], slider values.
         bones: rotations and gaze target of the control bones.
-        depsgraph: gives the time of its scene.
-        maximum: of the sliders.
+        depsgraph: its scene gives the time.
+        maximum: largest value of a slider.
 
     Returns:
-        float32[R] sliders, and the control bones with the layers.
+        float32[R] slider values and control bones with the layers applied.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
-        return raw, bones  # baked controls have them in their action
+        return raw, bones  # the action of baked controls contains the layers
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    # The numbers differ if a layer was added and not evaluated since.
+    # The counts differ if a layer was added after the last evaluation.
     there = len(layers.places(seen)) == len(layers.places(controls))
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
     if stack.weights != weights:
@@ -155,7 +158,7 @@ def mix(
 
 
 def _numbers(bones: Bones) -> NDArray[np.float32]:
-    """float32[BONES]: angles and target of the control bones, in the order of the mixer."""
+    """float32[len(clip_units.BONES)]: angles in radians, then the location of the gaze target."""
     found: list[float] = []
     for name, group in clip_logic.TURNS.items():
         turn = bones.turns.get(name)
@@ -166,7 +169,7 @@ def _numbers(bones: Bones) -> NDArray[np.float32]:
 
 
 def _changed(bones: Bones, before: NDArray[np.float32], after: NDArray[np.float32]) -> Bones:
-    """The control bones with the layers. Bones that no layer moves keep every bit."""
+    """The control bones after mixing. Bones that no layer moves keep their exact values."""
     if np.array_equal(before, after):
         return bones
     turns, target, at = dict(bones.turns), bones.target, 0
@@ -188,10 +191,10 @@ def compiled(
     """The Stack of a character. Only changed layers are compiled again.
 
     Args:
-        controls: its control armature, the original one.
-        live: its Runtime.
+        controls: the original (not evaluated) control armature.
+        live: the character's Runtime.
         scene: gives the frame rate.
-        maximum: of the sliders.
+        maximum: largest value of a slider.
     """
     rate = clip_actions.frame_rate(scene)
     made_of = (
@@ -211,7 +214,7 @@ def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
 
 
 def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
-    """The settings that the curves of a layer depend on, and the settings of its mask."""
+    """Cache keys of a layer: the settings that its curves depend on, and those of its mask."""
     action = layer.action
     uid = action.session_uid if action is not None else 0
     warp = tuple((point.frame, point.source) for point in layer.warp)
@@ -227,7 +230,7 @@ def _compile(
     made_of: tuple[object, ...],
     old: Stack | None,
 ) -> Stack:
-    """A new Stack. Args: old the earlier Stack; unchanged curves are reused."""
+    """Compile a new Stack. Args: old  the earlier Stack, whose unchanged curves are reused."""
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
     kept = Kept() if same is None else same.kept
@@ -257,7 +260,7 @@ def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> n
 
 
 def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
-    """Fire all reactions, whenever they are: so each frame is the same in any order of frames."""
+    """Fire the reactions of all frames, so that a frame does not depend on the frames before it."""
     stack.mixer.clear_fired()
     for reaction in layers.reactions_of(controls):
         try:
@@ -272,7 +275,7 @@ def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
 
 
 def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
-    """Give the layers the weights of this frame: cheap, their curves stay."""
+    """Give the layers new weights by place; curves are not compiled again."""
     stack.mixer.layers = tuple(
         replace(layer, weight=min(max(weights[place], 0.0), 1.0))
         for layer, place in zip(stack.layers, stack.places, strict=True)
@@ -288,18 +291,18 @@ def native_layer(
     old: Kept | None = None,
     kept: Kept | None = None,
 ) -> native.Layer:
-    """A layer as risorius.Layer, at full weight.
+    """A layer as risorius.Layer, at weight 1.
 
     Args:
         controls: control armature.
         live: the character's Runtime.
-        layer: its settings.
+        layer: settings of the layer.
         rate: frames per second.
-        old: earlier sources and masks to reuse; the mixer knows them.
-        kept: receives the sources and masks of this layer.
+        old: earlier sources and masks to reuse.
+        kept: receives the source and the mask of this layer.
 
     Raises:
-        ValueError: it has nothing to play, or its source does not fit; the sentence gives the
+        ValueError: the layer has nothing to play, or its source does not fit; the text gives the
             reason.
     """
     old, kept = old or Kept(), kept or Kept()
@@ -346,7 +349,8 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """Times of a pose: always, from its start on, or for its length."""
+    """Times in seconds at which a constant pose plays: always, from its start on, or for its
+    length."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
@@ -360,7 +364,7 @@ def _expression_source(
 
 
 def _for_face(live: runtime.Runtime, pose: Mapping[str, float]) -> dict[str, float]:
-    """A pose by slider labels of this face, without sliders that it lacks."""
+    """A pose by slider labels of this face; controls that the face lacks are left out."""
     sliders = clip_actions.sliders_of(live)
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 
@@ -398,14 +402,14 @@ def _span_times(span: logic.Span, rate: float) -> Times:
 def _idle_source(
     _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
 ) -> Source:
-    """Idle life of its length, or in a long loop that goes on for ever."""
+    """Idle life with the length of the layer, or an endless loop if the layer has no length."""
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
     clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)
     sliders = clip_actions.sliders_of(live)
     clip = clip.selected([name for name in clip.names if name in sliders])
     times: Times = {"start": layer.start / rate}
-    if endless:  # its loop has no begin and no end to fade at
+    if endless:  # a loop has no start and no end to fade at
         times.update(extend="repeat", fade_in=0.0, fade_out=0.0)
     return clip.replaced(names=[sliders[name] for name in clip.names]), times
 
@@ -414,11 +418,11 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 
 
 def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
-    """Sentences on layers that cannot be played, as last compiled.
+    """Sentences on layers that cannot be played.
 
     Args:
-        controls: control armature of the character, the original one.
-        live: its Runtime.
+        controls: the original (not evaluated) control armature of the character.
+        live: the character's Runtime.
         scene: gives the frame rate.
     """
     stack = compiled(controls, live, scene, parts.maximum_of(controls))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The layers of a character as properties of its control armature: saved, copied and overridden."""
 
-# Blender takes properties where Python has annotations:
+# Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
 
 from collections.abc import Callable, Iterable
@@ -36,7 +36,7 @@ _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
 def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Let Blender evaluate the character. Changed layers are then compiled again."""
+    """Tag the character for evaluation, which compiles changed layers again."""
     owner = self.id_data
     assert owner is not None
     owner.update_tag()
@@ -45,7 +45,7 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property that has no keys. Args: kind  of bpy.props, given  its own options."""
+    """A property without animation. Args: kind  function of bpy.props, given  its arguments."""
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 
@@ -78,7 +78,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Edition of the expressions of Risorius; files from the time of one edition do not store it.
+    # Edition of Risorius' built-in expressions; older files do not store it and mean edition 1.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0
@@ -137,8 +137,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     fade_out: _still(bpy.props.FloatProperty, name="Fade Out", description="Frames", min=0.0)
     mute: _still(bpy.props.BoolProperty, name="Mute")
     solo: _still(bpy.props.BoolProperty, name="Solo", description="Only this and other solo layers")
-    # Keys and drivers name a layer by its place, also Blender's own buttons: so places stay, and
-    # order and removal are settings.
+    # Keys and drivers name a layer by its index in the collection. So the index must not change,
+    # and order and removal are stored as properties.
     rank: _still(bpy.props.IntProperty, options={"HIDDEN"})
     removed: _still(bpy.props.BoolProperty, options={"HIDDEN"})
     warp: bpy.props.CollectionProperty(
@@ -150,7 +150,7 @@ CLASSES = (RISORIUS_PG_warp, RISORIUS_PG_reaction, RISORIUS_PG_layer)
 
 
 def register() -> None:
-    """Add the collections to objects; the classes are there."""
+    """Add the properties to bpy.types.Object; CLASSES must be registered before."""
     insertable: Any = {*_OVERRIDE, "USE_INSERTION"}
     for name, kind in (
         (layer_rules.COLLECTION, RISORIUS_PG_layer),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a character's layers: reading, ordering and changing it."""
+"""Reads, orders and changes the animation layers of a character."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ _KEY_SETTINGS = (
 
 
 def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[RISORIUS_PG_layer]:
-    """The settings of all layers of a character by their places, which never change.
+    """The collection of a character's layers. The index (place) of a layer never changes.
 
     Args:
-        controls: its control armature.
+        controls: control armature of the character.
     """
     return getattr(controls, logic.COLLECTION)
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers of a face, bottom to top. Args: controls the control armature."""
+    """The layers that are not removed, bottom to top. Args: controls  the control armature."""
     return [layer for _place, layer in ordered(controls)]
 
 
 def ordered(controls: bpy.types.Object) -> list[tuple[int, RISORIUS_PG_layer]]:
-    """Place and layer of each layer, bottom to top."""
+    """(place, layer) of each layer that is not removed, bottom to top."""
     there = ((i, layer) for i, layer in enumerate(places(controls)) if not layer.removed)
     return sorted(there, key=lambda pair: pair[1].rank)
 
@@ -50,12 +50,12 @@ def ordered(controls: bpy.types.Object) -> list[tuple[int, RISORIUS_PG_layer]]:
 def reactions_of(
     controls: bpy.types.Object,
 ) -> bpy.types.bpy_prop_collection_idprop[RISORIUS_PG_reaction]:
-    """The reactions that were fired."""
+    """The collection of fired reactions, stored on the control armature."""
     return getattr(controls, REACTIONS)
 
 
 def has_any(controls: ArmatureObject) -> bool:
-    """Whether anything is played above the sliders."""
+    """Whether a character has a fired reaction or a layer that is not muted."""
     return len(reactions_of(controls)) > 0 or any(not layer.mute for layer in of(controls))
 
 
@@ -70,7 +70,7 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 
 
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
-    """When a layer plays its action, or another one instead."""
+    """The times and frames at which a layer plays its action, or the given action instead."""
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
@@ -89,7 +89,7 @@ def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) ->
 
 
 def known_reactions() -> dict[str, native.Reaction]:
-    """Name -> reaction that can be fired."""
+    """Name -> definition, for all reactions that can be fired."""
     return native.part("anim.reactions").load_reactions()
 
 
@@ -105,9 +105,9 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Pin the current time of a layer's action to a frame of the scene.
+    """Add a warp point to a layer that pins the source frame shown at a scene frame to this frame.
 
-    The first pin also pins both ends, so that other frames stay.
+    The first warp point also adds one at each end, so that all frames keep their timing.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -132,10 +132,10 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
         controls: control armature.
         kind: see layer_properties.KINDS.
         name: name in the list; a number is added if another layer has it.
-        settings: other properties of the layer.
+        settings: other properties of the layer by name.
 
     Returns:
-        The layer.
+        The new layer.
     """
     there = of(controls)
     layer_name = _free_name(name, {layer.name for layer in there})
@@ -165,8 +165,8 @@ def add_action(
 
     Args:
         controls: control armature of the character.
-        action: action to play, from the frame of its first key on.
-        settings: properties of the layer by name, as `add` takes them.
+        action: action to play; the layer starts at its first frame.
+        settings: other properties of the layer by name.
 
     Returns:
         The new layer, on top of the others.
@@ -176,11 +176,11 @@ def add_action(
 
 
 def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
-    """The place of a layer: what its keys and drivers call it by.
+    """The index of a layer in the collection; keys and drivers name the layer by this index.
 
     Args:
         controls: control armature of the character.
-        layer: one of its layers, also a removed one.
+        layer: a layer of the character, also a removed one.
     """
     return list(places(controls)).index(layer)
 
@@ -188,7 +188,8 @@ def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
 def remove(controls: ArmatureObject, place: int) -> None:
     """Remove a layer, and the keys of its weight unless another character plays them.
 
-    Its place stays empty while an action has keys for it, so that these keys move no other layer.
+    The collection entry stays, hidden, while an action has keys for its index, so that these keys
+    move no other layer.
 
     Args:
         controls: control armature of the character.
@@ -209,7 +210,7 @@ def remove(controls: ArmatureObject, place: int) -> None:
 
 
 def _trim(controls: ArmatureObject) -> None:
-    """Take empty places from the end that no action of the file has keys for."""
+    """Delete removed entries at the end of the collection for which no action has keys."""
     curves = (c for action in bpy.data.actions for c in compat.curves_of(action))
     keyed = {logic.place_of(c.data_path) for c in curves}
     last = len(places(controls)) - 1
@@ -219,7 +220,7 @@ def _trim(controls: ArmatureObject) -> None:
 
 
 def move(controls: ArmatureObject, place: int, up: bool) -> bool:
-    """Move a layer up or down in the list. Its place and keys stay.
+    """Move a layer up or down in the stack. Its index in the collection and its keys stay.
 
     Args:
         controls: control armature of the character.
@@ -227,7 +228,7 @@ def move(controls: ArmatureObject, place: int, up: bool) -> bool:
         up: True: up; False: down.
 
     Returns:
-        Whether it was moved.
+        Whether the layer was moved; False at the end of the stack.
     """
     there = of(controls)
     at = there.index(places(controls)[place])
@@ -259,7 +260,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
     source = places(controls)[place]
     name, kind = source.name, source.kind
     add(controls, kind, name)
-    source, copy = places(controls)[place], places(controls)[-1]  # adding moved them in memory
+    source, copy = places(controls)[place], places(controls)[-1]  # `add` invalidated `source`
     for prop in source.bl_rna.properties:
         if prop.identifier not in ("rna_type", "name", "kind", "warp", "rank"):
             setattr(copy, prop.identifier, getattr(source, prop.identifier))
@@ -274,7 +275,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """The lists of F-curves that move this control armature alone, including its drivers."""
+    """Yields the F-curve collections that move no other datablock, and the list of drivers."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:
@@ -310,11 +311,11 @@ def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
 
 
 def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> None:
-    """Give the action that now plays the keys of weights that were in another one.
+    """Copy the keys of layer weights from the earlier action to the active action.
 
     Args:
         controls: control armature.
-        before: the action that it played until now, or None.
+        before: the earlier active action, or None.
     """
     old = compat.bag_for(before, controls) if before is not None else None
     curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []
@@ -346,7 +347,7 @@ def fire(
         strength: 0 to 1, factor on the reaction's values.
 
     Returns:
-        Its entry in the list.
+        The new entry of the list of fired reactions.
     """
     entry = reactions_of(controls).add()
     entry.name, entry.frame, entry.strength = name, frame, strength
@@ -356,7 +357,7 @@ def fire(
 
 
 def unfire(controls: ArmatureObject, place: int) -> None:
-    """Take a fired reaction out again.
+    """Remove a fired reaction.
 
     Args:
         controls: control armature of the character.

@@ -21,11 +21,11 @@ _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
 def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
-    The NLA lies below all layers, so the layers above that one stay layers. Converted layers are
-    muted. The active action becomes the lowest new strip.
+    Blender evaluates the NLA below all layers, so the layers above that layer stay. Converted
+    layers are muted. The active action becomes the lowest new strip.
 
     Args:
-        scene: gives the rate and the frame range.
+        scene: gives the frame rate.
         rig: the character.
 
     Returns:
@@ -36,7 +36,7 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     playing = [layer for layer in settings if not layer.mute]
     if any(layer.solo for layer in playing):
         playing = [layer for layer in playing if layer.solo]
-    curves = [_weight_curve(controls, layer) for layer in playing]  # of the action as it plays
+    curves = [_weight_curve(controls, layer) for layer in playing]  # before _push_down
     notes, count = [], 0
     for place, layer in enumerate(playing):
         trouble = obstacle(controls, layer, curves[place])
@@ -97,7 +97,7 @@ def _weight_curve(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> bpy.typ
 
 
 def _push_down(controls: ArmatureObject, rig: ArmatureObject) -> None:
-    """The active action as a strip, as Blender's own Push Down Action makes it."""
+    """Convert the active action to a strip, like Blender's Push Down Action."""
     data = controls.animation_data
     if data is None or data.action is None:
         return
@@ -155,11 +155,14 @@ def _place_strip(strip: bpy.types.NlaStrip, span: logic.Span) -> None:
 def _set_influence(
     strip: bpy.types.NlaStrip, value: float, fade_in: float = 0.0, fade_out: float = 0.0
 ) -> None:
-    """A constant influence; with it a strip does not fade of itself, so its keys do."""
+    """Key the influence of a strip: a constant value with fades of some frames at the ends.
+
+    A strip with animated influence ignores blend_in and blend_out.
+    """
     strip.use_animated_influence = True
     strip.influence = value
     start, end = strip.frame_start, strip.frame_end
-    # Where the fades meet they make a peak: min((t - start) / in, (end - t) / out).
+    # If the fades overlap, the peak is at their crossing: min((t - start) / in, (end - t) / out).
     top = min(1.0, (end - start) / max(fade_in + fade_out, 1e-9))
     keys = {start + fade_in * top: value * top, end - fade_out * top: value * top}
     if fade_in:
@@ -176,8 +179,8 @@ def _set_influence(
 def _action_of(
     scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
 ) -> tuple[bpy.types.Action, bool]:
-    """An action with the curves that the layer's mask allows; its own action if all are allowed.
-    Returns: the action, and whether it is a still pose."""
+    """An action with the curves that the layer's mask allows; the layer's action if all are.
+    Returns: the action, and whether it is a constant pose."""
     controls = parts.controls_there(rig)
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range

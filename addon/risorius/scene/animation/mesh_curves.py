@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh of a face's own topology, moving by whatever means, as curves of the face's controls."""
+"""Solves curves of a face's controls from an animated mesh with the topology of the face."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ..character import runtime
 from ..character.meshes import basis_of
 from . import clip_actions
 
-_HOTTEST_MM = 2.0  # what is left over of a vertex and shown in the hottest colour, at least
+_HOTTEST_MM = 2.0  # smallest residual in mm that gets the hottest colour
 MOST_FRAMES = 20_000
 Floats = NDArray[np.float32]
 
 
 def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
-    """Mesh objects of the scene with as many vertices as a mesh of a face, that are not its own.
+    """Mesh objects of the scene with the vertex count of a face mesh that are no part of the face.
 
     Args:
         context: has the scene.
@@ -41,7 +41,7 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The mesh to read: the selected one, or the only one, or None.
+    """The mesh to read: a selected object of `sources`, else its only object, else None.
 
     Args:
         context: has the scene.
@@ -56,14 +56,14 @@ def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
 
 
 def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
-    """The LOD and the mesh of a face's DNA that a source has the vertices of.
+    """The LOD and the index of the face mesh with the vertex count of a source.
 
     Args:
         rig: the face.
-        item: one of `sources`.
+        item: an object from `sources`.
 
     Raises:
-        ClipError: there is none.
+        ClipError: no mesh of the face has this vertex count.
     """
     dna = runtime.there(rig).dna
     count = len(item.data.vertices)
@@ -81,12 +81,13 @@ def recorded(
 
     Args:
         context: scene and view layer.
-        item: a mesh object with all its modifiers.
-        first, last: frames.
-        progress: called with the finished share, 0 to 1.
+        item: a mesh object; its modifiers are applied.
+        first, last: first and last frame, both included.
+        progress: function that is called with the progress, 0 to 1.
 
     Raises:
-        ClipError: no frame or too many, or a modifier changes the number of vertices.
+        ClipError: the number of frames is outside 1 to MOST_FRAMES, or a modifier changes the
+            number of vertices.
     """
     count = last - first + 1
     if not 1 <= count <= MOST_FRAMES:
@@ -115,11 +116,11 @@ def recorded(
 
 
 class MeshCurvesTask(Task["native.SolvedClip"]):
-    """Curves of a recorded mesh on their way, made in a thread.
+    """Solves the curves of a recorded mesh in a thread.
 
     Attributes:
-        mesh: the mesh of the DNA.
-        mm: millimetres of the file's unit.
+        mesh: index of the mesh in the DNA file.
+        mm: length of the file's unit in millimetres.
     """
 
     def __init__(
@@ -138,13 +139,13 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
         Args:
             rig: the face.
             item: the recorded mesh.
-            frames: float32[F, V, 3], as `recorded` gives them.
+            frames: float32[F, V, 3], from `recorded`.
             rate: frames per second.
-            relative: True: use the motion and not the form.
+            relative: True: fit the motion relative to the mesh's neutral; False: fit the shape.
             sparse, smooth: see risorius.solve_clip.
 
         Raises:
-            ClipError: the mesh has the vertices of no mesh of the face.
+            ClipError: no mesh of the face has the vertex count of the mesh.
             DnaError: the face cannot be solved.
         """
         live = runtime.there(rig)
@@ -178,10 +179,10 @@ def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
     Args:
         rig: the face.
         mesh: index of the mesh in the DNA file.
-        residual: float32[V] in mm.
+        residual: float32[V], distance of each vertex in mm.
 
     Returns:
-        Millimetres of the hottest colour; 0 if the face lacks this mesh.
+        The residual of the hottest colour in mm; 0 if the face lacks this mesh.
     """
     hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
     colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))
@@ -201,5 +202,5 @@ def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
 
 
 def rate_of(scene: bpy.types.Scene) -> float:
-    """Frames per second."""
+    """Frames per second of a scene."""
     return clip_actions.frame_rate(scene)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The capture range of a face as properties of its control armature: saved, copied, overridden."""
 
-# Blender takes properties where Python has annotations:
+# Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
 
 from typing import Any
@@ -18,8 +18,8 @@ INDEX = "risorius_ranges_index"
 SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
-_LEAST, _MOST = 0.1, 1.9  # difference of extreme and neutral, as risorius.ranges has them
-# How often any range changed.
+_LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
+# Number of changes of any range.
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -28,7 +28,7 @@ def _touch(_self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
 
 
 def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
-    """Keep the extreme above the neutral, and tell live capture."""
+    """Keep the extreme at 0.1 to 1.9 above the neutral, and count the change."""
     wanted = min(max(self.extreme, self.neutral + _LEAST), self.neutral + _MOST)
     if abs(wanted - self.extreme) > 1e-6:
         self.extreme = wanted
@@ -72,20 +72,20 @@ def touch() -> None:
 
 
 def changes() -> int:
-    """How often ranges may have changed; whoever keeps some compares it."""
+    """Number of calls of `touch`. A cache of ranges compares it to notice changes."""
     return _changes.now
 
 
 def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
-    """The rows of a face. Args: controls  its control armature."""
+    """The ranges of a face, one for each control. Args: controls  its control armature."""
     return list(getattr(controls, ROWS))
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, also if they are off.
+    """The ranges of a face, also if the face does not use them.
 
     Args:
-        controls: its control armature. A row without a valid range counts as off.
+        controls: the control armature. A row without a valid range counts as off.
 
     Returns:
         risorius.ranges.Ranges.
@@ -93,7 +93,7 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
     module = native.part("ranges")
     found = {}
     for row in rows_of(controls):
-        # Blender keeps float32: 0.67 shall be written as 0.67.
+        # Blender stores float32, so 0.67 is rounded to 0.67 again.
         range_ = module.Range(round(row.neutral, 5), round(row.extreme, 5))
         reason = "" if row.used and range_.trouble() is None else row.reason or "off"
         found[row.name] = module.Learned(range_, reason)
@@ -101,13 +101,13 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
 
 
 def of(controls: ArmatureObject) -> "native.Ranges | None":
-    """The ranges that captures of a face are stretched by, or None.
+    """The ranges that stretch captures of a face; None if they are switched off or missing.
 
     Args:
-        controls: its control armature.
+        controls: the control armature.
 
     Returns:
-        risorius.ranges.Ranges.
+        risorius.ranges.Ranges, or None.
     """
     if not getattr(controls, SWITCH) or not len(getattr(controls, ROWS)):
         return None
@@ -115,11 +115,11 @@ def of(controls: ArmatureObject) -> "native.Ranges | None":
 
 
 def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
-    """Replace the ranges of a face.
+    """Replace the ranges of a face, and switch them on.
 
     Args:
-        controls: its control armature.
-        ranges: risorius.ranges.Ranges.
+        controls: the control armature.
+        ranges: the new ranges.
     """
     rows: Any = getattr(controls, ROWS)
     rows.clear()
@@ -134,7 +134,7 @@ def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
 
 
 def forget(controls: ArmatureObject) -> None:
-    """Take a face's ranges away. Args: controls  its control armature."""
+    """Remove the ranges of a face. Args: controls  its control armature."""
     rows: Any = getattr(controls, ROWS)
     rows.clear()
     setattr(controls, SOURCE, "")
@@ -142,7 +142,7 @@ def forget(controls: ArmatureObject) -> None:
 
 
 def _all() -> dict[str, object]:
-    """The properties of objects, by their names."""
+    """The properties that `register` adds to bpy.types.Object, by name."""
     insertable: Any = {*_OVERRIDE, "USE_INSERTION"}
     return {
         ROWS: bpy.props.CollectionProperty(type=RISORIUS_PG_range, override=insertable),
@@ -164,7 +164,7 @@ CLASSES = (RISORIUS_PG_range,)
 
 
 def register() -> None:
-    """Add the properties to objects; the classes are there."""
+    """Add the properties to bpy.types.Object; CLASSES must be registered before."""
     for name, kind in _all().items():
         setattr(bpy.types.Object, name, kind)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape-key animation of another rig as a clip of its own names, to be mapped to a face."""
+"""Reads the shape-key animation of another rig as a clip, which is then mapped to a face."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sources(context: Context) -> list[MeshObject]:
 
 
 def source_of(context: Context) -> MeshObject | None:
-    """The mesh to read: the selected one, or the only one of the scene, or None."""
+    """The mesh to read: a selected object of `sources`, else its only object, else None."""
     there = sources(context)
     selected = cast(list[MeshObject], context.selected_objects)
     chosen = [item for item in selected if item in there]
@@ -48,20 +48,20 @@ def clip_of(
     first: float | None = None,
     last: float | None = None,
 ) -> native.Clip:
-    """The shape keys of an object over time.
+    """The animation of an object's shape keys as a clip.
 
     A single action is read directly. NLA strips and drivers are evaluated frame by frame.
 
     Args:
         context: scene and view layer.
         item: a mesh object.
-        first, last: frames; None: the range of its action, or of the scene.
+        first, last: frames; None: from the range of its action, or of the scene.
 
     Returns:
-        risorius.Clip, one curve for each shape key that moves or is not 0; frame 0 is second 0.
+        A clip with one curve for each shape key that moves or is not 0; frame 0 is second 0.
 
     Raises:
-        ClipError: no shape key moves.
+        ClipError: all shape keys are 0 at all frames.
     """
     keys = parts.keys_there(item)
     data = keys.animation_data

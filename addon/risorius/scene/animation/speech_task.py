@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speech from a sound file in a process beside Blender, and the package of the recogniser."""
+"""Makes speech clips from sound files in a separate process, and installs the recogniser."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from ...logic.base.sentences import told
 from ..base import session
 from ..base.task import Task
 
-_LOOK_EVERY = 3.0  # seconds
+_LOOK_EVERY = 3.0  # seconds between two searches for the recogniser
 _looked: dict[str, float] = session.keep(
     "speech_task.looked", lambda: {"lacks": False, "until": 0.0}, ("unregister",)
 )
 
 
 class SpeechTask(Task["native.Clip"]):
-    """A clip of speech on its way, made by a process."""
+    """Makes a clip of speech in a separate process."""
 
     def __init__(self, path: str, transcript: str | None, **options: object) -> None:
-        """Args: see risorius.speech.speak."""
+        """Start the task. Args: path, transcript, options  see risorius.speech.speak."""
         folder = str(packages_folder())
         if folder not in sys.path:
-            sys.path.append(folder)  # the process looks for packages where this one does
+            sys.path.append(folder)  # the new process searches the folders of this sys.path
 
         def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> native.Clip:
             return native.part("speech.apart").speak_apart(
@@ -54,7 +54,7 @@ def has_recogniser() -> bool:
 
 
 def lacks_recogniser() -> bool:
-    """The opposite for a panel, which asks with each drawing: looked up once in some seconds."""
+    """Whether the recogniser is missing; cached for _LOOK_EVERY seconds, for panels."""
     now = time.monotonic()
     if now > _looked["until"]:
         _looked.update(lacks=not has_recogniser(), until=now + _LOOK_EVERY)
@@ -62,24 +62,24 @@ def lacks_recogniser() -> bool:
 
 
 def packages_folder() -> Path:
-    """The folder of packages that the user installed for the add-on."""
+    """The folder for Python packages that the user installs for the add-on; created if missing."""
     return Path(bpy.utils.extension_path_user(native.ADDON, path="packages", create=True))
 
 
 class InstallError(FaceError, RuntimeError):
-    """pip could not install the recogniser; the sentence gives the reason."""
+    """pip could not install the recogniser; the text gives the reason."""
 
 
 def install_recogniser() -> None:
     """Install the recogniser with pip into the extension's own user folder.
 
     Raises:
-        InstallError: pip failed; the sentence gives the reason. ValueError: Blender has no Python
-            program.
+        InstallError: pip failed; the text gives the reason.
+        ValueError: Blender has no Python program.
     """
     python = native.part("speech.apart").python_program()
     options = ["--no-deps", "--only-binary", ":all:", "--require-hashes"]
-    options += ["--retries", "1", "--timeout", "20"]  # with fewer it does not say what it retries
+    options += ["--retries", "1", "--timeout", "20"]  # with 0 retries pip prints no cause
     environment = {**os.environ, "PYTHONPATH": _bundled_pip()}
     with tempfile.TemporaryDirectory() as folder:
         wanted = Path(folder) / "recogniser.txt"
@@ -100,8 +100,8 @@ def install_recogniser() -> None:
 
 
 def _bundled_pip() -> str:
-    """The wheel of pip that comes with Python and runs without installation; "" if pip is
-    installed."""
+    """Path of the pip wheel bundled with Python, which runs without installation; "" if pip is
+    installed or the wheel is missing."""
     if importlib.util.find_spec("pip") is not None:
         return ""
     found = importlib.util.find_spec("ensurepip")

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits by Blender's own buttons go into the active tweak too.
+"""Moves edits by Blender's own buttons into the active tweak.
 
-Blender puts its keys into the action of the face. While a tweak is on, the file keeps a copy of
-that action, so that undo and redo have it. New keys of the action are removed again, and their
-values go into the tweak. Sliders, bones and handles that were moved without a key go into the tweak
-when the frame changes. Other edits of the action stay: moved or deleted keys, and keys of
-properties that no tweak holds, such as the location of the whole face.
+Blender inserts its keys into the action of the face. While a tweak is on, the file keeps a copy of
+that action, so that undo and redo restore it. New keys of the action are removed again, and their
+values are stored in the tweak. Moves of sliders, bones and handles without a key are stored in the
+tweak when the frame changes. Other edits of the action stay: moved or deleted keys, and keys of
+properties that a tweak cannot store, such as the location of the whole face.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ..character import board, runtime
 from . import clip_actions, curve_colours, tweaks
 
 _ACTION = "risorius_tweak_action"  # on the control armature: the action below the tweak
-_KEPT = "risorius_tweak_kept"  # on the same: its copy, as it was before
-_NEAR = 1e-5  # values that are the same
-_AT = 1e-3  # frames that are the same
+_KEPT = "risorius_tweak_kept"  # on the control armature: a copy of that action before edits
+_NEAR = 1e-5  # values that differ by no more count as equal
+_AT = 1e-3  # frames that differ by less count as equal
 _ARRAYS = ("co", "handle_left", "handle_right")
 _OF_STRIPS = (
     "name",
@@ -46,12 +46,12 @@ Curves = dict[CurveName, bpy.types.FCurve]
 
 @dataclass
 class _Hand:
-    """Controls that differ from the keys below and have no key there.
+    """Controls that the user moved at a frame, to be stored in the tweak.
 
     Attributes:
         frame: frame of the scene.
         stand: the moved controls and their values.
-        held: True: the user inserted a key, so the tweak gets one even without a difference.
+        held: True: the user inserted a key, so the tweak gets a key even without a difference.
     """
 
     frame: float
@@ -74,37 +74,37 @@ class _Below:
     stand: tweaks.Stand
 
 
-# Session uid of a control armature -> what its user moved.
+# Session uid of a control armature -> controls that the user moved without a key.
 _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
-# Session uid of those looked at since load or undo -> what stands below a tweak beside strips.
+# Session uid of a control armature checked since load or undo -> cached pose below its tweak, or
+# None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of one -> why its last key went nowhere.
+# Session uid of a control armature -> reason why the tweak refused its last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """Why the last key went nowhere, or "". Args: controls  a control armature."""
+    """The reason why the tweak refused the last key, or "". Args: controls  a control armature."""
     return _troubles.get(controls.session_uid, "")
 
 
 def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> None:
-    """Turn a tweak on.
+    """Turn a tweak on, and keep a copy of the active action.
 
     Args:
         controls: the control armature.
-        first, last: frames.
-        fade: frames at each end.
+        first, last: first and last frame of the tweak.
+        fade: length of the fade at each end in frames.
 
     Raises:
-        FaceError: the range has no room.
+        FaceError: the range is shorter than two frames, or the fade is negative.
     """
     tweaks.begin(controls, first, last, fade)
     _keep(controls)
 
 
 def end(controls: ArmatureObject) -> None:
-    """Turn the tweak off and keep its layer. Controls moved at the current frame go into it
-    first."""
+    """Store moves without a key in the tweak, and turn the tweak off. Its layer stays."""
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -112,7 +112,7 @@ def end(controls: ArmatureObject) -> None:
 
 
 def _keep(controls: ArmatureObject) -> None:
-    """Keep a copy of the action that is played now."""
+    """Store the active action and a copy of it on the control armature."""
     _drop(controls)
     data = controls.animation_data
     if data is None or data.action is None:
@@ -133,11 +133,11 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Move keys that landed below the tweak into it, and note moves without a key.
+    """Move new keys of the action below the tweak into the tweak, and note moves without a key.
 
     Args:
         controls: an edited control armature.
-        frame: of its scene.
+        frame: current frame of the scene.
         edited: whether its action was edited too.
     """
     tweak, uid = tweaks.of(controls), controls.session_uid
@@ -146,7 +146,7 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
         return
     if edited or uid not in _known:
         _known[uid] = None
-        if _is_dragging():  # what is dragged must not go: keys are looked at when it ends
+        if _is_dragging():  # dragged keys must not be removed: check when the drag ends
             del _known[uid]
         else:
             _take_keys(controls, tweak, frame)
@@ -158,8 +158,8 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """The controls below the tweak. Blender evaluates them once until anything but the controls is
-    edited."""
+    """The pose of the controls below the tweak. On a face with NLA strips it is cached, because
+    Blender has to evaluate the strips."""
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
     uid, strips = controls.session_uid, _strips(controls)
@@ -172,7 +172,7 @@ def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweak
 
 
 def _strips(controls: ArmatureObject) -> tuple[object, ...]:
-    """The strips of a face, and the blending of its action above them."""
+    """Settings of the NLA strips of a face and of the active action, to notice changes."""
     data = controls.animation_data
     assert data is not None
     own = (data.use_nla, data.action_influence, data.action_blend_type)
@@ -186,10 +186,10 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 
 
 def settle(controls: ArmatureObject) -> None:
-    """Take moves without a key into the tweak; outside of its range they are dropped.
+    """Store moves without a key in the tweak; moves outside its frame range are dropped.
 
     Args:
-        controls: a control armature; its frame may have changed since.
+        controls: a control armature; the scene may be at another frame than the move.
     """
     hand = _hands.pop(controls.session_uid, None)
     if hand is not None and tweaks.of(controls) is not None:
@@ -197,7 +197,7 @@ def settle(controls: ArmatureObject) -> None:
 
 
 def _is_dragging() -> bool:
-    """Whether keys or bones are being dragged in a window."""
+    """Whether a transform operator, such as a drag of keys or bones, runs in a window."""
     windows = bpy.data.window_managers[0].windows if len(bpy.data.window_managers) else ()
     running = (op.bl_idname for w in windows for op in getattr(w, "modal_operators", ()))
     return any(name.startswith("TRANSFORM_OT") for name in running)
@@ -218,7 +218,7 @@ def _take(controls: ArmatureObject, hand: _Hand, old: tweaks.Curves | None = Non
 
 
 def _of(whole: tweaks.Stand, part: tweaks.Stand) -> tweaks.Stand:
-    """The controls of one pose that another pose contains."""
+    """The values of the pose `whole` for the controls that the pose `part` contains."""
     return tweaks.Stand(
         {n: v for n, v in whole.sliders.items() if n in part.sliders},
         {n: v for n, v in whole.places.items() if n in part.places},
@@ -236,7 +236,7 @@ def _take_keys(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> N
         before = _curves(controls, kept)
     elif below is None and tweak.bare:
         before = {}
-    else:  # another action is played since: it is what lies below from now on
+    else:  # the user assigned another action, which is the action below from now on
         _keep(controls)
         return
     now, inserted, foreign = _curves(controls, action), {}, False
@@ -274,9 +274,9 @@ def _hands_of(
     for at in sorted(by_frame, key=lambda at: (at == frame, at)):
         hand = _Hand(at)
         if held is not None and is_held and at == frame:
-            hand = held  # the key brought what had none back to the keys below
+            hand = held  # Blender reset moves without a key when it inserted this key
         hand.held = True
-        shown = tweaks.below_at(controls, tweak, at)  # with the new keys, also beside strips
+        shown = tweaks.below_at(controls, tweak, at)  # includes the new keys
         for curve in by_frame[at]:
             _note_key(hand.stand, shown, curve)
         hands.append(hand)
@@ -297,7 +297,11 @@ def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve)
 def _take_all(
     controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
 ) -> None:
-    """Take keys of several frames, the current one last: the controls keep its values."""
+    """Store the controls of several frames in the tweak, then reset the controls of other frames to
+    the current frame.
+
+    hands: one for each frame, the current frame last.
+    """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
             _take(controls, hand, old)
@@ -308,10 +312,10 @@ def _take_all(
 
 
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
-    """The curves of an action that a tweak replaces: of sliders, handles and bones.
+    """The curves of sliders, handles and control bones in an action, by data path and index.
 
-    All channels of the bones are included, because Blender keys channels that the face does not
-    use.
+    All channels of the bones are included, because Blender also keys channels that the face does
+    not use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}
@@ -331,7 +335,7 @@ def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
 ) -> list[float] | None:
-    """The frames of keys that came since; None after any other edit."""
+    """The frames of keys that `before` lacks; None if the curve has any other edit."""
     frames, values = clip_actions.key_points(curve)
     if before is None:
         return frames.tolist()
@@ -344,7 +348,7 @@ def _inserted(
         return None  # keys were moved, deleted or doubled
     changed = same & (np.abs(values - old_values[places]) > _NEAR)
     if same.all() and (changed & (np.abs(frames - frame) >= _AT)).any():
-        return None  # keys were moved up or down
+        return None  # the user edited values of existing keys
     return frames[~same | changed].tolist()
 
 
@@ -355,7 +359,7 @@ def _restore(
     before: bpy.types.FCurve | None,
     frames: list[float],
 ) -> None:
-    """Give a curve the keys that it had; one that was not there goes."""
+    """Restore the keys that a curve had in `before`; remove the curve if `before` is None."""
     if before is None:
         bag = compat.bag_for(action, controls)
         if bag is not None:
@@ -364,7 +368,7 @@ def _restore(
     points, old = curve.keyframe_points, before.keyframe_points
     there = clip_actions.key_points(before)[0]
     new = [i for i, point in enumerate(points) if np.abs(there - point.co.x).min() >= _AT]
-    for index in reversed(new):  # one by one: to remove a key moves those behind it
+    for index in reversed(new):  # from the end, because a removal shifts the later keys
         points.remove(points[index], fast=True)
     for point, kept in zip(points, old, strict=True):
         if any(abs(point.co.x - f) < _AT for f in frames):
@@ -378,7 +382,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the keys below; None if none does."""
+    """The controls that differ from the pose below the tweak; None if none does."""
     rig = parts.rig_of(controls)
     if rig is None:
         return None

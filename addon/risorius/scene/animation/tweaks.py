@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tweak over a range: edits go into an additive layer above the keys, which stay as they are.
+"""Tweaks a range of frames: edits are stored in an additive layer, and the keys below stay.
 
-While a tweak is on, an edit becomes its difference from the keys below. The slider returns to the
-value of these keys, and the layer adds the difference. The same applies to the bones of head, neck
-and eyes, to the gaze target, and to the handles of a leading face board.
+While a tweak is on, the layer stores the difference between an edited slider and the keys below,
+and the slider returns to the value of these keys. The same applies to the bones of head, neck and
+eyes, to the gaze target, and to the handles of a leading face board.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..base.blender_types import ArmatureObject
 from ..character import board, runtime, sides
 from . import clip_actions, curve_colours, layer_mixing, layer_properties, layers
 
-_ON = "risorius_tweak"  # on the control armature: the tweak that is on, as JSON
-_LEAST = 1e-5  # a difference that counts
+_ON = "risorius_tweak"  # on the control armature: the active tweak as JSON
+_LEAST = 1e-5  # smaller differences of values are ignored
 _TARGET = "eyes"  # the bone of the gaze target
-_REST = (0.0, 0.0, 0.0)  # of its place
+_REST = (0.0, 0.0, 0.0)  # rest location of the gaze target
 _FARTHEST = (179.0, 89.0, 179.0)  # degrees of yaw, pitch and roll that a layer can hold
 
 
@@ -42,12 +42,12 @@ class Tweak:
 
     Attributes:
         first, last: its first and last frame, where its effect is 0.
-        fade: frames of the fade at each end.
+        fade: length of the fade at each end in frames.
         layer: name of its layer; empty until something is tweaked.
-        base: values of sliders without keys, by name.
-        places: places of handles without keys, by bone.
+        base: slider values when the tweak began, by name; used for sliders without keys.
+        places: positions of handles when the tweak began, by bone; used for handles without keys.
         bare: whether the face played no action when the tweak began.
-        bones: components of control bones without keys, by the data paths of `paths_of`.
+        bones: components of control bones when the tweak began, by the data paths of `paths_of`.
     """
 
     first: float
@@ -60,7 +60,7 @@ class Tweak:
     bones: dict[str, list[float]] = field(default_factory=dict)
 
     def weight(self, frame: float) -> float:
-        """How much of the layer a frame shows, 0 to 1."""
+        """The weight of the tweak's layer at a frame, 0 to 1."""
         ends = min(frame - self.first, self.last - frame)
         return min(max(ends / self.fade, 0.0), 1.0) if self.fade else float(ends > 0.0)
 
@@ -71,8 +71,8 @@ class Stand:
 
     Attributes:
         sliders: values by name.
-        places: places of handles of the face board, by bone.
-        bones: components by the data paths of `paths_of`.
+        places: positions of handles of the face board, by bone.
+        bones: rotation or location components, by the data paths of `paths_of`.
     """
 
     sliders: dict[str, float] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class Stand:
 
 
 def paths_of(controls: ArmatureObject) -> dict[str, str]:
-    """The properties of control bones that a tweak takes: data path -> bone."""
+    """Data path -> bone name, for the properties of control bones that a tweak can change."""
     bones, found = controls.pose.bones, {}
     for name in clip_units.TURNS:
         if name in bones:
@@ -92,7 +92,7 @@ def paths_of(controls: ArmatureObject) -> dict[str, str]:
 
 
 def of(controls: ArmatureObject) -> Tweak | None:
-    """The tweak that is on, or None."""
+    """The active tweak of a control armature; None if there is none or its data are damaged."""
     text = controls.get(_ON)
     if not isinstance(text, str):
         return None
@@ -104,7 +104,7 @@ def of(controls: ArmatureObject) -> Tweak | None:
 
 
 def _is_sound(tweak: Tweak) -> bool:
-    """Whether the stored data of a tweak in a file are complete."""
+    """Whether the stored data of a tweak have the expected types and finite numbers."""
     base, places, bones = tweak.base, tweak.places, tweak.bones
     if not all(isinstance(part, dict) for part in (base, places, bones)):
         return False
@@ -122,11 +122,11 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
     Args:
         controls: the control armature.
-        first, last: frames.
-        fade: frames at each end.
+        first, last: first and last frame of the tweak.
+        fade: length of the fade at each end in frames.
 
     Raises:
-        FaceError: the range has no room.
+        FaceError: the range is shorter than two frames, or the fade is negative.
     """
     if last - first < 2.0 or fade < 0.0:
         raise FaceError(told("A tweak needs a range of two frames or more."))
@@ -157,21 +157,21 @@ def take(
     held: bool = False,
     old: Curves | None = None,
 ) -> int:
-    """Store sliders and bones as the tweak of a frame, and set them back to the keys below.
+    """Store edited sliders and bones in the tweak at a frame, and reset them to the keys below.
 
     Args:
         controls: control armature with an active tweak.
         labels: sliders to store.
         frame: of the scene.
         bones: data paths of `paths_of`; others are ignored.
-        held: True: controls without a difference get a key too, if the tweak moves them already.
-        old: curves of the tweak so far, from `curves_so_far`; None: the current ones.
+        held: True: controls without a difference get a key too if the tweak moves them already.
+        old: earlier curves of the tweak, from `curves_so_far`; None: the current curves.
 
     Returns:
         The number of tweaked sliders and bones.
 
     Raises:
-        FaceError: the frame lies outside the tweak, or too near to its end for such a large
+        FaceError: the frame is outside the tweak, or its weight is too small for such a large
             rotation.
     """
     tweak = of(controls)
@@ -193,7 +193,7 @@ def take(
     rows = _bone_rows(controls, asked, below, old, frame, weight, held)
     changes |= _given(controls, below)
     for follower, leader in sides.followers(controls).items():
-        if leader in changes:  # a driver lets it follow the slider, and no layer
+        if leader in changes:  # its driver follows the slider but not the layer
             changes[follower] = changes[leader]
     for label, change in changes.items():
         path = parts.property_path(label)
@@ -223,10 +223,10 @@ def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -
 
 @contextmanager
 def curves_so_far(controls: ArmatureObject) -> Iterator[Curves]:
-    """The curves of a tweak's layer as they are now, for keys of several frames that come at once.
+    """Yields a copy of the curves of the tweak's layer, for keys of several frames at once.
 
     Args:
-        controls: the control armature, with a tweak that is on.
+        controls: the control armature; without a tweak or layer the result is empty.
     """
     tweak = of(controls)
     layer = _layer_of(controls, tweak) if tweak is not None else None
@@ -264,7 +264,7 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Values of the layer at a frame that reproduce the current bones, by data path."""
+    """Data path -> values of the layer at a frame that reproduce the current bones."""
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -300,14 +300,14 @@ def _bone_rows(
 
 
 def _rows_of(curves: Curves, path: str) -> list[bpy.types.FCurve | None]:
-    """The three curves of a place."""
+    """The curves of x, y and z of a location; None for an axis without a curve."""
     return [curves.get((path, axis)) for axis in range(3)]
 
 
 def _insert(
     controls: ArmatureObject, tweak: Tweak, rows: Mapping[str, Sequence[float]], frame: float
 ) -> None:
-    """Give the layer of a tweak keys at a frame: numbers by data path."""
+    """Insert keys into the layer of a tweak. Args: rows  components by data path."""
     layer = _layer(controls, tweak)
     action = layer.action
     bag = compat.bag_for(action, controls)
@@ -319,11 +319,11 @@ def _insert(
             _hold_ends(curve, tweak)
     curve_colours.colour_action(controls, action)
     layer.start = action.frame_range[0]
-    layer_mixing.note_edits([action])  # nothing plays it that Blender would tell of
+    layer_mixing.note_edits([action])  # no datablock plays it, so Blender reports no update
 
 
 def is_mixed(controls: ArmatureObject) -> bool:
-    """Whether NLA strips move the face too, so that its action alone does not give the pose."""
+    """Whether NLA strips or the blending of the action affect the pose, not the action alone."""
     data = controls.animation_data
     if data is None:
         return False
@@ -332,7 +332,7 @@ def is_mixed(controls: ArmatureObject) -> bool:
 
 
 def now(controls: ArmatureObject) -> Stand:
-    """The values of all that a tweak takes. Args: controls  the original or evaluated armature."""
+    """The current pose of the controls. Args: controls  the original or evaluated armature."""
     face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls.original)
     found = Stand({n: float(v) for n, v in face.items() if isinstance(v, float)})
     if rig is not None:
@@ -346,7 +346,7 @@ def changed(stand: Stand, other: Stand) -> Stand:
 
     Args:
         stand: the pose.
-        other: the pose to compare with; controls that it lacks are left out.
+        other: the pose to compare with; controls missing from it are left out.
     """
 
     def differing(rows: Rows, others: Rows) -> Rows:
@@ -369,7 +369,7 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 
     Args:
         controls: the control armature.
-        stand: from `now` or `below_at`, or a part of one.
+        stand: a pose from `now` or `below_at`, or a part of such a pose.
     """
     face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls)
     for label, value in stand.sliders.items():
@@ -380,9 +380,9 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 
 
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
-    """The values of the controls without the tweak.
+    """The pose of the controls without the tweak.
 
-    On a face with NLA strips Blender evaluates them in a separate dependency graph.
+    On a face with NLA strips, Blender evaluates the pose in a separate dependency graph.
 
     Args:
         controls: the control armature.
@@ -409,7 +409,7 @@ def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
 
 
 def _shown(controls: ArmatureObject, base: Stand, frame: float) -> Stand:
-    """The evaluated controls at a frame; controls that nothing moves keep the given pose."""
+    """The evaluated pose at a frame; controls that no action moves keep the values of `base`."""
     data = controls.animation_data
     assert data is not None
     actions = compat.played_actions(controls) if data.use_nla else filter(None, [data.action])
@@ -429,7 +429,7 @@ def _shown(controls: ArmatureObject, base: Stand, frame: float) -> Stand:
 
 
 def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
-    """The curves that move the controls, without muted ones."""
+    """The curves of the active action that move the controls, without muted curves."""
     data = controls.animation_data
     if data is None or data.action is None:
         return []
@@ -437,7 +437,8 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """By how much a board that leads gives more than without the tweak; its handles go back."""
+    """Slider -> change of its value by the moved handles of a leading board; the handles return to
+    the pose below the tweak."""
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}
@@ -447,7 +448,7 @@ def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
 
 
 def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer:
-    """The layer of a tweak, made when first something is tweaked."""
+    """The layer of a tweak; created if it does not exist."""
     found = _layer_of(controls, tweak)
     if found is not None and found.action is not None:
         return found
@@ -462,7 +463,7 @@ def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_
 
 
 def _hold_ends(curve: bpy.types.FCurve, tweak: Tweak) -> None:
-    """Let a curve last from the first frame to the last, as its inner keys begin and end."""
+    """Add keys at both ends of the tweak with the values of the first and last inner key."""
     inner = [k for k in curve.keyframe_points if tweak.first + 1e-3 < k.co.x < tweak.last - 1e-3]
     for frame, value in ((tweak.first, inner[0].co.y), (tweak.last, inner[-1].co.y)):
         curve.keyframe_points.insert(frame, value)

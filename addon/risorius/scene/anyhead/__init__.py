@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions: its landmarks, and how it becomes a face."""
+"""Landmarks of a head without expressions, and the tasks that make a face from it."""

@@ -19,10 +19,10 @@ Doubles = NDArray[np.float64]
 
 
 class Finding(NamedTuple):
-    """Landmarks in the head's own coordinates.
+    """The result of a search: landmarks in the coordinates of the head's object.
 
     Attributes:
-        places: name -> float64[3].
+        places: name -> float64[3], the position.
         missing: names of needed landmarks that were not found.
         notes: sentences about the head.
     """
@@ -38,7 +38,7 @@ class Head(NamedTuple):
     Attributes:
         parts: the meshes, the face first, in the space of shape_key_head.turn_of.
         turn: float64[3, 3], from the coordinates of the head's object to that space.
-        fixed: landmarks that a person moved or placed, in that space.
+        fixed: landmarks that the user moved or placed, in that space.
         named: name of the object that is the face; "": the package chooses one of the meshes.
     """
 
@@ -52,7 +52,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
     """Read a head and its other meshes.
 
     Args:
-        context: the scene says what a unit is.
+        context: its scene defines the length of a unit.
         head: the mesh that is the face.
         others: meshes that belong to it: eyes, teeth, hair.
     """
@@ -70,13 +70,13 @@ def words() -> Mapping[str, str]:
 
 
 def needed() -> frozenset[str]:
-    """The landmarks without which a head becomes no face."""
+    """Names of the landmarks that are needed to make a face from a head."""
     found: frozenset[str] = native.part("anyhead.landmarks.names").needed_landmarks()
     return found
 
 
 def _search(head: Head, progress: Callable[[float], bool]) -> native.Landmarks:
-    """The landmarks of a head, beside those that a person placed."""
+    """Find the landmarks of a head; landmarks that the user placed are kept."""
     module = native.part("anyhead.landmarks.find")
     hints = module.Hints(where=head.parts[0].name, marks=dict(head.fixed))
     found: native.Landmarks = module.find_landmarks(surface_of(head.parts[0]), hints)
@@ -88,8 +88,8 @@ def on_object(head: Head, found: native.Landmarks) -> Finding:
     """Landmarks of the package in the coordinates of the head's object.
 
     Args:
-        head: of `read`.
-        found: in the head's centimetres.
+        head: the result of `read`.
+        found: landmarks in the space of `head.parts`.
     """
     back = np.linalg.inv(head.turn)
     places = {name: back @ np.asarray(point) for name, point in found.points.items()}
@@ -98,10 +98,10 @@ def on_object(head: Head, found: native.Landmarks) -> Finding:
 
 
 def marks_of(head: Head) -> native.Landmarks | None:
-    """The landmarks that a person moved or placed, or None.
+    """The landmarks that the user moved or placed, or None if there are none.
 
     Args:
-        head: of `read`.
+        head: the result of `read`.
     """
     if not head.fixed:
         return None
@@ -112,7 +112,7 @@ def marks_of(head: Head) -> native.Landmarks | None:
 
 
 def surface_of(part: native.HeadPart) -> native.HeadSurface:
-    """A mesh as risorius.anyhead.surface.Surface. Args: part  its polygons become triangles."""
+    """The triangulated polygons of a mesh as risorius.anyhead.surface.Surface."""
     surface: native.HeadSurface = native.part("anyhead.surface").Surface.of_polygons(
         part.mesh.positions, part.mesh.faces
     )
@@ -120,7 +120,7 @@ def surface_of(part: native.HeadPart) -> native.HeadSurface:
 
 
 def find_task(head: Head) -> Task[Finding]:
-    """The finding of landmarks beside Blender. Args: head  of `read`."""
+    """A background task that finds the landmarks of a head, the result of `read`."""
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Finding:
         return on_object(head, _search(head, telling(progress, cancelled)))
@@ -129,7 +129,12 @@ def find_task(head: Head) -> Task[Finding]:
 
 
 def text_of(head: Head, places: Mapping[str, Doubles]) -> str:
-    """Landmarks as a JSON file has them. Args: head  of `read`; places  in its object's space."""
+    """Landmarks as the text of a JSON file.
+
+    Args:
+        head: the result of `read`.
+        places: landmarks by name, in the coordinates of the head's object.
+    """
     module = native.part("anyhead.landmarks.marks")
     out = module.Landmarks()
     for name, place in places.items():
@@ -139,15 +144,15 @@ def text_of(head: Head, places: Mapping[str, Doubles]) -> str:
 
 
 def read_file(head: Head, path: str) -> dict[str, Doubles]:
-    """The landmarks of a JSON file, in the head's own coordinates.
+    """Read the landmarks of a JSON file, in the coordinates of the head's object.
 
     Args:
-        head: of `read`.
-        path: of the file.
+        head: the result of `read`.
+        path: the JSON file.
 
     Raises:
-        LandmarkError: the file has something else; the sentence names it.
-        OSError: it cannot be read.
+        LandmarkError: the file is not a valid landmark file; the message says why.
+        OSError: the file cannot be read.
     """
     found = native.part("anyhead.landmarks.marks").read_landmarks(path)
     return dict(on_object(head, found).places)

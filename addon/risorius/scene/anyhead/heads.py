@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head and the face that the selection names."""
+"""Finds the head and the face of the selection."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def head_of(context: Context) -> MeshObject | None:
 
 
 def face_of(context: Context) -> ArmatureObject | None:
-    """The face that is selected, else the only one of the scene, else None.
+    """The selected face; without a selected face the only face of the scene; else None.
 
     Args:
         context: has the selection.
@@ -48,13 +48,13 @@ def face_of(context: Context) -> ArmatureObject | None:
 
 
 def face_there(context: Context) -> ArmatureObject:
-    """The face of face_of.
+    """The selected face, or the only face of the scene.
 
     Args:
         context: has the selection.
 
     Raises:
-        FaceError: there is none, or there are several.
+        FaceError: there is no face, or there are several.
     """
     rig = face_of(context)
     if rig is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work on a head without expressions: its rig is made, or a face is conformed to it."""
+"""Background tasks on a head without expressions: making its rig, or conforming a face to it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FITTED = 0.6  # share of the total time after which the head has its expression
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task of two stages. Attributes: stage  FIT or JOINTS."""
+    """A task of two stages; `stage` is FIT or JOINTS."""
 
     stage = FIT
 
@@ -52,7 +52,7 @@ class Template(NamedTuple):
     path: str = ""
 
     def load(self) -> native.Dna:
-        """The template face.
+        """Load the template face, unless it is a face of the scene.
 
         Raises:
             DnaError: the file is not a DNA file.
@@ -65,8 +65,12 @@ class Template(NamedTuple):
 
 
 class Transfer(NamedTuple):
-    """Options of the transfer. Attributes: strength  factor on all expressions; repair  whether
-    contacts of lids, lips and teeth are repaired."""
+    """Options of the transfer.
+
+    Attributes:
+        strength: factor of all expressions, 0 to 1.5.
+        repair: whether contacts of lids, lips and teeth are repaired.
+    """
 
     strength: float = 1.0
     repair: bool = True
@@ -92,7 +96,7 @@ def rig_task(
     """A task that makes a DNA file of a head without expressions. A cancelled task writes no file.
 
     Args:
-        head: of finding.read.
+        head: the result of finding.read.
         template: the face with the expressions.
         transfer: options of the transfer.
         wishes: options of the rig.
@@ -124,7 +128,7 @@ def _carry_over(
         strength=transfer.strength,
         repaired=transfer.repair,
         marks=finding.marks_of(head),
-        # An object has the size that it has: a face that is made smaller would not fit its body.
+        # The head keeps its size, because a face of another size would not fit its body.
         wishes=parts.Wishes(mesh=head.named, scale=1.0),
     )
     name = head.parts[0].name
@@ -137,7 +141,7 @@ def _carry_over(
 
 
 def _write(dna: native.Dna, read: native.Read, path: str) -> None:
-    """Write a face and the textures of the meshes that it has from the template."""
+    """Write a face and the textures of its materials."""
     textures = native.part("author.heads.textures")
     found = textures.textures_of(read.materials, textures.texture_folder(Path(path)))
     named = textures.metadata_of(dna.mesh_names, read.materials, found)
@@ -149,12 +153,12 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
     """A task that gives a face the form of a head. A cancelled task writes no file.
 
     Args:
-        head: of finding.read; it may be a sculpt with the vertices of the face.
-        template: the face.
-        path: of the new file.
+        head: the result of finding.read; it may be a sculpt with the topology of the face.
+        template: the face that is conformed.
+        path: the new DNA file.
 
     Returns:
-        A task whose result is a list of sentences about the work.
+        A task with a list of sentences about the work as result.
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> list[str]:
@@ -170,12 +174,12 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The textures that lie beside the DNA file of a face, by their new paths.
+    """The textures of a face's DNA file, by their paths for the new file.
 
     Args:
         dna: the face.
-        source: the DNA file of the face, or "". It may have been deleted.
-        path: of the new file.
+        source: the DNA file of the face, or "". Without the file there are no textures.
+        path: the new DNA file.
     """
     if not source or not Path(source).is_file():
         return {}

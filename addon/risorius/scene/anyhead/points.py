@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks of a head as empties on it: found, moved by hand, placed by hand."""
+"""Shows the landmarks of a head as empties, and reads them back after the user moved them."""
 
 from __future__ import annotations
 
@@ -18,25 +18,23 @@ Doubles = NDArray[np.float64]
 Place = Vector | Doubles
 
 FOUND, MOVED, PLACED = "FOUND", "MOVED", "PLACED"
-# Colours of the empties, which views show whose wires have the colours of objects.
+# Colours of the empties; visible in viewports with the wireframe colour "Object".
 _COLORS = {
     FOUND: (0.15, 0.75, 0.3, 1.0),
     MOVED: (1.0, 0.55, 0.05, 1.0),
     PLACED: (0.2, 0.5, 1.0, 1.0),
 }
-_SIZE = 0.012  # of an empty, in the largest side of the box around all landmarks
-_STAYED = (
-    1e-4  # of the same: one that is nearer to the place where it was found counts as not moved
-)
+_SIZE = 0.012  # size of an empty / largest side of the box around all landmarks
+_STAYED = 1e-4  # of that side: a landmark this close to the place where it was found is not moved
 
 
 class Point(NamedTuple):
-    """A landmark that is shown.
+    """A landmark that is shown as an empty.
 
     Attributes:
-        name: as the package has it.
-        place: float64[3] in the head's own coordinates.
-        state: FOUND, MOVED, or PLACED where it was not found.
+        name: the name of the landmark in the package.
+        place: float64[3], in the coordinates of the head's object.
+        state: FOUND, MOVED (found, then moved), or PLACED (not found, placed by the user).
         item: the empty.
     """
 
@@ -52,7 +50,7 @@ def is_point(item: bpy.types.Object | None) -> bool:
 
 
 def of(head: bpy.types.Object) -> dict[str, Point]:
-    """The landmarks of a head, by their names. Args: head  the mesh object."""
+    """The landmarks of a head, a mesh object, by name."""
     items = [item for item in head.children if is_point(item)]
     into = head.matrix_world.inverted_safe()
     places = {
@@ -68,13 +66,13 @@ def of(head: bpy.types.Object) -> dict[str, Point]:
             stayed = np.linalg.norm(place - found) <= _STAYED * size
             state = FOUND if stayed else MOVED
         name = saved.text(item, parts.LANDMARK)
-        # A copy of the empty beside it does not count.
+        # Ignores copies of an empty, which come later in the order of names.
         out.setdefault(name, Point(name, place, state, item))
     return out
 
 
 def by_hand(points: Mapping[str, Point]) -> dict[str, Doubles]:
-    """Where a person wants landmarks: those that were moved or placed. Args: points  of `of`."""
+    """Positions of the landmarks that the user moved or placed. `points` is the result of `of`."""
     return {name: point.place for name, point in points.items() if point.state != FOUND}
 
 
@@ -83,12 +81,12 @@ def show(
     head: MeshObject,
     found: Mapping[str, Place],
 ) -> None:
-    """Show landmarks that were found; one that a person moved or placed stays where it is.
+    """Show landmarks that were found. Landmarks that the user moved or placed keep their places.
 
     Args:
         context: has the scene.
         head: the mesh object.
-        found: name -> [3] in the head's own coordinates.
+        found: name -> float[3], positions in the coordinates of the head's object.
     """
     there = of(head)
     size = _size([*(np.asarray(p) for p in found.values()), *(p.place for p in there.values())])
@@ -107,16 +105,16 @@ def show(
 
 
 def place(context: Context, head: MeshObject, name: str, where: Place) -> bpy.types.Object:
-    """Put a landmark where a person wants it.
+    """Place a landmark at a position that the user chose.
 
     Args:
         context: has the scene.
         head: the mesh object.
-        name: of the landmark.
-        where: [3] in the head's own coordinates.
+        name: name of the landmark.
+        where: float[3], the position in the coordinates of the head's object.
 
     Returns:
-        The empty.
+        The empty of the landmark.
     """
     there = of(head)
     point = there.get(name)
@@ -130,13 +128,13 @@ def place(context: Context, head: MeshObject, name: str, where: Place) -> bpy.ty
 
 
 def remove(head: bpy.types.Object) -> int:
-    """Take the landmarks of a head away, with their collection.
+    """Delete the landmarks of a head, and their collection if it is then empty.
 
     Args:
         head: the mesh object.
 
     Returns:
-        How many there were.
+        The number of deleted landmarks.
     """
     items = [item for item in head.children if is_point(item)]
     _delete(items)
@@ -144,7 +142,7 @@ def remove(head: bpy.types.Object) -> int:
 
 
 def names_are_shown(points: Iterable[Point]) -> bool:
-    """Whether the views write the names of landmarks beside them. Args: points  of a head."""
+    """Whether the viewports show the name of at least one of the landmarks."""
     return any(point.item.show_name for point in points)
 
 
@@ -179,7 +177,7 @@ def _put(head: bpy.types.Object, item: bpy.types.Object, where: Place) -> None:
 
 
 def _collection(context: Context, head: bpy.types.Object) -> bpy.types.Collection:
-    """Where the landmarks of a head are: with those that are there, else a new collection."""
+    """The collection of a head's landmarks; created if it has none."""
     for item in head.children:
         if is_point(item):
             for group in item.users_collection:
@@ -192,12 +190,12 @@ def _collection(context: Context, head: bpy.types.Object) -> bpy.types.Collectio
 
 
 def _size(places: Iterable[Doubles]) -> float:
-    """The largest side of the box around points; 0 of none."""
+    """The largest side of the bounding box of points; 0 without points."""
     rows = [np.asarray(place, np.float64) for place in places]
     return float(np.ptp(np.stack(rows), axis=0).max()) if rows else 0.0
 
 
 def head_of(item: bpy.types.Object | None) -> MeshObject | None:
-    """The head that a landmark is on, or None. Args: item  any object."""
+    """The head of a landmark; None if the object is not a landmark."""
     above = item.parent if item is not None and is_point(item) else None
     return cast(MeshObject, above) if above is not None and above.type == "MESH" else None

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animation of a face as plain actions."""
+"""Bakes the animation of a face to actions that play without the add-on."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face's animation as plain actions, and back to live.
+"""Bakes the animation of a face to actions, and restores the live face.
 
-Actions alone move a baked face. The evaluator leaves it, so nothing is driven twice, and the file
-looks the same in a Blender without the add-on. Each part stores its earlier animation in the file.
+Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
+file looks the same in a Blender without the add-on. Each part stores its earlier animation.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _CONSTRAINTS = "constraints"
 
 
 class BakeError(FaceError, RuntimeError):
-    """Why a face cannot be baked, in one sentence."""
+    """A face cannot be baked; the text gives the reason in one sentence."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class BakeOptions:
 
     Attributes:
         kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
-        start, end, step: frames; the step may be a fraction.
+        start, end, step: range and step in frames; the step may be a fraction.
         lod: level of detail of a RESULT; -1: the level in the viewport.
-        wanted: parts of a RESULT, some of "BONES", "SHAPES", "MAPS"; other parts keep their state.
-        error: largest error of removed keys, see key_reduction.reduce_keys.
-        strip: put the actions onto new NLA tracks.
+        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; others keep their state.
+        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """
 
     kind: str = RESULT
@@ -57,7 +57,7 @@ class BakeOptions:
 
 
 def baked(rig: ArmatureObject) -> str:
-    """The kind of bake of a character: RESULT, CONTROLS or "" for live."""
+    """The kind of bake of a character: RESULT, CONTROLS, or "" if it is not baked."""
     if parts.BAKED in rig:
         return RESULT
     controls = parts.controls_of(rig)
@@ -65,7 +65,7 @@ def baked(rig: ArmatureObject) -> str:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about a baked character; empty for a live one."""
+    """The sentence of the panel about a baked character; "" if it is not baked."""
     kind = baked(rig)
     if not kind:
         return ""
@@ -90,7 +90,7 @@ def refusal(rig: ArmatureObject, kind: str) -> str:
     """The reason why a character cannot be baked now, in one sentence; empty if it can.
 
     Args:
-        rig: its deforming armature.
+        rig: the deforming armature.
         kind: kind of bake: CONTROLS or RESULT.
     """
     if baked(rig) in (RESULT, kind):
@@ -113,15 +113,15 @@ def refusal(rig: ArmatureObject, kind: str) -> str:
 def bake(
     context: Context, rigs: Sequence[ArmatureObject], options: BakeOptions
 ) -> Generator[float, None, list[str]]:
-    """Bake characters; a generator that shows progress and can be cancelled without damage.
+    """Bake characters; a generator that yields progress and can be cancelled without damage.
 
     Args:
         context: scene and view layer.
         rigs: deforming armatures.
-        options: BakeOptions.
+        options: range, kind and parts of the bake.
 
     Yields:
-        The finished share, 0 to 1. Nothing changes before the last one.
+        The progress, 0 to 1. No character changes before the last value.
 
     Returns:
         Sentences for a report, one for each character.
@@ -162,13 +162,13 @@ def level_of(rig: ArmatureObject, lod: int) -> int:
 
     Args:
         rig: deforming armature of the character.
-        lod: the wanted level; negative for the one that the viewport shows.
+        lod: the wanted level; negative for the level in the viewport.
 
     Returns:
-        The level, never beyond the coarsest that the DNA has.
+        The level, at most the coarsest level of the DNA file.
 
     Raises:
-        BakeError: it was not built.
+        BakeError: the meshes of this level were not built.
     """
     level = lods.viewport_level(rig) if lod < 0 else lod
     there = lods.built(rig)
@@ -182,7 +182,7 @@ def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
 
     Args:
         rig: deforming armature of the character.
-        level: 0 is the finest.
+        level: level of detail; 0 is the finest.
     """
     return [m for m in parts.meshes_of(rig) if lods.shows(m, level)]
 
@@ -195,7 +195,7 @@ def animated_keys(rig: ArmatureObject, level: int) -> list[tuple[MeshObject, lis
         level: level of detail; only its meshes count.
 
     Returns:
-        (mesh, data paths) of each mesh that has such keys.
+        (mesh, data paths of the animated keys) of each mesh with such keys.
     """
     found = []
     for item in shown(rig, level):
@@ -286,7 +286,7 @@ def _write_controls(
 
 
 def unbake(context: Context, rig: ArmatureObject) -> bool:
-    """Back to live: restore the animation before the last bake.
+    """Restore the animation that a character had before its bake.
 
     Args:
         context: scene and view layer.
@@ -309,7 +309,7 @@ def unbake(context: Context, rig: ArmatureObject) -> bool:
 
 
 def _take_back(rig: ArmatureObject, kind: str) -> None:
-    """Undo the writes of a failed bake on a character, complete or partial."""
+    """Undo the complete or partial writes of a failed bake on a character."""
     controls = parts.controls_there(rig)
     if kind == CONTROLS and parts.BAKED in controls:
         _restore_controls(controls)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape keys for baked values. A mesh in LIVE mode gets them for the bake and loses them
-afterwards."""
+"""Adds the shape keys that a bake animates to meshes in LIVE mode, and removes them later."""
 
 from __future__ import annotations
 
@@ -10,19 +9,19 @@ from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import build, meshes, runtime
 
-OPENED = "risorius_opened"  # on a Key: names of the keys that were made for a bake
+OPENED = "risorius_opened"  # on a Key: "channel name" of each shape key that was made for a bake
 
 
 def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
-    """The real keys of a mesh by channel; a mesh in LIVE mode gets the keys that the bake needs.
+    """The real shape keys of a mesh by channel; in LIVE mode, keys that the bake needs are added.
 
     Args:
         item: mesh object.
-        live: its character's Runtime.
+        live: Runtime of the mesh's character.
         used: channels that differ from 0 in the bake.
 
     Returns:
-        Channel -> key name; empty if the vertices of the mesh differ from its file.
+        Channel -> key name; empty if the mesh's vertex count differs from its DNA file.
     """
     dna_mesh = runtime.dna_mesh(live, item)
     key = item.data.shape_keys
@@ -45,12 +44,12 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
 
 
 def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
-    """Remove the keys of a bake. Edited keys stay as real, driven keys.
+    """Remove the shape keys of a bake. Keys that the user edited stay and get their drivers.
 
     Args:
-        item: mesh object without its baked action.
-        rig: its deforming armature.
-        live: its Runtime.
+        item: mesh object; its baked action is removed already.
+        rig: deforming armature of the character.
+        live: Runtime of the character.
     """
     key = item.data.shape_keys
     dna_mesh = runtime.dna_mesh(live, item)

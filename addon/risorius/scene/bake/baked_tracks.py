@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Samples of a face to the values of every property that they move."""
+"""Computes the baked values of all animated properties from the samples of a face."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _CHANNEL = re.compile(r'^\["channels"\]\[(\d+)\]$')
 
 
 def evaluate(live: runtime.Runtime, samples: sampling.Samples, lod: int) -> native.Pose:
-    """The poses of all frames.
+    """Evaluate the rig at all frames of the samples.
 
     Args:
         live: the character's Runtime.
@@ -48,19 +48,18 @@ def rig_tracks(
     wanted: Collection[str],
     target: ArmatureObject | None = None,
 ) -> list[Track]:
-    """Tracks of the deforming armature.
+    """Tracks of the deforming armature. The target gets the values of the first frame.
 
     Args:
         rig: the character's deforming armature.
-        live: its Runtime.
-        samples: sampling.Samples.
+        live: the character's Runtime.
+        samples: inputs of the face, from sampling.sample.
         pose: from `evaluate`.
-        wanted: some of "BONES", "MAPS".
-        target: the armature that will play them and gets the values of the first frame: a copy of
-            the rig, or None for the rig.
+        wanted: parts to bake; "BONES" and "MAPS" count here.
+        target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:
-        Tracks.
+        Tracks of bones, maps, channels, and other animated properties.
     """
     target = target or rig
     found = {t.path: t for t in _others(samples.others.get(rig, {}), rig)}
@@ -131,7 +130,7 @@ _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 
 
 def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
-    """The track of the face's place, if it follows the control armature."""
+    """Tracks of the rig's object transform if it follows the control armature and moves."""
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
     matrices = samples.places
@@ -164,7 +163,8 @@ def _array(
     group: str,
     indices: Iterable[int] | None = None,
 ) -> list[Track]:
-    """Tracks of an array property, one for each entry, which gets the first frame's value."""
+    """Tracks of an array property, one for each index, all by default. The property gets the
+    values of the first frame."""
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
     target[name][:] = values[0].tolist()
@@ -177,7 +177,7 @@ def _array(
 
 
 def _read_channels(rig: ArmatureObject) -> list[int]:
-    """The channels that drivers of the user's own read."""
+    """The indices of the channels that the user's own drivers read."""
     ours = {m.data.shape_keys for m in parts.meshes_of(rig)}
     found = set()
     for owner, target in drivers.targets_at(rig):
@@ -196,13 +196,13 @@ def key_tracks(
     """Tracks of the shape keys of a mesh. The keys get the values of the first frame.
 
     Args:
-        key: the Key.
+        key: the Key datablock.
         names: channel -> key name.
-        weights: float32[N, B] of a Pose.
+        weights: float32[N, B], blend shape weights at N frames.
         others: path -> values of keys that the user animates, see Samples.
 
     Returns:
-        Tracks.
+        One track for each of these keys, and for each key in `others`.
     """
     tracks = list(_others(others or {}, key))
     for channel, name in names.items():
@@ -213,7 +213,7 @@ def key_tracks(
 
 
 def key_path(name: str) -> str:
-    """The data path of a shape key's value, from its Key."""
+    """The data path of a shape key's value, relative to the Key datablock."""
     return f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
 
 
@@ -225,10 +225,10 @@ def control_tracks(
     Args:
         controls: control armature.
         live: the character's Runtime.
-        samples: sampling.Samples.
+        samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. A slider or bone at rest in the whole range has no track.
+        Tracks. `actions.write` makes no curve for a slider or bone that never leaves its value.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulations on and around faces, baked by Blender; never with a face of the wrong frame."""
+"""Bakes the simulations of a scene, unless a face would be evaluated at the wrong frame."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
 
     Args:
         context: its scene is played.
-        rigs: the faces in it.
+        rigs: the faces in the scene.
 
     Returns:
         A sentence for a report.
 
     Raises:
-        BakeError: the scene has nothing to bake, or a face cannot be evaluated before its frame;
-            started bakes are freed.
+        BakeError: the scene has no simulation with a cache, a cache begins below frame 0, or a face
+            cannot be evaluated before its frame; if this shows during the bake, bakes are freed.
     """
     found = [cache for _key, cache in caches.of_scene(context.scene)]
     count = len(found)
@@ -35,7 +35,7 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         raise BakeError(told("There is no simulation with a cache in this scene."))
     begin = min(cache.frame_start for cache in found)
     if begin < 0:
-        # Blender counts frames of a cache without a sign: negative frames read as the last one.
+        # Blender reads cache frames as unsigned numbers, so a negative frame reads as the last.
         raise BakeError(
             told(
                 "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs of a face, frame by frame over a range, without changing the scene.
+"""Reads the inputs of a face (sliders, rotations, other animation) at the frames of a range.
 
 Blender evaluates actions, NLA, drivers, constraints and bodies in a separate scene that has only
-the two armatures of the face and the objects they depend on. Every frame equals the result of frame
-stepping, other objects of the scene cost nothing, and the frame of the scene never changes.
+the two armatures of the face and the objects they depend on. The result of every frame equals frame
+stepping in the user's scene, whose other objects are not evaluated and whose frame stays. A few
+features need the user's scene itself (`_needs_whole_scene`); its frame is restored afterwards.
 """
 
 from __future__ import annotations
@@ -34,17 +35,17 @@ class Samples:
     """The inputs of one face.
 
     Attributes:
-        frames: float64[N].
-        times: float64[N], the frames at which actions are read; Time Stretching makes them differ.
-        raw: float32[N, R], the raw controls for the rig.
-        sliders: float32[N, R], the raw controls before the eye bones add to the look controls. Both
-            include the layers.
+        frames: float64[N], frames of the scene.
+        times: float64[N], frames at which Blender reads actions; they differ from `frames` if the
+            scene uses Time Stretching.
+        raw: float32[N, R], the raw controls for the rig, with layers.
+        sliders: float32[N, R], like raw, before the eye bones add to the look controls.
         turns: for each frame "neck", "head" -> Quaternion, see inputs.read_inputs.
         basis: control bone -> float64[N, 4, 4], relative to its rest, after constraints and layers.
-        places: float64[N, 4, 4] of the control armature in the world.
-        bones: "location", ... -> float32[N, bones, width] of the deforming armature's bones without
-            the evaluator; None if nothing animates them.
-        others: id -> {(path, first index): list of values} of other animated properties.
+        places: float64[N, 4, 4], world matrices of the control armature.
+        bones: channel such as "location" -> float32[N, bones, width], values of the deforming
+            armature's bones without the evaluator; None if nothing animates them.
+        others: datablock -> {data path: list of values} of other animated properties.
     """
 
     frames: NDArray[np.float64]
@@ -64,16 +65,16 @@ def sample(
     frames: NDArray[np.float64],
     keys: Sequence[tuple[MeshObject, list[str]]] = (),
 ) -> Generator[float, None, list[Samples]]:
-    """Read the inputs of faces over a range; a generator that shows progress and can be cancelled.
+    """Read the inputs of faces over a range; a generator that yields progress and can be cancelled.
 
     Args:
         context: its scene gives the frame rate; the scene itself is stepped only if necessary.
         rigs: deforming armatures.
-        frames: float64[N].
-        keys: (mesh object, data paths) of shape keys that have animation of their own.
+        frames: float64[N], frames of the scene.
+        keys: (mesh object, data paths) of shape keys with animation by the user.
 
     Yields:
-        The finished share, 0 to 1.
+        The progress, 0 to 1.
 
     Returns:
         The Samples of each rig, in order.
@@ -99,7 +100,8 @@ def sample(
 
 
 def _times(scene: bpy.types.Scene, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where Blender reads actions at frames of a scene, float64[N], rounded as it rounds them."""
+    """float64[N]: the frames at which Blender reads actions under Time Stretching, in float32
+    precision."""
     length = np.float32(scene.render.frame_map_old / scene.render.frame_map_new)
     return (frames.astype(np.float32) * length).astype(np.float64)
 
@@ -108,7 +110,8 @@ def _times(scene: bpy.types.Scene, frames: NDArray[np.float64]) -> NDArray[np.fl
 def _stage(
     context: Context, rigs: Sequence[ArmatureObject], items: Iterable[bpy.types.Object]
 ) -> Iterator[bpy.types.Scene]:
-    """A scene to step through."""
+    """Context manager: a new scene with the given objects to step through, or the user's scene if
+    necessary."""
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:
             yield scene
@@ -138,7 +141,7 @@ def _whole_scene(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
 
 
 def _is_there(scene: bpy.types.Scene) -> bool:
-    """Whether a scene is still in the file: another file may have been opened meanwhile."""
+    """Whether a scene is still in the file; the user may have opened another file."""
     try:
         return scene in bpy.data.scenes[:]
     except ReferenceError:
@@ -146,8 +149,8 @@ def _is_there(scene: bpy.types.Scene) -> bool:
 
 
 def _needs_whole_scene(scene: bpy.types.Scene, rigs: Iterable[ArmatureObject]) -> bool:
-    """Whether the scene itself must be stepped: for simulated bodies, drivers by context, and
-    hidden objects, which Blender evaluates only for visible objects.
+    """Whether the user's scene must be stepped, because it has rigid bodies, drivers with context
+    properties, or a hidden armature, which Blender evaluates only for visible objects.
     """
     if scene.rigidbody_world is not None:
         return True
@@ -189,8 +192,7 @@ class _Reader:
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
         hold = rig_placement.body_of(self.controls)
         if hold is not None:
-            # Hold all of its bones: Blender does not evaluate bones that no visible object depends
-            # on.
+            # Add the body, because Blender skips bones that no visible object depends on.
             self.objects.append(hold.target)
         if drivers.moves(rig):
             size = len(rig.pose.bones)
@@ -235,12 +237,12 @@ class _Reader:
         raw: NDArray[np.float32],
         own: layer_mixing.Bones,
     ) -> Iterator[None]:
-        """Context manager: constraints on the joints of neck and head see the rotations of this
-        frame.
+        """Context manager: pose the rig at this frame, so that constraints that read its joints see
+        the pose. The earlier pose is restored at the end.
 
         Args:
             depsgraph: at the frame; it is evaluated once more.
-            raw, own: see inputs.read_mixed.
+            raw, own: results of inputs.read_mixed.
         """
         if not joint_readings.of(self.rig, self.live).places:
             yield
@@ -267,7 +269,7 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Args: own  how they are turned and moved with the layers."""
+        """Store the matrices of the control bones. Args: own  their transforms with layers."""
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -292,7 +294,7 @@ class _Reader:
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
-    """The numbers at a path; None if it leads to nothing or to text."""
+    """The numbers at a data path; None if the path is invalid or its value is not numeric."""
     try:
         value = owner.path_resolve(path)
     except ValueError:
@@ -310,7 +312,7 @@ def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True
 
     Args:
         owner: the object or the shape keys.
-        drivers: whether paths of drivers count too.
+        drivers: True: include driven paths.
     """
     data = owner.animation_data
     if data is None:

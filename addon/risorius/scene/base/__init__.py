@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding and storing the parts of a character, and differences between Blender versions."""
+"""Finds and stores the parts of a character, and hides differences between Blender versions."""

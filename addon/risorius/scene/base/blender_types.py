@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A checker treats members of this Context as present; Blender's own may be None: pyright:
-# reportIncompatibleMethodOverride=false
-"""Types for annotations that are more exact than Blender's own.
+# Members of this Context are never None, which pyright would report:
+# pyright: reportIncompatibleMethodOverride=false
+"""Types for annotations that are more exact than the stubs of Blender's API.
 
-An Object type for each kind of data: Blender's class may have data of any kind. In the stubs of
-    Blender's API a context may lack a scene or a window manager. It has both while an operator runs
-    or a panel is drawn, so code need not test it each time. At run time all classes here are
-    Blender's own. Any is used here because a base class lacks the members of its kinds. No other
-    file of the add-on may use Any in a signature.
+Objects have one type for each kind of data. A Context always has a scene and a window manager,
+because it has both while an operator runs or a panel is drawn. At run time all classes here are
+Blender's own. Any is used for types whose subtypes have different members. No other file of the
+add-on may use Any in a signature.
 """
 
 from __future__ import annotations
@@ -17,15 +16,13 @@ from typing import TYPE_CHECKING, Any, cast
 import bpy
 from numpy.typing import NDArray
 
-Node = Any  # one of some hundred kinds, each with settings of its own
-Attribute = Any  # of a mesh: each type has data of its own
-NodeTree = Any  # of a material, a scene or a group
-Socket = Any  # each kind has another default_value
-Values = NDArray[
-    Any
-]  # of a mesh's layer: a row each vertex, corner or face, of the layer's own type
-Override = dict[str, Any]  # what bpy.context.temp_override takes: members of all kinds
-Animated = bpy.types.Object | bpy.types.Key  # what a face has that plays actions
+Node = Any  # a shader or compositor node; each kind has different settings
+Attribute = Any  # an attribute of a mesh; each type has different data
+NodeTree = Any  # the node tree of a material, a scene or a group
+Socket = Any  # a node socket; the type of default_value depends on its kind
+Values = NDArray[Any]  # values of a mesh attribute: one row for each vertex, corner or face
+Override = dict[str, Any]  # keyword arguments of bpy.context.temp_override
+Animated = bpy.types.Object | bpy.types.Key  # datablocks of a face that play actions
 
 if TYPE_CHECKING:
 
@@ -33,10 +30,10 @@ if TYPE_CHECKING:
         """The deforming or the control armature of a character."""
 
         data: bpy.types.Armature  # pyright: ignore[reportIncompatibleVariableOverride]
-        risorius_layer_rules: bool  # see layer_properties, as the two below
+        risorius_layer_rules: bool  # this and the next two: see layer_properties
         risorius_layers_index: int
         risorius_reactions_index: int
-        risorius_converge: float  # see gaze_settings, as the two below
+        risorius_converge: float  # this and the next three: see gaze_settings
         risorius_lids: float
         risorius_neck_poses: bool
         risorius_body_turn: float
@@ -52,13 +49,13 @@ if TYPE_CHECKING:
         data: bpy.types.Mesh  # pyright: ignore[reportIncompatibleVariableOverride]
 
     class Depsgraph(bpy.types.Depsgraph):
-        """An evaluated dependency graph: it has a scene."""
+        """An evaluated dependency graph, whose scene is never None."""
 
         @property
         def scene(self) -> bpy.types.Scene: ...
 
     class WindowManager(bpy.types.WindowManager):
-        """With the properties that registration.py gives it."""
+        """The window manager with the properties that registration.py adds."""
 
         risorius_search: str
         risorius_only_used: bool
@@ -69,7 +66,8 @@ if TYPE_CHECKING:
     class Context(bpy.types.Context):
         """The context of an operator or a panel.
 
-        In the stubs a member named property turns all members above it into methods.
+        The members are declared again, because the stubs' Context has a member named `property`,
+        which pyright takes for the decorator of the other members.
         """
 
         region: bpy.types.Region | None  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Differences between Blender 4.2 and 5.2."""
+"""Functions that work alike in Blender 4.2 to 5.2."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import bpy
 from ...logic.base.sentences import told
 from .blender_types import Animated, NodeTree
 
-NEWEST_TRIED = (5, 2)  # of Blender, by packaging/check/blender/matrix.sh
+NEWEST_TRIED = (5, 2)  # newest Blender version that packaging/check/blender/matrix.sh tests
 
 
 def notice() -> str:
-    """A sentence if this Blender is newer than all tested versions, else empty."""
+    """A sentence if this Blender is newer than all tested versions, else ""."""
     if bpy.app.version[:2] <= NEWEST_TRIED:
         return ""
     return told(
@@ -27,7 +27,7 @@ def notice() -> str:
 
 
 def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    """The F-curves of an action: since 4.4 it has layers and slots, since 5.0 only these."""
+    """All F-curves of an action. Blender 4.4 adds layers and slots; 5.0 removes action.fcurves."""
     if hasattr(action, "layers") and len(action.layers):
         for layer in action.layers:
             for strip in layer.strips:
@@ -38,23 +38,23 @@ def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
 
 
 def _strips(layer: bpy.types.ActionLayer) -> list[bpy.types.ActionKeyframeStrip]:
-    """The strips of a layer of an action: Blender has only one kind."""
+    """The strips of a layer of an action; all are keyframe strips, Blender's only kind."""
     return cast("list[bpy.types.ActionKeyframeStrip]", layer.strips)
 
 
 def make_node_tree(material: bpy.types.Material) -> None:
-    """Give a material its nodes: since 5.0 each has them and the switch only warns."""
+    """Give a material a node tree. Since Blender 5.0 it has one, and setting use_nodes warns."""
     if material.node_tree is None:
         material.use_nodes = True
 
 
 def tree_of(material: bpy.types.Material) -> NodeTree:
-    """The nodes of a material that has some."""
+    """The node tree of a material that has one."""
     return material.node_tree
 
 
 def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
-    """The driver of a curve that is listed among drivers."""
+    """The driver of an F-curve from AnimData.drivers."""
     assert curve.driver is not None
     return curve.driver
 
@@ -62,7 +62,7 @@ def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
 def uid_of(modifier: bpy.types.Modifier) -> int:
     """A number that identifies a modifier of an object, also after renaming.
 
-    0 in a Blender without such a number.
+    0 if this Blender version has no such number.
     """
     return int(getattr(modifier, "persistent_uid", 0))
 
@@ -78,7 +78,7 @@ def is_bone_selected(bone: bpy.types.PoseBone) -> bool:
 
 
 def select_bone(bone: bpy.types.PoseBone, chosen: bool = True) -> None:
-    """Select a bone of an armature in pose mode; others stay as they are.
+    """Select or deselect a bone of an armature in pose mode; other bones keep their state.
 
     Args:
         bone: the pose bone.
@@ -88,10 +88,10 @@ def select_bone(bone: bpy.types.PoseBone, chosen: bool = True) -> None:
 
 
 def deselect_all(layer: bpy.types.ViewLayer) -> None:
-    """Select no object of a view layer.
+    """Deselect all objects of a view layer.
 
-    4.2 iterates its list of objects while selecting rebuilds the list, and crashes if objects were
-    added or removed since the last update.
+    The update and the copied list avoid a crash of Blender 4.2: a selection rebuilds the list of
+    objects during its iteration if objects were added or removed since the last update.
     """
     layer.update()
     for item in layer.objects[:]:
@@ -99,14 +99,15 @@ def deselect_all(layer: bpy.types.ViewLayer) -> None:
 
 
 def add_curves(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag:
-    """The collection for new F-curves of an action.
+    """Create the collection for the F-curves of a new action.
 
     Args:
         action: a new action.
-        owner: the datablock that it moves.
+        owner: the datablock that will play the action.
 
     Returns:
-        An object with `fcurves` and `groups`: since 4.4 the channel bag of a slot.
+        An object with `fcurves` and `groups`: the channel bag of a new slot; before Blender 4.4 the
+        action.
     """
     if not hasattr(action, "slots"):
         return cast("bpy.types.ActionChannelbag", action)
@@ -116,9 +117,10 @@ def add_curves(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionCha
 
 
 def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot | None:
-    """The slot of an action that fits a datablock, or None: before 4.4, and if none fits.
+    """The slot of an action that fits a datablock; None before Blender 4.4 or if none fits.
 
-    First choice is the slot in use, then the slot of its name, then the first of its kind.
+    First choice is the slot in use, then the slot with the datablock's name, then the first slot
+    for its type.
 
     Args:
         action: any action.
@@ -138,8 +140,9 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
     """The channel bag with the F-curves of an action for a datablock, or None.
 
     Args:
-        action: an action with one layer of one strip; before 4.4 the action itself is returned.
-        owner: the object or the shape keys; decides on the slot.
+        action: any action; only its first layer and strip are read. Before Blender 4.4 the action
+            itself is returned.
+        owner: the object or the shape keys that determine the slot.
     """
     if not hasattr(action, "slots") or not len(action.layers):
         own = action if hasattr(action, "fcurves") else None
@@ -150,11 +153,11 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 
 
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action for a datablock: of one slot, if the action has slots.
+    """The F-curves of an action for a datablock; only of one slot if the action has slots.
 
     Args:
         action: any action.
-        owner: the object or the shape keys; decides on the slot.
+        owner: the object or the shape keys that determine the slot.
     """
     if not hasattr(action, "slots") or not len(action.layers):
         return list(getattr(action, "fcurves", ()))
@@ -164,7 +167,7 @@ def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCur
 
 
 def played_actions(owner: Animated) -> list[bpy.types.Action]:
-    """The actions that a datablock plays: its active one and its strips', also in meta strips."""
+    """The active action of a datablock and the actions of its NLA strips, also in meta strips."""
     data = owner.animation_data
     if data is None:
         return []
@@ -192,7 +195,7 @@ def assign_action(
     Args:
         target: the animation data or the strip.
         action: any action.
-        slot: of the action; None lets Blender choose. Before 4.4 it is always None.
+        slot: of the action; None lets Blender choose. Must be None before Blender 4.4.
     """
     target.action = action
     if slot is not None:

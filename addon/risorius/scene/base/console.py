@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Output to the console: our own sentences, without Blender's messages from our calls."""
+"""Writes the add-on's messages to the console, and silences messages of Blender's operators."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def say(*sentences: str) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Discard the standard output of operators; errors go to the standard error.
+    """Context manager: discard standard output; standard error stays visible.
 
-    Without a window the renderer prints every step of a bake from C.
+    In background mode the file descriptor is redirected too, because the renderer prints from C.
     """
     with redirect_stdout(io.StringIO()):
         if not bpy.app.background:
@@ -37,8 +37,8 @@ def quiet() -> Iterator[None]:
 
 
 def _turn_away() -> int | None:
-    """Discard the standard output. Returns: its earlier file descriptor, or None."""
-    with suppress(OSError):  # closed, as in a service
+    """Redirect file descriptor 1 to null. Returns: a copy of the earlier one; None if closed."""
+    with suppress(OSError):  # standard output may be closed, for example in a service
         kept = os.dup(1)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drivers that follow a character: how one is made, and where in the file others lead to it."""
+"""Makes drivers that read a character's properties, and finds the existing ones in the file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WITH_NODES = (
 
 
 def owners() -> Iterator[bpy.types.ID]:
-    """Every datablock that can bear drivers, node trees inside others too."""
+    """Every datablock that can have drivers, including node trees inside other datablocks."""
     for kind in bpy.data.bl_rna.properties:
         if kind.type != "COLLECTION":
             continue
@@ -40,7 +40,7 @@ def owners() -> Iterator[bpy.types.ID]:
 
 
 def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.DriverTarget]]:
-    """All driver targets of the file that point at a datablock, each with its curve's owner."""
+    """(datablock with the driver, driver target) for all targets that point at a datablock."""
     for owner in owners():
         data = getattr(owner, "animation_data", None)
         for curve in data.drivers if data else ():
@@ -51,11 +51,11 @@ def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.Dri
 
 
 class Entries:
-    """Moves drivers of single channels and maps to the places that these have now.
+    """Updates drivers that read single channels or maps after the order of these changed.
 
     Args:
         rig: deforming armature.
-        labels: "channels" and "maps" -> (old labels, new labels).
+        labels: "channels" and "maps" -> (labels in the old order, labels in the new order).
     """
 
     def __init__(
@@ -84,14 +84,14 @@ class Entries:
         entry, gone = _ENTRY.match(path), _GONE.match(path)
         if entry and int(entry.group(2)) < len(labels[entry.group(1)][0]):
             return entry.group(1), labels[entry.group(1)][0][int(entry.group(2))]
-        if gone:  # perhaps it is back
+        if gone:  # an earlier change removed the label; the new file may have it again
             array, key = gone.group(2), bpy.utils.unescape_identifier(gone.group(1))
             back = next((x for x in labels[array][1] if _gone_key(array, x) == key), None)
             return (array, back) if back is not None else None
         return None
 
     def _stand_in(self, target: bpy.types.DriverTarget, array: str, label: str) -> str:
-        """A property of value 0 in place of what is gone, so that drivers stay valid."""
+        """Path of a property with value 0 for a removed label, so that its drivers stay valid."""
         key = _gone_key(array, label)
         assert target.id is not None
         target.id[key] = 0.0
@@ -100,7 +100,7 @@ class Entries:
         return f'["{bpy.utils.escape_identifier(key)}"]'
 
     def move(self) -> None:
-        """Point the drivers at their new places; their targets must be evaluated before."""
+        """Write the new data paths; the new properties must have been evaluated before."""
         for target, path in self._moves:
             target.data_path = path
 
@@ -110,7 +110,7 @@ def _gone_key(array: str, label: str) -> str:
 
 
 def moves(owner: bpy.types.Object) -> bool:
-    """Whether an action, an NLA strip or a driver other than our own moves an object."""
+    """Whether an object has an action, an NLA track, or a driver other than the add-on's PULL."""
     data = owner.animation_data
     return data is not None and bool(
         data.action
@@ -120,11 +120,11 @@ def moves(owner: bpy.types.Object) -> bool:
 
 
 def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
-    """The control properties that an F-curve of any action or a driver uses.
+    """The control properties that an F-curve of any action moves or a driver sets or reads.
 
     Args:
         controls: control armature.
-        labels: property names.
+        labels: names of the properties to look for.
     """
     paths = {parts.property_path(label): label for label in labels}
     used = {
@@ -142,12 +142,12 @@ def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
 def plain_driver(
     curve: bpy.types.FCurve, owner: bpy.types.Object, data_path: str, name: str = "var"
 ) -> None:
-    """Make an F-curve follow one property of an object, without any expression.
+    """Set up a driver that copies one property of an object, without an expression.
 
     Args:
-        curve: of a new driver without variables.
+        curve: F-curve of a new driver without variables.
         owner: the object with the property.
-        data_path: from the object to one number.
+        data_path: path from the object to one number.
         name: of the driver's variable.
     """
     driver = curve.driver

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The last values written to objects of characters; unchanged values are not written again.
+"""Remembers the last values written to objects of characters, to skip unchanged values.
 
-Keys are session uids, so that no Blender object is kept.
+The tables have session uids as keys, so that no Blender object is kept.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from . import session
 inputs: dict[int, object] = session.table("last_written.inputs", ("rewrite", "undo", "load"))
 # Deforming armature -> bytes of the matrix that was last written.
 places: dict[int, object] = session.table("last_written.places", ("rewrite", "undo", "load"))
-# Shape key -> bytes of the channel weights of its sum.
+# Shape keys -> bytes of the channel weights whose sum the live key holds.
 weights: dict[int, object] = session.table("last_written.weights", ("rewrite", "undo", "load"))
-# Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
+# Deforming armature -> the Writer of skinning/bone_writer.py.
 bone_writers: dict[int, object] = session.table(
     "last_written.bone_writers", ("rewrite", "undo", "load")
 )
-# Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Undo keeps
-# it, because it remembers messages on the console.
+# Deforming armature -> the Reading of frame/joint_readings.py. Undo keeps it, because it remembers
+# which messages were printed.
 readings: dict[int, object] = session.table("last_written.readings", ("load",))
 # Shape keys whose points were last written without notifying Blender.
 unheard: set[int] = session.keep("last_written.unheard", set, ("rewrite", "undo", "load"))
-# Objects of overrides that Blender does not let anyone write to.
+# Objects on which Blender ignored the last write, such as linked objects without an override.
 _refused: set[int] = session.keep("last_written.refused", set, ("rewrite", "undo", "load"))
 
 
 def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
-    """Whether a state differs from the one that is kept of a datablock; it is kept from now on.
+    """Store the state of a datablock. Returns: whether it differs from the stored state.
 
     Args:
-        kept: `inputs`, `places` or `weights`.
+        kept: table of states: `inputs`, `places` or `weights`.
         item: the datablock.
-        state: anything that compares.
+        state: any value that supports ==.
     """
     if kept.get(item.session_uid) == state:
         return False
@@ -44,7 +44,7 @@ def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
 
 
 def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender accepted a write to an object; it refuses silently.
+    """Note whether Blender accepted a write to an object; Blender reports no refusal.
 
     Args:
         item: the object.
@@ -62,5 +62,5 @@ def is_refused(item: bpy.types.ID) -> bool:
 
 
 def forget() -> None:
-    """Let the next evaluation write everything: after undo, load and changes of shape mode."""
+    """Clear the stored values, so that the next evaluation writes all values."""
     session.end("rewrite")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the parts of a character find each other: object pointers and indices, never names."""
+"""Finds the objects of a character by custom properties with pointers and indices, not by names."""
 
 from __future__ import annotations
 
@@ -12,67 +12,71 @@ from .blender_types import ArmatureObject, Context, MeshObject
 
 RIG = "risorius_rig"  # on meshes and control armature: the deforming armature
 CONTROLS = "risorius_controls"  # on the deforming armature: the control armature
-DNA = "risorius_dna"  # on the deforming armature: the Text that holds the file
+DNA = "risorius_dna"  # on the deforming armature: the Text that holds the DNA file
 LOD = "risorius_lod"  # on the deforming armature: the level that the viewport shows
-LOD_RENDER = "risorius_lod_render"  # on the same: that of renders, -1 for the viewport's
-LOD_BY_DISTANCE = "risorius_lod_by_distance"  # on the same: the camera's distance chooses
-LOD_DISTANCES = "risorius_lod_distances"  # on the same: where level n gives way to n + 1
-FOLLOW = "risorius_follow"  # on the same: its place is that of the control armature
+LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in renders, -1: LOD
+LOD_BY_DISTANCE = (
+    "risorius_lod_by_distance"  # on the rig: whether camera distance chooses the level
+)
+LOD_DISTANCES = (
+    "risorius_lod_distances"  # on the rig: entry n: distance of the change to level n + 1
+)
+FOLLOW = "risorius_follow"  # on the rig: whether it copies the transform of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
-SOURCE = "risorius_source"  # on the deforming armature: the path it came from
-TEXTURES = "risorius_textures"  # on the deforming armature: words on which textures were found
+SOURCE = "risorius_source"  # on the deforming armature: path of the imported file
+TEXTURES = "risorius_textures"  # on the deforming armature: text about the textures found
 OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
 RANGES = "risorius_ranges"  # on the control armature: capture range, see range_properties.py
 CURVES = "risorius_curves"  # on the control armature: unknown curves, see unknown_curves.py
-BODY_NECK = "risorius_body_neck"  # on the control armature: bones of the body, a line each
-BODY_HEAD = "risorius_body_head"  # the same for the head
-MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: a mesh
-MESH = "dna_mesh"  # on a mesh object: its number in the DNA
-RESIDUAL = "risorius_residual"  # colours of a mesh: what solved curves leave of another
+BODY_NECK = "risorius_body_neck"  # on the control armature: neck bones of the body, one per line
+BODY_HEAD = "risorius_body_head"  # on the control armature: head bone of the body
+MESH_PREFIX = "risorius_mesh_"  # prefix of numbered properties of the rig: pointers to its meshes
+MESH = "dna_mesh"  # on a mesh object: index of its mesh in the DNA file
+RESIDUAL = "risorius_residual"  # colour attribute: distance of solved curves from the source mesh
 LODS = "dna_lods"  # on a mesh object: the levels that show it
-JOINT = "dna_joint"  # on a bone: its number in the DNA
-HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
+JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
+HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: value that was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
-# On a mesh object: it is in Direct mode now, see direct.py; the persistent uid of the modifier.
+# On a mesh object in Direct mode (see direct.py): the persistent uid of the modifier.
 FINISHED = "risorius_finished"
-SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" where Direct is not wanted
-JOINTS_SHOWN = "risorius_joints_shown"  # on the same: its joints were shown in an older file
+SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
+JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an older file showed its joints
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
-NAMES = "risorius_names"  # on a Mesh: what the user says of its shape keys, see assigned.py
-LANDMARK = "risorius_landmark"  # on an empty: the landmark of a head that it is, see points.py
-LANDMARK_FOUND = "risorius_landmark_found"  # on the same: where it was found, in the head's space
-LANDMARKS = "risorius_landmarks"  # on a collection: it holds the landmarks of a head
+NAMES = "risorius_names"  # on a Mesh: names that the user assigned to shape keys, see assigned.py
+LANDMARK = "risorius_landmark"  # on an empty: name of its head landmark, see points.py
+LANDMARK_FOUND = "risorius_landmark_found"  # on the empty: detected position in the head's space
+LANDMARKS = "risorius_landmarks"  # on a collection: marks it as container of head landmarks
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
-KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
-KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels
-CHANNEL_VARIABLE = "risorius_channel"  # name of the driver variable of our keys
+KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: channel -> name given by the user
+KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: channels in the user's order of keys
+CHANNEL_VARIABLE = "risorius_channel"  # driver variable that identifies keys of the add-on
 TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
-LOOK = "risorius_look"  # on the deforming armature: what of the face is shown, see look_masks.py
-HEAT = "risorius_heat"  # on the same: which heat map it shows; on its meshes: the colours of that
-HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with such colours: what was active before them
-BAKED = "risorius_baked"  # on rig or controls: what was baked; the rig's is not live meanwhile
+LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
+HEAT = "risorius_heat"  # on the rig: kind of its heat map; on meshes: name of the colour attribute
+HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: the colours active before
+BAKED = "risorius_baked"  # on rig or controls: notes of a bake; a baked rig is not live
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
-FACE = "face"  # the bone of the control armature that bears the controls
-PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
+FACE = "face"  # the bone of the control armature with the control properties
+PART = "risorius_part"  # on a control bone: its role, such as "head", also after renaming
 OUTLINES = "risorius_outlines"  # on the control armature: sizes of its hidden outlines, by PART
-BOARD = "risorius_board"  # on the bones of the face board: the name of each
-BOARD_KIND = "risorius_board_kind"  # on the control armature: "PRIMARY" for that board
-LEAD = "risorius_lead"  # on the control armature: "BOARD" where the face board moves the face
+BOARD = "risorius_board"  # on a bone of the face board: its original name
+BOARD_KIND = "risorius_board_kind"  # on the control armature: "PRIMARY"; missing: complete board
+LEAD = "risorius_lead"  # on the control armature: "BOARD" if the face board moves the face
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
-PINS = "risorius_pins"  # on the control armature: mesh and vertex of each pin of a drag, flat
-HANDLES_SELECTED = "risorius_handles_selected"  # on the same, like pins: handles that go together
-HANDLES_HIDDEN = "risorius_handles_hidden"  # on the same, like pins: handles that are not offered
-_MOST_MESHES = 1 << 16  # the numbers of a DNA file have 16 bits
+PINS = "risorius_pins"  # on the control armature: flat list of mesh, vertex of each drag pin
+HANDLES_SELECTED = "risorius_handles_selected"  # a list like PINS: selected drag handles
+HANDLES_HIDDEN = "risorius_handles_hidden"  # a list like PINS: hidden drag handles
+_MOST_MESHES = 1 << 16  # mesh indices of a DNA file have 16 bits
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:
-    """The deforming armatures of all characters of this file; linked ones cannot be written.
+    """The deforming armatures of all characters of this file.
 
     Args:
-        linked: include linked armatures.
+        linked: True: include linked armatures, which cannot be changed.
     """
     return [o for o in bpy.data.objects if (linked or o.library is None) and is_rig(o)]
 
@@ -83,14 +87,14 @@ def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
 
 
 def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
-    """Let a custom property point to another part, also on overrides of linked characters.
+    """Set a custom property that points to another part, also on overrides of linked characters.
 
-    Blender gives a pointer of an override back to the library at load unless it is marked so.
+    It is marked as overridable, because Blender otherwise resets it to the library's at load.
 
     Args:
-        owner: the object that has the property.
-        key: name of the property; whatever it held is replaced.
-        item: the object or text that it points to from now on.
+        owner: the object that gets the property.
+        key: name of the property; an earlier value is replaced.
+        item: the object or text to point to.
     """
     owner[key] = item
     owner.property_overridable_library_set(f'["{key}"]', True)
@@ -105,14 +109,14 @@ def controls_of(rig: ArmatureObject) -> ArmatureObject | None:
 
 
 def controls_there(rig: ArmatureObject) -> ArmatureObject:
-    """The control armature of a character that has one: whoever asks has looked."""
+    """The control armature of a character; the caller must have checked that it exists."""
     controls = controls_of(rig)
     assert controls is not None
     return controls
 
 
 def keys_there(item: MeshObject) -> bpy.types.Key:
-    """The shape keys of a mesh that has some: whoever asks has looked."""
+    """The shape keys of a mesh; the caller must have checked that they exist."""
     key = item.data.shape_keys
     assert key is not None
     return key
@@ -121,8 +125,8 @@ def keys_there(item: MeshObject) -> bpy.types.Key:
 def carrier_of(rig: ArmatureObject) -> bpy.types.Object:
     """The object with the array MAPS that drivers of a character's materials read.
 
-    It is a mesh of the character: each update of the deforming armature copies all its bones.
-    Characters of older files have the array on the deforming armature alone.
+    It is a mesh, because each update of the deforming armature would copy all its bones. In older
+    files it is the deforming armature.
 
     Args:
         rig: deforming armature.
@@ -145,7 +149,7 @@ def title_of(rig: ArmatureObject) -> str:
     """The unique name of a character.
 
     Args:
-        rig: its deforming armature; copies are called Anna_rig.001 and so on.
+        rig: deforming armature of the character; "Anna_rig.001" gives "Anna.001".
     """
     name, mark, number = rig.name.rpartition("_rig")
     return name + number if mark else rig.name
@@ -157,8 +161,7 @@ def maximum_of(controls: ArmatureObject) -> float:
 
 
 def members_of(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """All existing objects of a character: rig, controls, meshes; also of an incomplete
-    character."""
+    """The existing objects of a character, which may be incomplete: rig, controls, meshes."""
     held = (rig, saved.item(rig, CONTROLS), *meshes_of(rig))
     return [item for item in held if item is not None]
 
@@ -175,13 +178,13 @@ def meshes_of(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def is_numbered(item: bpy.types.Object) -> TypeGuard[MeshObject]:
-    """Whether an object is a mesh that stores its mesh index in the DNA file."""
+    """Whether an object is a mesh with a valid index of a DNA mesh in its property MESH."""
     number = item.get(MESH)
     return item.type == "MESH" and isinstance(number, int) and 0 <= number < _MOST_MESHES
 
 
 def meshes_pointing_at(rig: ArmatureObject) -> list[MeshObject]:
-    """All mesh objects of a character, also linked duplicates that it does not list."""
+    """All mesh objects that point to a character, also duplicates that the rig does not list."""
     listed = meshes_of(rig)
     others = [o for o in bpy.data.objects if o.get(RIG) == rig and is_numbered(o)]
     return listed + [o for o in others if o not in listed]
@@ -194,7 +197,7 @@ def active_rig(context: Context) -> ArmatureObject | None:
     """
     rig = rig_of(context.object)
     if rig is None:
-        # A linked object may have the same name: identity tells them apart.
+        # Compare objects, not names, because a linked object may have the same name.
         there = [r for r in rigs() if context.scene in r.users_scene]
         rig = there[0] if len(there) == 1 else None
     return rig if rig is not None and rig.library is None else None
@@ -207,6 +210,6 @@ def face_bone(rig: ArmatureObject) -> bpy.types.PoseBone | None:
 
 
 def property_path(name: str) -> str:
-    """The data path of a control, from its armature object."""
+    """The data path of a control property, relative to the control armature object."""
     bone, quoted = bpy.utils.escape_identifier(FACE), bpy.utils.escape_identifier(name)
     return f'pose.bones["{bone}"]["{quoted}"]'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading custom properties of a .blend, whose values may have any type and size.
+"""Reads custom properties of a .blend safely, because their values may have any type and size.
 
 A value of another type or out of range counts as missing. Tables and arrays are copied, because
 they point into Blender's memory, which is freed with the property.
@@ -15,19 +15,19 @@ from typing import cast
 import bpy
 from idprop.types import IDPropertyArray, IDPropertyGroup
 
-_MOST = 2**31 - 1  # Blender's whole numbers
+_MOST = 2**31 - 1  # largest integer of a custom property
 
 
-# A datablock, a bone, or a table in one.
+# A datablock, a bone, or a table (a group of custom properties) in one of these.
 Owner = bpy.types.bpy_struct | Mapping[str, object]
 
 
 def whole(owner: Owner, key: str, default: int, low: int = -_MOST, high: int = _MOST) -> int:
-    """A whole number.
+    """The whole number in a custom property.
 
     Args:
-        owner: the datablock or bone with the property.
-        key: its name.
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
         default: returned if the value is missing or out of range.
         low, high: the range, ends included.
     """
@@ -44,20 +44,20 @@ def number(
     low: float = -sys.float_info.max,
     high: float = sys.float_info.max,
 ) -> float:
-    """A finite number. Args: owner, key, default, low, high  as for `whole`."""
+    """The finite number in a custom property. Args: owner, key, default, low, high  see `whole`."""
     found = owner.get(key)
     usable = isinstance(found, int | float) and math.isfinite(found) and low <= found <= high
     return float(cast("float", found)) if usable else default
 
 
 def text(owner: Owner, key: str, default: str = "") -> str:
-    """Words. Args: owner, key, default  as for `whole`."""
+    """The string in a custom property. Args: owner, key, default  see `whole`."""
     found = owner.get(key)
     return found if isinstance(found, str) else default
 
 
 def wholes(owner: Owner, key: str, low: int = -_MOST, high: int = _MOST) -> list[int]:
-    """The whole numbers of a list that are in a range.
+    """The whole numbers of a list property that are in a range; other entries are left out.
 
     Args:
         owner, key, low, high: see `whole`.
@@ -66,7 +66,7 @@ def wholes(owner: Owner, key: str, low: int = -_MOST, high: int = _MOST) -> list
 
 
 def numbers(owner: Owner, key: str, low: float = -math.inf, high: float = math.inf) -> list[float]:
-    """The finite numbers of a list that are in a range.
+    """The finite numbers of a list property that are in a range; other entries are left out.
 
     Args:
         owner, key, low, high: see `whole`.
@@ -76,12 +76,12 @@ def numbers(owner: Owner, key: str, low: float = -math.inf, high: float = math.i
 
 
 def texts(owner: Owner, key: str) -> list[str]:
-    """The words of a list. Args: owner, key  as for `whole`."""
+    """The strings of a list property; other entries are left out. Args: owner, key  see `whole`."""
     return [word for word in _entries(owner, key) if isinstance(word, str)]
 
 
 def table(owner: Owner, key: str) -> Mapping[str, object] | None:
-    """A copy of a table, or None. Args: owner, key see `whole`."""
+    """A copy of a group of custom properties, or None. Args: owner, key  see `whole`."""
     found = owner.get(key)
     return (
         cast("dict[str, object]", found.to_dict()) if isinstance(found, IDPropertyGroup) else None
@@ -89,13 +89,13 @@ def table(owner: Owner, key: str) -> Mapping[str, object] | None:
 
 
 def item(owner: Owner, key: str) -> bpy.types.Object | None:
-    """The object that is pointed to, or None. Args: owner, key  as for `whole`."""
+    """The object that a property points to, or None. Args: owner, key  see `whole`."""
     found = owner.get(key)
     return found if isinstance(found, bpy.types.Object) else None
 
 
 def length(owner: Owner, key: str) -> int:
-    """The length of an array; 0 if it is missing. Args: owner, key see `whole`."""
+    """The length of an array property; 0 if it is missing. Args: owner, key  see `whole`."""
     found = owner.get(key)
     return len(cast("list[float]", found)) if isinstance(found, IDPropertyArray) else 0
 

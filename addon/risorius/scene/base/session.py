@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The owner of all values that the add-on keeps between two calls.
+"""Manages all caches and states that the add-on keeps between two calls.
 
-A module gets its table here and names the events that empty it. The handlers report an event, and
-all tables of this event are emptied in place. A module keeps its table in a variable and reads it
-as fast as any dict. A test in tests/layers finds every other changing object of a module or class.
+A module creates its table here and names the events that empty it. When the handlers report an
+event, all tables of this event are emptied in place. A module keeps its table in a variable and
+reads it like any dict. A test in tests/layers finds mutable globals that are not created here.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from collections.abc import (
 from functools import lru_cache
 from typing import Generic, Literal, Protocol, TypeVar, cast, get_args
 
-# free: before undo, redo and load, which free what Blender's pointers point to. undo: after undo
+# free: before undo, redo and load, which invalidate pointers to Blender's data. undo: after undo
 # and redo. load: after a file was loaded. frame: before a frame is evaluated. rewrite: all values
-# must be written again. unregister: empties all tables except those with quit. These end with
-# Blender: work of the user, and data read from the extension's own files.
+# must be written again. unregister: empties all tables except those with quit. Tables with quit
+# live until Blender quits: work of the user, and data read from the add-on's own files.
 End = Literal["free", "undo", "load", "frame", "rewrite", "unregister", "quit"]
 
 Kept = TypeVar("Kept")
@@ -39,7 +39,7 @@ class Cached(Protocol):
 
 
 class Slot(Generic[Kept]):
-    """One value. Attributes: now the current value, which code replaces."""
+    """Holder of one value. Attributes: now  the current value; assign to it to change it."""
 
     __slots__ = ("now",)
 
@@ -48,8 +48,13 @@ class Slot(Generic[Kept]):
 
 
 class _Entry:
-    """Attributes: ends events; clear restores the initial state; is_new whether it has that
-    state."""
+    """A registered value.
+
+    Attributes:
+        ends: events that reset the value.
+        clear: function that restores the initial state.
+        is_new: function that returns whether the value has its initial state.
+    """
 
     def __init__(
         self, ends: Sequence[End], clear: Callable[[], object], is_new: Callable[[], bool]
@@ -61,18 +66,18 @@ class _Entry:
         self.clear, self.is_new = clear, is_new
 
 
-_entries: dict[str, _Entry] = {}  # by name: a module that is loaded again takes its place again
-_by_end: dict[str, list[_Entry]] = {}  # what a frame asks must be there already
+_entries: dict[str, _Entry] = {}  # by name, so that a reloaded module replaces its entry
+_by_end: dict[str, list[_Entry]] = {}  # prepared, because `end` runs at each frame
 
 
-def table(  # its types are those of the name that it is assigned to
+def table(  # the annotation of the assigned variable gives the types
     name: str, ends: Sequence[End]
 ) -> dict[Key, Value]:  # pyright: ignore[reportInvalidTypeVarUse]
-    """A dict that events empty.
+    """Create a dict that events empty.
 
     Args:
-        name: unique name of its content.
-        ends: events that empty it; `unregister` always does, except with `quit`.
+        name: unique name of the table.
+        ends: events that empty the table; `unregister` does too, unless `quit` is given.
 
     Returns:
         The dict; it stays the same object.
@@ -81,32 +86,32 @@ def table(  # its types are those of the name that it is assigned to
 
 
 def keep(name: str, make: Callable[[], Kept], ends: Sequence[End]) -> Kept:
-    """A dict, set, list, deque, weak dictionary or record that events reset.
+    """Create a dict, set, list, deque, weak dictionary or record that events reset.
 
     Args:
         name, ends: see `table`.
-        make: makes the initial object. A record is a class without slots.
+        make: function that makes the initial object. A record is an instance without __slots__.
 
     Returns:
         The object of `make`; it stays the same object.
     """
     kept = make()
     empty = isinstance(kept, Sized) and not len(kept)
-    # One that begins empty is emptied without more ado: it happens at each frame.
+    # An object that is empty at the start needs only clear(), which is fast enough for each frame.
     clear: Callable[[], object] | None = getattr(kept, "clear", None) if empty else None
     _add(name, ends, clear or (lambda: _refill(kept, make())), lambda: _is_like(kept, make()))
     return kept
 
 
 def value(name: str, start: Kept, ends: Sequence[End]) -> Slot[Kept]:
-    """A single value.
+    """Create a holder of a single value that events reset.
 
     Args:
         name, ends: see `table`.
-        start: initial value, also after each event; it is never changed in place.
+        start: initial value, also after each event; must not be changed in place.
 
     Returns:
-        Slot.
+        The holder; its attribute `now` is the value.
     """
     slot = Slot(start)
 
@@ -122,7 +127,7 @@ def cached(ends: Sequence[End], most: int = 128) -> Callable[[Function], Functio
 
     Args:
         ends: see `table`.
-        most: most results to keep; the oldest are dropped.
+        most: largest number of results; the least recently used are dropped.
     """
 
     def decorate(function: Function) -> Function:
@@ -134,11 +139,11 @@ def cached(ends: Sequence[End], most: int = 128) -> Callable[[Function], Functio
 
 
 def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
-    """Own the caches of functions in modules that do not use the session.
+    """Let events empty the caches of functions in modules that do not use this module.
 
     Args:
         ends: see `table`.
-        functions: with @cache of functools.
+        functions: functions with the decorator functools.cache or lru_cache.
     """
     for function in functions:
         _adopt(cast("Cached", function), ends)
@@ -159,18 +164,18 @@ def at(*ends: End) -> Callable[[Function], Function]:
 
 
 def end(word: End) -> None:
-    """Reset everything that ends with an event. Args: word the event."""
+    """Reset all values that are registered for an event. Args: word  the event."""
     for entry in _by_end.get(word, ()):
         entry.clear()
 
 
 def held() -> list[str]:
-    """The names of the entries that are not as they were at the beginning."""
+    """The names of the values that differ from their initial state, sorted."""
     return sorted(name for name, entry in _entries.items() if not entry.is_new())
 
 
 def ends_of(name: str) -> tuple[str, ...]:
-    """The words of an entry."""
+    """The events that reset a value. Args: name  of the value."""
     return tuple(_entries[name].ends)
 
 
@@ -194,7 +199,7 @@ def _name(function: object) -> str:
 
 
 def _refill(kept: object, fresh: object) -> None:
-    """Give an object the content of a fresh one."""
+    """Replace the content of an object by the content of a new object."""
     if isinstance(kept, MutableMapping):
         kept.clear()
         kept.update(cast("MutableMapping[object, object]", fresh))
@@ -211,7 +216,7 @@ def _refill(kept: object, fresh: object) -> None:
 
 
 def _is_like(kept: object, fresh: object) -> bool:
-    """Whether an object is as a fresh one; of lists only the length is compared."""
+    """Whether an object equals a new object; of lists only the length is compared."""
     if isinstance(kept, Sized) and isinstance(fresh, Sized) and len(kept) != len(fresh):
         return False
     if isinstance(kept, (MutableMapping, MutableSet)):

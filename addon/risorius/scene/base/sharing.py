@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sharing of equal data between characters of a .blend: Texts of DNA files, packed images.
+"""Shares equal data between characters of a .blend: Texts of DNA files, packed images.
 
 An image is shared until any tool edits it. Then the other characters get a copy of the unedited
 image. Meshes and shape keys are never shared, because the values of keys belong to one face.
@@ -16,9 +16,9 @@ from . import parts, session, storage
 from .blender_types import ArmatureObject, Node, NodeTree, current_context
 
 DIGEST = "risorius_sha256"  # on an image: hash of the packed file
-STATE = "risorius_state"  # on an image: colour space, way of alpha and size of the packed file
+STATE = "risorius_state"  # on an image: colour space, alpha mode and size of the packed file
 
-# Digest -> bytes of an image that several characters show.
+# Digest -> packed bytes of an image that several characters show.
 _kept: dict[str, bytes] = session.table("sharing.kept", ("unregister",))
 
 
@@ -40,7 +40,7 @@ def find(content: bytes, digest: str, data: bool) -> bpy.types.Image | None:
     Args:
         content: bytes of an image file.
         digest: storage.hash_of the content.
-        data: True: read as numbers; False: read as colours.
+        data: True: find an image of non-colour data; False: an image of colours.
     """
     for image in bpy.data.images:
         if image.get(DIGEST) != digest or image.library is not None or _edited(image):
@@ -79,7 +79,7 @@ def separate(exact: bool = False, spaces: bool = True) -> list[str]:
 
     Args:
         exact: compare packed bytes too, as before a save.
-        spaces: compare colour spaces too: reading one takes 9 us, all other checks 2 us.
+        spaces: compare colour spaces too, which takes 9 us per image; all other checks take 2 us.
 
     Returns:
         Sentences about changes.
@@ -144,7 +144,7 @@ def _merge(equal: Sequence[bpy.types.Image], rigs: Sequence[ArmatureObject]) -> 
 def _show_instead(
     rigs: Iterable[ArmatureObject], image: bpy.types.Image, other: bpy.types.Image
 ) -> None:
-    """Let the materials of characters show another image in the place of one."""
+    """Replace an image by another image in the materials of characters."""
     for rig in rigs:
         for node in nodes_of(rig):
             if node.image == image and node.id_data.library is None:
@@ -169,9 +169,9 @@ def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[
 
 
 def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.Image:
-    """A new image of packed bytes, with the stored settings of another image.
+    """A new image from packed bytes, with colour space and alpha mode from the text `state`.
 
-    The stored text may be invalid; then the current settings of the other image are used.
+    If the text is invalid, the current settings of `image` are used.
     """
     space, alpha = (*state.split("\n"), "")[:2]
     fresh = bpy.data.images.new(image.name, 1, 1)
@@ -189,7 +189,7 @@ def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.I
 
 
 def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
-    """Set a property that is one of some choices. Returns: whether it has this one."""
+    """Set an enum property. Returns: whether the property accepts this choice."""
     try:
         setattr(owner, name, choice)
     except TypeError:
@@ -198,17 +198,17 @@ def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
 
 
 def _noted(image: bpy.types.Image) -> tuple[str, str]:
-    """Digest and state that an image was marked with, as text: anybody may have written there."""
+    """Digest and state of a marked image; converted to text, because users may change them."""
     return str(image.get(DIGEST)), str(image.get(STATE))
 
 
 def _images(rigs: Iterable[ArmatureObject]) -> list[bpy.types.Image]:
-    """The images that these characters show, each once."""
+    """The images in the materials of these characters, without repetition."""
     return list(dict.fromkeys(node.image for rig in rigs for node in nodes_of(rig)))
 
 
 def _owners(rigs: Iterable[ArmatureObject]) -> dict[bpy.types.Image, list[ArmatureObject]]:
-    """Image that may be shared -> the characters that show it."""
+    """Marked local image -> the characters whose materials show it."""
     found = {}
     for rig in rigs:
         for image in _images([rig]):

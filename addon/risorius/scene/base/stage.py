@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Control armatures evaluated alone, in a scene of data of its own.
+"""Evaluates control armatures alone, in a temporary scene outside the file's data.
 
-This scene is in no file: no list, save, undo step, append or handler finds it. The armatures are
-    cameras of its markers: Blender evaluates these and counts no user. Blender finds the objects
-    that move them by itself.
+The scene belongs to no file, so lists, saves, undo steps, appends and handlers do not find it. The
+armatures are set as cameras of its timeline markers, because Blender evaluates these cameras and
+their dependencies without counting a user.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ import bpy
 from . import parts
 from .blender_types import ArmatureObject, Depsgraph
 
-# Blender counts one reference too few to temporary data, and would free it twice. The newest that
-# was seen to do so; in a newer one the references are counted each time.
+# Newest version known to count one reference too few to temporary data, which would be freed twice.
+# In newer versions Stage checks the count.
 MISCOUNTED_UNTIL = (5, 2)
-_FAR = 1_000_000  # frame of the first marker: no animation gets there
+_FAR = 1_000_000  # frame of the first marker, beyond any animation
 _HANDLERS = (
     "frame_change_pre",
     "frame_change_post",
@@ -34,14 +34,14 @@ _TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 
 
 class Stage:
-    """A scene in data of its own.
+    """A temporary scene outside the file's data.
 
     Args:
         roots: objects to evaluate.
     """
 
     def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
-        data = bpy.data.temp_data()  # which the stubs take for what it gives
+        data = bpy.data.temp_data()  # a context manager, contrary to the stubs
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
         # Three references are expected: ours, the creator's, and the argument of this call.
@@ -54,7 +54,7 @@ class Stage:
         self.roots = identity(roots)
 
     def evaluate(self, user: bpy.types.Scene) -> Depsgraph:
-        """The graph at the time of a scene."""
+        """The evaluated graph at the current frame and time settings of the user's scene."""
         render = self._scene.render
         for name in _TIME:
             value = getattr(user.render, name)
@@ -63,7 +63,7 @@ class Stage:
         return self.evaluate_frame(user.frame_current, user.frame_subframe)
 
     def evaluate_frame(self, frame: int, part: float = 0.0) -> Depsgraph:
-        """The graph at a frame. Args: frame; part  of the way to the next one, 0 to 1."""
+        """The evaluated graph. Args: frame  whole frame; part  subframe, 0 to 1."""
         own, layer = self._scene, self._scene.view_layers[0]
         own.frame_current = frame
         if own.frame_subframe != part:
@@ -71,7 +71,7 @@ class Stage:
         with unheard():
             if own.frame_current == frame:
                 layer.update()
-            else:  # below 0 the preferences forbid it, but not to scripts; redraws every window
+            else:  # frame_current refuses frames below 0; frame_set does not, but redraws windows
                 own.frame_set(frame, subframe=part)
         return cast("Depsgraph", layer.depsgraph)
 
@@ -82,10 +82,10 @@ class Stage:
 
 @contextmanager
 def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
-    """While a graph is built the controls do not point to their faces.
+    """Context manager: the controls do not point to their faces while a graph is built.
 
-    A graph has all that its objects' properties point to: the meshes and their keys would be
-    copied, and copied again at each frame.
+    A graph includes all objects that custom properties point to: the meshes and their keys would be
+    copied at each frame.
 
     Args:
         armatures: control armatures.
@@ -98,13 +98,12 @@ def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
         yield
     finally:
         for controls, item in held:
-            controls[parts.RIG] = item  # it keeps its marks
+            controls[parts.RIG] = item  # the property keeps its override flag
 
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Context manager: no handler is called for frames and updates, because these are not the
-    user's."""
+    """Context manager: call no frame or update handlers, because the evaluation is internal."""
     lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
     kept = [handlers[:] for handlers in lists]
     for handlers in lists:
@@ -117,20 +116,20 @@ def unheard() -> Iterator[None]:
 
 
 def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
-    """Numbers that identify objects without holding references."""
+    """(session uid, address) of each object, to identify objects without references to them."""
     return tuple((item.session_uid, item.as_pointer()) for item in items)
 
 
 @contextmanager
 def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]:
-    """A control armature as its keys, strips and drivers show it at a frame.
+    """Context manager: the control armature evaluated at a frame with keys, strips and drivers.
 
-    A property without animation keeps its present value. Blender writes the animated values to the
-    original too, as in any evaluation. The caller has to give the user's own edits back.
+    A property without animation keeps its present value. Blender also writes the animated values to
+    the original; the caller must restore the user's edits.
 
     Args:
         controls: the control armature.
-        frame: need not be whole.
+        frame: of the scene; need not be whole.
     """
     whole = math.floor(frame)
     made = Stage([controls])

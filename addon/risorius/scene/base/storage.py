@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The DNA file inside the .blend: compressed bytes on a Text datablock.
+"""Stores the DNA file inside the .blend: compressed bytes in a property of a Text datablock.
 
-On a Text, because Blender copies the custom properties of scene objects at each update.
+A Text is used, because Blender copies the custom properties of scene objects at each update.
 """
 
 from __future__ import annotations
@@ -18,30 +18,29 @@ from .blender_types import ArmatureObject
 
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
-_LENGTH = "risorius_length"  # of the unpacked file; Texts of older versions have none
-# Unpacked bytes are at most 32 times the packed bytes and 64 KB more, whatever a .blend states. DNA
-# files pack to a half or a fifth; a file that packs better is stored unpacked.
+_LENGTH = "risorius_length"  # length of the unpacked file in bytes; missing in older Texts
+# Unpacking stops at 32 times the packed bytes plus 64 KB, even if the .blend states more. DNA files
+# pack to a half or a fifth; a file that packs to less than this limit is stored uncompressed.
 _MOST_TIMES = 32
 _ALWAYS = 1 << 16  # bytes
-_PIECE = 1 << 20  # bytes
-_SIGNATURE = b"DNA"  # what the first bytes of every DNA file are
+_PIECE = 1 << 20  # bytes that are unpacked at once
+_SIGNATURE = b"DNA"  # first bytes of every DNA file
 
 
 class ContentError(FaceError):
-    """A Text does not have the stored DNA file. Its sentence continues after a colon."""
+    """A Text has no intact DNA file. The error text is meant to follow a colon."""
 
 
 def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text:
-    """Put the bytes of a file into a Text datablock: a new one, or an existing one with the same
-    bytes.
+    """Store the bytes of a DNA file in a new Text, or find an existing Text with the same bytes.
 
     Args:
         name: the character's name.
         content: bytes of the DNA file.
-        made: receives a new datablock.
+        made: a new Text is appended to this list.
 
     Returns:
-        The Text. It is never written again, because characters of one file share it.
+        The Text. It must not be changed, because characters with equal files share it.
     """
     digest = hash_of(content)
     there = _holding(content, digest)
@@ -49,19 +48,19 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
         return there
     text = bpy.data.texts.new(f"{name}.dna")
     made.append(text)
-    text.use_fake_user = False  # the armature's pointer keeps it
+    text.use_fake_user = False  # the armature's pointer keeps the Text in the file
     text.write(
         f"The DNA file of {name} ({len(content):,} bytes) is kept in this datablock.\n"
         "The character needs it; it is not meant to be edited.\n"
     )
     text[_BYTES] = _packed(content)
     text[_HASH] = digest
-    text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
+    text[_LENGTH] = str(len(content))  # as text, because integer properties end at 2 GiB
     return text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend with these bytes, or None. Its bytes are unpacked and compared."""
+    """A Text of this .blend with these unpacked bytes, or None."""
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -79,8 +78,8 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
     """Whether two Texts hold the same packed bytes of a DNA file.
 
     Args:
-        one: a Text with a file.
-        other: another, or the same Text.
+        one: a Text with a DNA file.
+        other: another Text, or the same.
     """
     return one == other or (
         content_hash(one) == content_hash(other) and one.get(_BYTES) == other.get(_BYTES)
@@ -88,7 +87,7 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
 
 
 def _packed(content: bytes) -> bytes:
-    """The bytes of a file as a zlib stream, within the bound for unpacking."""
+    """The bytes as a zlib stream, uncompressed if it would exceed the limit for unpacking."""
     # Level 2 takes a sixth of the time of level 6 for 9 % more bytes.
     packed = zlib.compress(content, 2)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
@@ -99,18 +98,18 @@ def _most(packed: bytes) -> int:
 
 
 def hash_of(content: bytes) -> str:
-    """The hash of the bytes of a file, as stored beside them."""
+    """The SHA-256 hash of bytes, as hexadecimal text."""
     return hashlib.sha256(content).hexdigest()
 
 
 def content_hash(text: object) -> str:
-    """The hash of the DNA file in a Text; empty if it has none or is no Text."""
+    """The stored hash of the DNA file in a Text; "" if there is none or `text` is no Text."""
     digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
     return digest if isinstance(digest, str) else ""
 
 
 def text_of(rig: ArmatureObject) -> bpy.types.Text | None:
-    """The Text with the DNA file of a character. Args: rig its deforming armature."""
+    """The Text with the DNA file of a character, or None. Args: rig  its deforming armature."""
     text = rig.get(parts.DNA)
     return text if isinstance(text, bpy.types.Text) else None
 
@@ -131,7 +130,10 @@ def content(text: object) -> bytes:
 
 
 def _limit(text: bpy.types.Text, packed: bytes) -> int:
-    """The bytes that may be unpacked: the stored size, within the bound."""
+    """The largest number of bytes to unpack: the stored length, or the limit if none is stored.
+
+    Raises ContentError if the stored length is invalid or exceeds the limit.
+    """
     said = text.get(_LENGTH)
     if said is None:
         return _most(packed)
@@ -151,7 +153,7 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
 
 
 def _unpack(packed: bytes, limit: int) -> bytes:
-    """Unpack piece by piece: a few kilobytes of zeros would unfold to any size."""
+    """Unpack in pieces up to a limit, because a malicious file may unpack to any size."""
     unpacking = zlib.decompressobj()
     pieces, count, rest = [], 0, packed
     while not unpacking.eof:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work in a thread beside Blender, with progress and cancel. It uses no Blender data."""
+"""Runs work in a thread, with progress and cancel. The work must not use Blender data."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Work = Callable[[Callable[[float], None], Callable[[], bool]], Result]
 def telling(
     progress: Callable[[float], None], cancelled: Callable[[], bool]
 ) -> Callable[[float], bool]:
-    """A progress function that returns False to cancel the work.
+    """Combine progress and cancel to one function that returns False to cancel the work.
 
     Args:
-        progress: progress function of a task.
-        cancelled: cancel function of the task.
+        progress: function that receives the progress, 0 to 1.
+        cancelled: function that returns whether the task was cancelled.
     """
 
     def tell(share: float) -> bool:
@@ -29,16 +29,16 @@ def telling(
 
 
 class Task(Generic[Result]):
-    """Work that takes seconds.
+    """Work in a thread.
 
     Attributes:
-        share: finished share, 0 to 1.
-        result: result of finished work.
-        error: the error, or None.
+        share: progress, 0 to 1.
+        result: result of the work; None until it is finished.
+        error: error of the work, or None.
     """
 
     def __init__(self, work: Work[Result]) -> None:
-        """Args: work(progress, cancelled)  tells the share that is done, asks whether to end."""
+        """Args: work  function that calls progress(0 to 1), and ends early if cancelled()."""
         self.share = 0.0
         self.result: Result | None = None
         self.error: Exception | None = None
@@ -47,11 +47,11 @@ class Task(Generic[Result]):
         self._thread = threading.Thread(target=self.run, daemon=True)
 
     def start(self) -> None:
-        """Begin in a thread."""
+        """Start the work in the thread."""
         self._thread.start()
 
     def run(self) -> None:
-        """Do it now, waiting in this thread."""
+        """Do the work in the calling thread, and store its result or error."""
         try:
             self.result = self._work(self._progress, self._cancelled.is_set)
         except Exception as error:  # noqa: BLE001  a thread's error is told by who waits for it
@@ -61,15 +61,15 @@ class Task(Generic[Result]):
         self.share = float(share)
 
     def is_running(self) -> bool:
-        """Whether the thread still works."""
+        """Whether the thread is running."""
         return self._thread.is_alive()
 
     def wait(self) -> None:
-        """Until the thread ends."""
+        """Wait until the thread ends."""
         if self.is_running():
             self._thread.join()
 
     def cancel(self) -> None:
-        """Let the work end, and wait for that."""
+        """Ask the work to end, and wait until the thread ends."""
         self._cancelled.set()
         self.wait()

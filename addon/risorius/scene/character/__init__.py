@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character's objects: built, compiled, shown and placed."""
+"""Builds, compiles, shows and places the objects of a character."""

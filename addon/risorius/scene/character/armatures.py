@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deforming armature and the control armature."""
+"""Builds and edits the deforming armature and the control armature of a character."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
 from . import bone_shapes
 
-SHELF = "Joints"  # the bone collection of the deforming bones, not shown
+SHELF = "Joints"  # the hidden bone collection of the deforming bones
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
 Point = tuple[float, float, float]
@@ -30,10 +30,10 @@ BonePlace = tuple[Point, Point, float, str]  # position, axis, length, name of t
 def _edit_bones(
     context: Context, item: ArmatureObject, collection: bpy.types.Collection
 ) -> Iterator[bpy.types.ArmatureEditBones]:
-    """The edit bones of an armature object, which must not be linked anywhere yet.
+    """Context manager: the edit bones of an armature object, which must be in no collection yet.
 
-    Edit bones exist only in edit mode, and only an operator enters it. No other file in scene/
-    changes a mode.
+    Edit bones exist only in edit mode, which only an operator can enter. In scene/, only this file
+    changes the mode of an object.
     """
     layer = context.view_layer
     previous = layer.objects.active
@@ -55,12 +55,10 @@ def _edit_bones(
 def edit_armature(
     context: Context, data: bpy.types.Armature
 ) -> Iterator[bpy.types.ArmatureEditBones]:
-    """The edit bones of an armature in use, also if its objects are hidden.
-
-    A context manager; changes inside it are kept.
+    """Context manager: the edit bones of an existing armature, also if its objects are hidden.
 
     Args:
-        context: its scene temporarily has a helper object.
+        context: its scene temporarily gets a helper object.
         data: the armature.
     """
     workshop = bpy.data.collections.new("bones")
@@ -83,7 +81,7 @@ def kept_selection(context: Context) -> Iterator[None]:
     try:
         yield
     finally:
-        layer.update()  # the list still has places of removed objects
+        layer.update()  # removes deleted objects from the list of objects
         there = {o for o in layer.objects if o is not None}
         for item in there:
             item.select_set(item in selected, view_layer=layer)
@@ -98,7 +96,7 @@ def join_pose_mode(context: Context, item: ArmatureObject) -> None:
 
     Args:
         context: its view layer has both objects.
-        item: the armature; it stays as it is if Blender refuses.
+        item: the armature; it keeps its mode if Blender refuses the change.
     """
     layer = context.view_layer
     active, layer.objects.active = layer.objects.active, item
@@ -138,7 +136,7 @@ def build_rig(
 
     Args:
         context: a Blender context with a view layer.
-        plan: the CharacterPlan.
+        plan: names, joints and meshes of the character.
         made: receives every new datablock.
         workshop: a linked collection for editing bones.
 
@@ -163,12 +161,13 @@ def build_rig(
     for joint, label in enumerate(armature.labels):
         data.bones[label][parts.JOINT] = joint
     data.display_type = "STICK"
-    # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
+    # Hide the bones and not the object, so that Select All and Duplicate include the object.
     shelf = data.collections.new(SHELF)
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False
-    # It follows the control armature (place.py); moved together with it, it would go twice as far.
+    # It follows the control armature (rig_placement.py); moved together with it by the user, it
+    # would move twice as far.
     lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
@@ -219,7 +218,7 @@ def _pulling(rig: ArmatureObject) -> bpy.types.Driver | None:
 
 
 def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Let Blender evaluate bones of the controls that are new, too, see `pull_controls`.
+    """Make Blender also evaluate new bones of the controls, see `pull_controls`.
 
     Args:
         rig: the deforming armature.
@@ -238,7 +237,7 @@ def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
 
     Args:
         rig: the deforming armature.
-        bones: their names.
+        bones: names of the control bones.
     """
     driver = _pulling(rig)
     for variable in list(driver.variables) if driver is not None else ():
@@ -247,7 +246,7 @@ def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
 
 
 def joints_are_shown(rig: ArmatureObject) -> bool:
-    """Whether bones of a deforming armature can be seen: their collection is shown."""
+    """Whether a deforming armature is visible and any of its bone collections is shown."""
     return not rig.hide_viewport and any(c.is_visible for c in rig.data.collections_all)
 
 
@@ -259,7 +258,7 @@ def hide_joints(rig: ArmatureObject) -> None:
 
 
 def lock_place(item: bpy.types.Object) -> None:
-    """Let the user's hand not move an object by accident."""
+    """Lock location, rotation and scale of an object against accidental moves by the user."""
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
     item.lock_rotation_w = True
 
@@ -270,12 +269,12 @@ def build_controls(
     made: list[bpy.types.ID],
     workshop: bpy.types.Collection,
 ) -> ArmatureObject:
-    """Build the small control armature with the sliders and the bones that turn things.
+    """Build the control armature with the sliders and the bones of head, neck, eyes and gaze.
 
     Args:
         context: a Blender context with a view layer.
-        plan: the CharacterPlan.
-        made: list that every new datablock is put on.
+        plan: names, joints, meshes and controls of the character.
+        made: receives every new datablock.
         workshop: a linked collection in which bones are edited.
 
     Returns:
@@ -316,7 +315,7 @@ def build_controls(
 
 
 def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
-    """Places of the control bones: name -> (position, axis, length, parent)."""
+    """Places of the control bones: name -> (position, axis, length, name of the parent)."""
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -347,7 +346,7 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The extent of the face, for placing the outlines. Args: plan of the face."""
+    """The extent of the face, for placing the outlines. Args: plan  meshes and joints of a face."""
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)
@@ -355,7 +354,7 @@ def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
 
 
 def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[float, float]:
-    """Middle and half width of a head at the height of its eyes: shoulders are lower."""
+    """x of the centre and half the width of a head at eye height, which excludes the shoulders."""
     near = np.abs(points[:, 2] - height) < 0.1 * size
     # A face without skin near its eyes uses the width of the whole face.
     across = points[near if near.any() else slice(None), 0]
@@ -369,8 +368,8 @@ def add_properties(
 
     Args:
         bone: the bone of the face.
-        controls: ControlPlans of the sliders.
-        maximum: highest value of all of them.
+        controls: label, rest and lowest value of each slider.
+        maximum: largest value of all sliders.
     """
     for control in controls:
         bone[control.label] = control.rest
@@ -378,12 +377,12 @@ def add_properties(
 
 
 def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maximum: float) -> None:
-    """Set limits, default and words of one slider.
+    """Set limits, default and tooltip of one slider.
 
     Args:
         bone: the bone of the face, which has the property already.
-        control: its ControlPlan.
-        maximum: highest value that it may have.
+        control: label, rest, lowest value and description of the slider.
+        maximum: largest value of the slider.
     """
     name = control.label
     words: Any = bone.id_properties_ui(name)
@@ -401,6 +400,6 @@ def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maxi
 
 
 def key_group(name: str) -> str:
-    """The F-curve group that keys of a control go to."""
+    """The name of the F-curve group for keys of a control: the title of its region."""
     regions = native.regions()
     return regions.titles[regions.of_slider(name)]

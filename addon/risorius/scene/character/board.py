@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face board of a character: the values of its handles, and whether it or the sliders lead.
+"""Reads and sets the handles of a face board, and decides whether board or sliders lead the face.
 
-The location of a handle in its own axes is the value of its GUI control, wherever board, armature
-and face stand. Raw controls without a GUI control keep their sliders. Either the board or the
-sliders lead: all code that reads or sets "the pose" asks here.
+The location of a handle in its own axes gives the value of its GUI control, independent of the
+places of board, armature and face. Raw controls without a GUI control keep their sliders. Either
+the board or the sliders lead; all code that reads or sets the pose of a face uses this module.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject
 from . import runtime
 
-RANGE = "Range"  # the constraint of a handle that is ours
-SEEN = 0.0005  # a raw control that is off by less is not worth a word
-_NEAR = 1e-6  # numbers that are the same
+RANGE = "Range"  # name of the add-on's constraint of a handle
+SEEN = 0.0005  # smaller errors of a raw control are not reported
+_NEAR = 1e-6  # locations that differ by no more count as equal
 _BY_BOARD, _BY_SLIDERS = "BOARD", "SLIDERS"
 Floats = NDArray[np.float32]
 
@@ -33,12 +33,14 @@ class _Places:
     """Indices of handle values among the bone locations of an armature.
 
     Attributes:
-        names: names of all its pose bones, in order; other names need new indices.
+        names: names of all pose bones of the armature, in order; other names need new indices.
         live: Runtime of the handles.
-        at: int[n] indices into the flat float[bones, 3] of locations.
-        gui: int[n] the GUI control of each.
-        low, high, unit: float32[n] its range, and its value for one unit.
-        moved: handles moved by the user's constraints: bone and axes.
+        at: int[n], indices into the flat float[bones, 3] of locations.
+        gui: int[n], index of the GUI control of each location.
+        low, high: float32[n], range of each location.
+        unit: float32[n], value of the GUI control for a location of 1.
+        moved: bone and (row, axis) pairs of each handle with constraints by the user; None: to be
+            searched.
     """
 
     names: tuple[str, ...]
@@ -51,12 +53,12 @@ class _Places:
     moved: list[tuple[str, list[tuple[int, int]]]] | None = None
 
 
-# Session uid of a control armature -> its places.
+# Session uid of a control armature -> indices of its handle values.
 _places: dict[int, _Places] = session.table("board.places", ("undo", "load"))
 
 
 def note_edit() -> None:
-    """Something was edited: a handle may have got a constraint."""
+    """Search for handles with constraints again, because the user edited something."""
     for places in _places.values():
         places.moved = None
 
@@ -67,22 +69,22 @@ def _handles_there(controls: ArmatureObject, live: runtime.Runtime) -> list[boar
 
 
 def is_there(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
-    """Whether a character has a face board, complete or in part.
+    """Whether a character has a face board, complete or incomplete.
 
     Args:
-        controls: its control armature.
-        live: its Runtime.
+        controls: control armature of the character.
+        live: Runtime of the character; None gives False.
     """
     bones = controls.pose.bones
     return live is not None and any(handle.bone in bones for handle in live.handles)
 
 
 def missing(controls: ArmatureObject, live: runtime.Runtime) -> list[str]:
-    """The missing handles of a board; empty without a board.
+    """The bones of missing handles; empty if the character has no handle at all.
 
     Args:
         controls: control armature of the character.
-        live: its Runtime.
+        live: Runtime of the character.
     """
     bones = controls.pose.bones
     gone = [handle.bone for handle in live.handles if handle.bone not in bones]
@@ -93,15 +95,15 @@ def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
     """Whether the face board leads a face, and not its sliders.
 
     Args:
-        controls: its control armature, the original one.
-        live: its Runtime.
+        controls: the original (not evaluated) control armature.
+        live: Runtime of the character; None gives False.
     """
     wanted = controls.get(parts.LEAD) == _BY_BOARD and parts.BAKED not in controls
     return wanted and is_there(controls, live)
 
 
 def leads_face(rig: ArmatureObject) -> bool:
-    """`leads` of a character. Args: rig  its deforming armature."""
+    """Whether the face board leads a face. Args: rig  its deforming armature."""
     controls = parts.controls_of(rig)
     return controls is not None and leads(controls, runtime.of(rig))
 
@@ -110,7 +112,7 @@ def set_lead(controls: ArmatureObject, by_board: bool) -> None:
     """Choose whether board or sliders lead, without converting the pose.
 
     Args:
-        controls: its control armature.
+        controls: control armature of the character.
         by_board: True: the board; False: the sliders.
     """
     controls[parts.LEAD] = _BY_BOARD if by_board else _BY_SLIDERS
@@ -122,7 +124,7 @@ def set_kind(controls: ArmatureObject, kind: str) -> None:
     """Set the kind of board of a face, before its bones are built.
 
     Args:
-        controls: its control armature, without a board.
+        controls: control armature of the character, without a board.
         kind: runtime.PRIMARY, else runtime.COMPLETE.
     """
     if kind == runtime.PRIMARY:
@@ -132,14 +134,14 @@ def set_kind(controls: ArmatureObject, kind: str) -> None:
 
 
 def read(seen: ArmatureObject, live: runtime.Runtime) -> Floats:
-    """The values of GUI controls from the handles, within their ranges.
+    """The values of GUI controls from the handles, clamped to their ranges.
 
     Args:
-        seen: the control armature, evaluated or the original one.
+        seen: the control armature, evaluated or original.
         live: the character's Runtime.
 
     Returns:
-        float32[G]; values that are not finite, and controls without a handle, are at rest.
+        float32[G]; 0 for values that are not finite and for controls without a handle.
     """
     places = _places_of(seen, live)
     flat = np.empty(3 * len(places.names), np.float32)
@@ -160,7 +162,7 @@ def _places_of(seen: ArmatureObject, live: runtime.Runtime) -> _Places:
     places = _places.get(uid)
     if places is None or places.names != names or places.live is not live:
         places = _places[uid] = _compiled(names, live)
-    # Without an interface scripts edit and step without an update between.
+    # In background mode, scripts may add constraints without an update that calls `note_edit`.
     if places.moved is None or bpy.app.background:
         axes: dict[str, list[tuple[int, int]]] = {}
         for row, at in enumerate(places.at.tolist()):
@@ -195,7 +197,7 @@ def _read_moved(
     axes: Iterable[tuple[int, int]],
     gui: Floats,
 ) -> None:
-    """Read a handle that the user's constraints move."""
+    """Read a handle that constraints by the user move. Args: axes  (row in places, axis)."""
     local: Matrix = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )
@@ -206,15 +208,15 @@ def _read_moved(
 
 
 def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats:
-    """Raw controls of GUI controls.
+    """Convert GUI controls to raw controls.
 
     Args:
-        gui: float32[G].
+        gui: float32[G], values of GUI controls.
         live: the character's Runtime.
-        sliders: float32[R] for raw controls without a GUI control; None: at rest.
+        sliders: float32[R], values of raw controls without a GUI control; None: at rest.
 
     Returns:
-        float32[R].
+        float32[R], values of raw controls.
     """
     table = live.table
     raw = table.own_raw(gui) if table.is_own else live.rig.gui_to_raw(gui)
@@ -229,7 +231,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
         rig: the character.
 
     Returns:
-        Value of each existing slider; of a leading board, the values of the board.
+        Value of each existing slider; if the board leads, it gives the values of its sliders.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -240,7 +242,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Values from a leading board, by the names of the sliders that it sets.
+    """Slider name -> value from the board, for the sliders that the board reaches.
 
     Args:
         rig: the character.
@@ -258,7 +260,7 @@ def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
         values: values by slider names; controls without a handle are set on their sliders.
 
     Returns:
-        The loss.
+        The differences of raw controls that the board cannot show.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -282,11 +284,12 @@ def fit(
 
     Args:
         live: the character's Runtime.
-        raw: float[N, R].
-        start: float[N, G], start of the search; None: the inverted table of the file.
+        raw: float[N, R], wanted values of raw controls at N frames.
+        start: float[N, G], start of the search; None: from the inverted table of the file, or 0
+            if the file has no table.
 
     Returns:
-        float64[N, G].
+        float64[N, G], values of GUI controls.
     """
     if start is None and live.table.is_own:
         start = np.zeros((len(raw), len(live.table.names)), np.float32)
@@ -297,12 +300,12 @@ def fit(
 
 
 def write(controls: ArmatureObject, live: runtime.Runtime, gui: NDArray[np.float64]) -> None:
-    """Bring the handles to GUI values.
+    """Move the handles to values of GUI controls.
 
     Args:
-        controls: control armature of the character, the original one.
-        live: its Runtime.
-        gui: float[G], within the ranges.
+        controls: the original (not evaluated) control armature of the character.
+        live: Runtime of the character.
+        gui: float[G], values within the ranges of the handles.
     """
     for handle in _handles_there(controls, live):
         bone = controls.pose.bones[handle.bone]
@@ -333,18 +336,18 @@ def handles_in(rig: ArmatureObject, region: str = "") -> list[board_layout.Handl
 
     Args:
         rig: the character.
-        region: its name; empty for all.
+        region: name of the region; "": all regions.
     """
     there = _handles_there(parts.controls_there(rig), runtime.there(rig))
     return [handle for handle in there if not region or handle.region == region]
 
 
 def reset(controls: ArmatureObject, handles: Iterable[board_layout.Handle]) -> None:
-    """Bring handles to rest.
+    """Move handles to rest.
 
     Args:
-        controls: control armature of the character, the original one.
-        handles: of its board.
+        controls: the original (not evaluated) control armature of the character.
+        handles: handles of its board.
     """
     for handle in handles:
         controls.pose.bones[handle.bone].location = (0.0, 0.0, 0.0)
@@ -356,7 +359,7 @@ def places_of(controls: ArmatureObject, live: runtime.Runtime) -> dict[str, tupl
 
     Args:
         controls: control armature of the character.
-        live: its Runtime.
+        live: Runtime of the character.
     """
     there = _handles_there(controls, live)
     bones = controls.pose.bones
@@ -370,8 +373,8 @@ def put_places(
 
     Args:
         controls: control armature of the character.
-        live: its Runtime.
-        places: from places_of; missing bones are ignored.
+        live: Runtime of the character.
+        places: locations by bone, from places_of; missing bones are ignored.
     """
     for handle in _handles_there(controls, live):
         if handle.bone in places:
@@ -380,24 +383,24 @@ def put_places(
 
 
 def mark(rig: ArmatureObject, sign: float) -> None:
-    """Mark all handles, to find the handles that Blender pastes onto.
+    """Mark all handles before Blender pastes a pose, to find the handles that the paste changed.
 
     Args:
         rig: the character.
-        sign: a value that no user sets; it is stored on an axis that a handle does not use.
+        sign: the mark, a value that no user sets; it is stored as z of each handle's location.
     """
     for handle in handles_in(rig):
         parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign
 
 
 def pasted_flipped(rig: ArmatureObject, sign: float) -> dict[str, float]:
-    """Values that Blender pasted flipped onto marked handles, by slider names, still unflipped.
+    """Undo the flip of handles that Blender pasted flipped, and return their values by slider.
 
-    Blender mirrors each location and does not know partners.
+    Blender mirrors each location, but does not exchange left and right handles.
 
     Args:
         rig: the character; its board leads.
-        sign: the mark.
+        sign: the mark that was passed to `mark`.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     labels: set[str] = set()
@@ -412,7 +415,7 @@ def pasted_flipped(rig: ArmatureObject, sign: float) -> dict[str, float]:
 
 
 def is_same(one: runtime.Runtime, other: runtime.Runtime) -> bool:
-    """Whether two faces have the same handles. Args: one, other  their Runtimes."""
+    """Whether two faces have equal handles. Args: one, other  Runtimes of the faces."""
     return one.handles == other.handles
 
 
@@ -421,7 +424,7 @@ def is_selected(controls: ArmatureObject, bone: str) -> bool:
 
     Args:
         controls: control armature.
-        bone: name of its existing bone.
+        bone: name of the handle's bone, which must exist.
     """
     return compat.is_bone_selected(controls.pose.bones[bone])
 
@@ -431,8 +434,8 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
     Args:
         controls: control armature.
-        bones: names of their bones.
-        extend: True: add to the selection.
+        bones: names of the handles' bones.
+        extend: True: add to the selection; False: deselect all other bones.
     """
     chosen = set(bones)
     for bone in controls.pose.bones:
@@ -441,5 +444,5 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
 
 def path_of(bone: str) -> str:
-    """The data path of a handle's place, from its armature object. Args: bone  its name."""
+    """The data path of a handle's location, from the armature object. Args: bone  of the handle."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bones of a face board: building, repairing, removing.
+"""Builds, repairs and removes the bones of a face board.
 
-A constraint scales the bone `board` and all handles below it. So the location of a handle is the
-value of its GUI control, and actions fit faces of every size.
+A constraint scales the bone `board` and its children, the handles. So the location of a handle
+gives the value of its GUI control, and actions fit faces of every size.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from . import armatures, board, bone_shapes, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES
-_SHARE = 1.3  # height of the board over that of the head
-_AWAY = 0.42  # from the head to the board, over the size of the head
+_SHARE = 1.3  # height of the board divided by the size of the head
+_AWAY = 0.42  # distance from the head to the board divided by the size of the head
 _SIDE_COLOURS = {"L": (0.25, 0.6, 1.0), "R": (1.0, 0.35, 0.3), "": (1.0, 0.8, 0.2)}
 _LINE_COLOUR = (0.8, 0.8, 0.82)
 _BORDER_COLOUR = (0.25, 0.75, 0.45)
@@ -36,7 +36,7 @@ _BORDER_COLOUR = (0.25, 0.75, 0.45)
 
 @dataclass(frozen=True)
 class _Place:
-    """Place of a board: its centre, and Blender units for one unit of the board."""
+    """Centre of a board in Blender units, and the length of a board unit in Blender units."""
 
     middle: Vector
     unit: float
@@ -47,7 +47,7 @@ def add(context: Context, rig: ArmatureObject) -> int:
 
     Args:
         context: with a view layer.
-        rig: the character, whose control armature is of this file.
+        rig: the character; its control armature must not be linked.
 
     Returns:
         The number of new handles.
@@ -89,11 +89,11 @@ def _layout(live: runtime.Runtime) -> Board:
 
 
 def remove(context: Context, rig: ArmatureObject) -> int:
-    """Remove the face board of a character; its keys stay in their actions.
+    """Remove the face board of a character; keys of its handles stay in the actions.
 
     Args:
         context: with a view layer.
-        rig: the character, whose control armature is of this file.
+        rig: the character; its control armature must not be linked.
 
     Returns:
         The number of removed bones.
@@ -124,7 +124,11 @@ def remove(context: Context, rig: ArmatureObject) -> int:
 
 
 def corners(controls: ArmatureObject) -> NDArray[np.float64]:
-    """float64[N, 3] in the world: the outline of a face board. Args: controls  that have it."""
+    """float64[N, 3] in world space: the corners of a face board's border.
+
+    Args:
+        controls: control armature with the board.
+    """
     bone = controls.pose.bones[BORDER]
     drawn = bone.custom_shape.data if bone.custom_shape is not None else None
     points = [v.co for v in drawn.vertices] if isinstance(drawn, bpy.types.Mesh) else [Vector()]
@@ -137,7 +141,7 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
     Args:
         controls: control armature of the character.
-        visible: whether they are seen.
+        visible: True: show; False: hide.
     """
     shelf = controls.data.collections.get(COLLECTION)
     if shelf is not None and controls.data.library is None:
@@ -145,9 +149,10 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
 
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
-    """How far controls of the middle move the face to its own left, over all that they move it.
+    """GUI control -> its joint motion to the face's left divided by its total motion, -1 to 1.
 
-    Names do not tell: jawLeft may be the viewer's.
+    Only for middle controls that go sideways. Names do not tell the direction, because "left" in
+    jawLeft may mean the viewer's left.
     """
     table = live.table
     chosen = [
@@ -174,7 +179,7 @@ def _sideways(live: runtime.Runtime) -> dict[int, float]:
 
 
 def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
-    """float64[J, 3] in Blender units: where the joints are. Args: deltas  of a pose."""
+    """float64[J, 3]: joint positions in Blender units. Args: deltas  of a pose, float32[J, 9]."""
     dna, space = live.dna, live.space
     angles = np.asarray(dna.neutral_joint_rotations, np.float64)
     if live.rig.rotation == "euler":
@@ -185,7 +190,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 
 
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a primary board."""
+    """The place of a primary board: beside the head meshes."""
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
 
@@ -193,7 +198,10 @@ def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
 def _box(
     items: Sequence[MeshObject], live: runtime.Runtime, joints: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The least and the greatest places of meshes; of the joints too, if asked or without any."""
+    """The lower and upper corner of the bounding box of meshes, float64[3] each.
+
+    The box includes the joints if `joints` is True or the meshes have no vertices.
+    """
     corners: list[NDArray[Any]] = []
     for item in items:
         points = np.empty(3 * len(item.data.vertices), np.float32)
@@ -206,7 +214,7 @@ def _box(
 
 
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a complete board: beside the head, with its height."""
+    """The place of a complete board: to the right (+x) of the head, _SHARE times its size."""
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height
@@ -222,7 +230,7 @@ def _build(
     layout: Board,
     middle: Vector,
 ) -> None:
-    """Bones in the board's own units around its middle; the scale of `board` makes them small."""
+    """Create bones in board units around the board's centre; the bone `board` scales them."""
     for name in bars:
         bone = edit_bones.new(name)
         head = middle + Vector((0.0, 0.3, 0.0)) if name == FRAMES else middle  # behind handles
@@ -249,7 +257,7 @@ def _build(
 
 
 def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: float) -> None:
-    """Give new bones their looks, limits and locks."""
+    """Set shapes, colours, limits and locks of the new bones. Args: names  of these bones."""
     name = controls.name.removesuffix("_controls")
     disc: bpy.types.Object | None = None
     for bone in controls.pose.bones:
@@ -283,14 +291,14 @@ def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: 
 
 
 def _disc(controls: ArmatureObject, layout: Board, name: str) -> bpy.types.Object:
-    """The shape of all handles, which others of this board may have already."""
+    """The custom shape of handles: the shape of an existing handle, or a new disc."""
     bones = controls.pose.bones
     worn = (bones[handle.bone].custom_shape for handle in layout.handles)
     return next((w for w in worn if w is not None), None) or bone_shapes.disc(name)
 
 
 def _limit(bone: bpy.types.PoseBone, handle: Handle) -> None:
-    """Look, locks and range of a handle."""
+    """Set size, colour, locks and range of a handle."""
     wide = 0.3 if handle.x is not None and handle.y is not None else 0.2
     bone.custom_shape_scale_xyz = (wide, wide, wide)
     bone_shapes.colour(bone, _SIDE_COLOURS[handle.side])
@@ -307,7 +315,7 @@ def _limit(bone: bpy.types.PoseBone, handle: Handle) -> None:
 
 
 def _show_bones(controls: ArmatureObject, names: Sequence[str]) -> None:
-    """Put bones into the board's bone collection."""
+    """Assign bones to the board's bone collection."""
     data = controls.data
     shelf = data.collections.get(COLLECTION) or data.collections.new(COLLECTION)
     for name in names:

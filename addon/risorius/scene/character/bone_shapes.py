@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The look of the control bones: each has an outline and a colour for the part that it moves."""
+"""Makes the custom shapes (outlines) and colours of control bones."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mathutils import Vector
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 
-Line = Sequence[tuple[float, float]]  # corners in the xy plane, the last joined to the first
-_COUNT = 32
+Line = Sequence[tuple[float, float]]  # corners in the xy plane
+_COUNT = 32  # corners of a ring
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class Room:
     """Extent of a face at the height of its eyes, in the space of its control armature.
 
     Attributes:
-        middle: x of its centre.
+        middle: x of the face's centre.
         eyes: x between the eyes.
-        wide: distance from the centre to its side.
-        top: z of its highest point, hair included.
+        wide: half the width of the face.
+        top: z of the highest point of all meshes, hair included.
     """
 
     middle: float
@@ -42,7 +42,7 @@ def _ring(size: float = 1.0, x: float = 0.0, y: float = 0.0, flat: float = 1.0) 
 
 
 def _lens() -> Line:
-    """The outline of an open eye: two arcs that meet in corners."""
+    """The outline of an open eye: two arcs that meet in two corners."""
     half = _COUNT // 2
     turns = [math.pi * i / half for i in range(half)]
     arc = [(math.cos(turn), 0.55 * math.sin(turn) ** 2) for turn in turns]
@@ -50,14 +50,14 @@ def _lens() -> Line:
 
 
 def _band(low: float, high: float) -> Line:
-    """The lower part of a ring with a second one inside: a mouth that smiles."""
+    """The outline of a smiling mouth: the lower part of a ring with radii `low` and `high`."""
     turns = [math.pi * (1.15 + 0.7 * i / 12) for i in range(13)]
     outer = [(high * math.cos(t), high * math.sin(t)) for t in turns]
     return outer + [(low * math.cos(t), low * math.sin(t)) for t in reversed(turns)]
 
 
 def _cross() -> list[Line]:
-    """A ring with four marks, as of a gun sight."""
+    """A ring with four marks, like crosshairs."""
     marks = []
     for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
         marks.append([(0.72 * x - 0.04 * y, 0.72 * y + 0.04 * x), (1.3 * x, 1.3 * y),
@@ -66,12 +66,12 @@ def _cross() -> list[Line]:
 
 
 def _collar() -> Line:
-    """Two lines around the front of a neck: seen from above, the back would cross the mouth."""
+    """A band around the front of a neck; the back is left out, because it would cross the mouth."""
     outer = [(1.0, 0.0), (1.0, 0.6), (0.6, 1.0), (-0.6, 1.0), (-1.0, 0.6), (-1.0, 0.0)]
     return outer + [(0.93 * x, 0.93 * y) for x, y in reversed(outer)]
 
 
-# Each is seen in the xy plane; the longest way from the middle is about 1.
+# Outlines lie in the xy plane, with a radius of about 1.
 _OUTLINES: dict[str, list[Line]] = {
     "head": [_ring(), _ring(0.94)],
     "neck": [_collar()],
@@ -80,8 +80,7 @@ _OUTLINES: dict[str, list[Line]] = {
     "eyes": _cross(),
     "face": [_ring(), _ring(0.11, -0.36, 0.3), _ring(0.11, 0.36, 0.3), _band(0.5, 0.62)],
 }  # fmt: skip
-# Yellow for the head, darker for its neck; warm and cold for the two eyes; green for the bone with
-# the sliders.
+# Red, green and blue of each bone, 0 to 1.
 _COLOURS = {
     "head": (0.95, 0.75, 0.15),
     "neck": (0.75, 0.45, 0.10),
@@ -91,15 +90,15 @@ _COLOURS = {
     "face": (0.25, 0.85, 0.35),
 }
 
-PLACED = frozenset(_OUTLINES)  # the control bones that `place` knows
+PLACED = frozenset(_OUTLINES)  # the control bones that `place` supports
 
 
 def make(made: list[bpy.types.ID], character: str, bone: str) -> bpy.types.Object:
-    """The outline of a bone as a wire mesh, in no collection: only the bone shows it.
+    """Make the outline of a bone as a wire mesh object in no collection, so only the bone shows it.
 
     Args:
-        made: list that every new datablock is put on.
-        character: name that the datablocks begin with.
+        made: receives every new datablock.
+        character: prefix of the names of the datablocks.
         bone: name of the control bone.
     """
     corners: list[tuple[float, float, float]] = []
@@ -118,11 +117,11 @@ def make(made: list[bpy.types.ID], character: str, bone: str) -> bpy.types.Objec
 
 
 def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
-    """Open lines as a wire mesh, in no collection.
+    """Make a wire mesh object of open lines, in no collection.
 
     Args:
         name: of the new datablocks.
-        lines: each as corners in the xy plane.
+        lines: corners of each line in the xy plane.
     """
     corners: list[tuple[float, float, float]] = []
     edges = []
@@ -136,19 +135,19 @@ def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
 
 
 def disc(name: str) -> bpy.types.Object:
-    """A filled disc of radius 1, easy to click. Args: name of the datablocks."""
+    """Make a filled disc of radius 1, which is easy to click. Args: name  of the datablocks."""
     mesh = bpy.data.meshes.new(name)
     ring = [(x, y, 0.0) for x, y in _ring()]
-    # Two faces: Blender draws none from behind, where some handles are seen from.
+    # Two opposite faces, because Blender does not draw back faces, and some handles show them.
     back = range(2 * _COUNT - 1, _COUNT - 1, -1)
     mesh.from_pydata([*ring, *ring], [], [range(_COUNT), back])
     return bpy.data.objects.new(name, mesh)
 
 
 def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
-    """Turn and scale the outline to stand beside its body part, and colour it.
+    """Rotate, scale and move the outline beside its body part, and colour the bone.
 
-    From the front no outline covers the eyes, and framing the bones frames the head.
+    Seen from the front, no outline covers the eyes, and View Selected on the bones frames the head.
 
     Args:
         bone: the control bone with its outline.
@@ -158,14 +157,13 @@ def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
     scale, offset = _placed(bone.bone, name, room)
     bone.custom_shape_scale_xyz = (scale, scale, scale)
     bone.custom_shape_translation = offset
-    if name != "face":  # around the upright bone, or across one that looks ahead
+    if name != "face":  # the outline is perpendicular to the bone
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
     colour(bone, _COLOURS[name])
 
 
 def step_aside(controls: ArmatureObject, aside: bool) -> None:
-    """Move the outline of the bone with the sliders to the other side of the head, away from a
-    board.
+    """Move the outline of the slider bone to the other side of the head to make room for a board.
 
     Args:
         controls: control armature of a face.
@@ -182,7 +180,7 @@ def step_aside(controls: ArmatureObject, aside: bool) -> None:
 
 
 def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
-    """Whether an outline is as `place` set it, and the user has not scaled or moved it.
+    """Whether an outline has the scale and position from `place`.
 
     Args:
         bone: the control bone.
@@ -196,8 +194,8 @@ def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
 
 
 def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]:
-    """Radius in lengths of the bone, and the way from its head in its own space."""
-    # A face of one point, or one as large as numbers go, has bones of no length.
+    """Scale of the outline in bone lengths, and its translation in the bone's space."""
+    # Bones of an extremely small or large face may have length 0.
     length, head = bone.length or 1.0, bone.head_local
     if name == "head":  # a ring above the hair
         radius = 0.9 * room.wide
@@ -206,7 +204,7 @@ def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]
         return 1.2 * room.wide / length, Vector()
     if name == "face":
         return 0.7, Vector()
-    if name == "eyes":  # small: it stands between a near view and the face
+    if name == "eyes":  # small, because it is between a near viewpoint and the face
         return 0.18, Vector()
     radius = 0.4 * length  # beside the temple of its side
     away = 1 if head.x >= room.eyes else -1
@@ -216,11 +214,11 @@ def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]
 
 
 def colour(bone: bpy.types.PoseBone, normal: tuple[float, float, float]) -> None:
-    """Colour a bone, with a brighter colour when selected.
+    """Set the colour of a bone, and brighter colours for the selected and the active bone.
 
     Args:
         bone: any pose bone.
-        normal: red, green, blue of the unselected bone.
+        normal: red, green and blue of the unselected bone, 0 to 1.
     """
     look = bone.color
     assert look is not None

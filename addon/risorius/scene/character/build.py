@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the bytes of a DNA file to a complete character in the scene, or to no change."""
+"""Builds a complete character in the scene from a DNA file; an error leaves the scene unchanged."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class BuildOptions:
     """Options of an import.
 
     Attributes:
-        lods: levels whose meshes are built.
-        mode: LIVE, KEYS or AUTO.
+        lods: levels of detail whose meshes are built; 0 is the finest.
+        mode: LIVE, KEYS or AUTO, see change_mode.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load textures beside the file.
-        texture_folder: folder to search first; empty for none.
+        textures: load textures from the folders near the file and from texture_folder.
+        texture_folder: folder to search first; "": none.
         simple_materials: make materials without subsurface, relief and animated maps.
-        unit: metres per Blender unit; None takes the scene's.
+        unit: metres per Blender unit; None: the scene's unit.
         nearest_lods: build the finest level of the file if it has none of the chosen levels.
     """
 
@@ -49,13 +49,13 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class _File:
-    """A file, read and compiled once.
+    """A DNA file that was read and compiled.
 
     Attributes:
         path: of the file.
-        content: its bytes.
-        dna: the Dna of these bytes.
-        rig: its risorius.Rig.
+        content: bytes of the file.
+        dna: Dna parsed from these bytes.
+        rig: risorius.Rig compiled from the Dna.
     """
 
     path: Path
@@ -65,7 +65,7 @@ class _File:
 
 
 def _read(path: str | Path) -> _File:
-    # One read: a file that is just being written may be another at a second look.
+    # Read the file only once, because another program may write it meanwhile.
     risorius = native.module()
     content = Path(path).read_bytes()
     dna = risorius.load(content)
@@ -83,15 +83,15 @@ def import_file(
     Args:
         context: a Blender context with scene and view layer.
         path: of the DNA file.
-        options: BuildOptions.
-        progress: called with 0..1.
+        options: levels, shapes and materials to build.
+        progress: function that is called with the progress, 0 to 1.
 
     Returns:
         The deforming armature, and warnings as sentences.
 
     Raises:
-        DnaError: the file is bad or cannot be read.
-        PlanError, SpaceError: the file has no character.
+        DnaError: the file is damaged or cannot be read.
+        PlanError, SpaceError: no character can be built from the file.
     """
     file = _read(path)
     dna = file.dna
@@ -142,8 +142,8 @@ def _build(
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
     values.carry_on_largest(rig)
     warnings = []
-    # Drivers are made only after the properties that they read have reached the evaluated
-    # copies: one that was evaluated before stays invalid for ever.
+    # Make drivers only after Blender evaluated the properties that they read, because a driver that
+    # was evaluated without its property stays invalid.
     objects = [rig, controls, *built]
     for item in objects:
         workshop.objects.link(item)
@@ -203,7 +203,7 @@ def _connect(
 
 
 def _source(path: Path) -> str:
-    """The path as kept for Reload: relative where the .blend has a place."""
+    """The path that Reload uses; relative to the .blend if it is saved on the same drive."""
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:  # another drive
@@ -213,8 +213,7 @@ def _source(path: Path) -> str:
 def _find_textures(
     plan: plans.CharacterPlan, path: Path, options: BuildOptions
 ) -> texture_search.TexturePlan:
-    """The textures beside the file and in the chosen folder; empty if the options exclude
-    textures."""
+    """The textures near the file and in the chosen folder; none if `options.textures` is off."""
     if not options.textures:
         return texture_search.TexturePlan()
     chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
@@ -241,10 +240,10 @@ def _kind_of_keys(mode: str) -> str:
 
 
 def choose_skinning(rig: ArmatureObject, mode: str) -> None:
-    """Note whether a face may be in Direct mode.
+    """Store whether a face may use Direct mode; only LIVE forbids it.
 
     Args:
-        rig: its deforming armature.
+        rig: the deforming armature.
         mode: AUTO, LIVE or KEYS.
     """
     if mode == "LIVE":
@@ -254,7 +253,7 @@ def choose_skinning(rig: ArmatureObject, mode: str) -> None:
 
 
 def channel_labels(dna: native.Dna) -> list[str]:
-    """Names of the real shape keys, by channel."""
+    """Unique names for real shape keys, one for each blend shape channel."""
     return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
 
 
@@ -265,7 +264,7 @@ def _into_place(
     rig: ArmatureObject,
     controls: ArmatureObject,
 ) -> None:
-    """Name the collection; select the controls."""
+    """Give the collection its final name, and select the controls alone."""
     workshop.name = plan.name
     compat.deselect_all(context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
@@ -276,12 +275,12 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
     """Switch the meshes of a character to another kind of shapes.
 
     Args:
-        rig: its deforming armature.
-        mode: "AUTO" for finished positions in one key of each mesh, "LIVE" for one key that is
-            summed below the armature, "KEYS" for one key a channel.
+        rig: the deforming armature.
+        mode: "AUTO": each mesh has one key with final positions; "LIVE": one key with the sum of
+            the channels, before the armature deforms it; "KEYS": one key per channel.
 
     Returns:
-        Sentences on meshes that could not be switched.
+        Sentences about meshes that could not be switched.
     """
     live = runtime.there(rig)
     trouble = []
@@ -299,7 +298,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Remove a character and its data from the file; data that a copy of it uses stay."""
+    """Remove a character and its data from the file; data with other users stay."""
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)
@@ -323,7 +322,7 @@ def _remove(made: Iterable[bpy.types.ID | None]) -> None:
     for item in dict.fromkeys(made):
         try:
             if item is not None and item.name and not isinstance(item, bpy.types.Key):
-                alive.append(item)  # a Key leaves with its mesh
+                alive.append(item)  # a Key is removed with its mesh
         except ReferenceError:
             continue
     if alive:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with their weights, and their shape keys in both modes."""
+"""Builds mesh objects with skin weights, and switches their shape keys between LIVE and KEYS."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
-_LIVE_MARK = "KEY_BSPLINE"
+_LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
 
 
-# Mesh objects that were built and not edited since: they have the skin weights of their file.
+# Session uids of mesh objects that were built and not edited since, so their skin weights equal the
+# file.
 _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 
 
 def fresh_weights(item: MeshObject) -> bool:
-    """Whether a mesh was built a moment ago, and has the skin weights of its file."""
+    """Whether a mesh was not edited since its import, so that its skin weights equal the file."""
     return item.session_uid in _fresh
 
 
 def note_edit(uid: int) -> None:
-    """A mesh was edited. Args: uid  the session uid of its object."""
+    """Note that a mesh was edited. Args: uid  session uid of the mesh object."""
     _fresh.discard(uid)
 
 
@@ -51,14 +52,14 @@ def build_mesh(
     """Build one mesh object: faces, UVs, custom normals, vertex groups, armature modifier.
 
     Args:
-        plan: the CharacterPlan.
-        mesh_plan: the MeshPlan.
+        plan: names and joints of the character.
+        mesh_plan: geometry and skin weights of the mesh.
         rig: the deforming armature object.
-        made: list that every new datablock is put on.
+        made: receives every new datablock.
         normals: whether the file's normals are kept as custom normals.
 
     Returns:
-        The mesh object, not linked anywhere.
+        The mesh object, in no collection.
     """
     name = f"{plan.name}_{mesh_plan.label}"
     mesh = bpy.data.meshes.new(name)
@@ -93,7 +94,7 @@ def build_mesh(
 
 
 def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-    """Vertex groups of the joints that this mesh uses, filled through the deform layer."""
+    """Add a vertex group with weights for each joint that the mesh uses."""
     used = np.unique(mesh_plan.skin_joints)
     group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
     edit = bmesh.new()
@@ -106,7 +107,7 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
         for vertex, begin, end in zip(edit.verts, offsets[:-1], offsets[1:], strict=True):
             held: Any = vertex[layer]  # weights by group, as a dict
             for i in range(begin, end):
-                # A vertex may list a joint twice; its weights are added.
+                # A vertex may list a joint twice; then its weights are summed.
                 held[groups[i]] = held.get(groups[i], 0.0) + weights[i]
         edit.to_mesh(item.data)
     finally:
@@ -114,11 +115,10 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
-    """Shape key name -> channel, for the real keys that Risorius made; their drivers identify them.
+    """Shape key name -> channel, for the real keys that Risorius made.
 
-    A key that the user drives by a channel belongs to the user: the name of the driver's variable
-        differs. If a driver was copied onto another key, the first key of the list belongs to
-        Risorius.
+    They are identified by the variable name of their drivers, so a key that the user drives by a
+    channel does not count. If a driver was copied to another key, only the first key counts.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}
@@ -140,8 +140,8 @@ def real_channels(item: MeshObject) -> dict[str, int]:
 def live_block(item: MeshObject) -> bpy.types.ShapeKey | None:
     """The live key, also after renaming; None if the mesh has none.
 
-    Its interpolation marks it, because this has no effect on relative keys and survives renames,
-    reordering, copies and files. The name is only a shortcut.
+    Its interpolation identifies the key, because this setting has no effect on relative keys and
+    survives renames, reordering, copies and files. The search by name is only a shortcut.
     """
     key = item.data.shape_keys
     if key is None:
@@ -160,22 +160,22 @@ def set_mode(
     labels: Sequence[str],
     mode: str,
 ) -> bool:
-    """Switch the shapes of a mesh to LIVE or KEYS mode, with the same vertices.
+    """Switch the shape keys of a mesh to LIVE or KEYS mode.
 
-    A real key that the user edited stays a real key in LIVE mode. The user's own keys stay as they
-    are.
+    A real key that the user edited stays a real key in LIVE mode. The user's own keys do not
+    change.
 
     Args:
         item: mesh object.
-        rig: its deforming armature.
-        dna_mesh: the Mesh of the Dna.
-        space: the Space of the Dna.
+        rig: deforming armature of the mesh.
+        dna_mesh: the mesh in the DNA file.
+        space: conversion from the DNA's axes and unit to Blender's.
         labels: shape key names by channel.
         mode: LIVE or KEYS.
 
     Returns:
-        Whether the mode changed; a mesh whose number of vertices differs from its file stays as it
-        is.
+        Whether the mode was set; False, without a change, if the number of vertices differs from
+        the file.
     """
     if not dna_mesh.blend_shape_targets:
         item[parts.MODE] = mode
@@ -194,11 +194,11 @@ def set_mode(
 
 
 def imported_basis(dna_mesh: native.Mesh, space: Space) -> NDArray[np.float32]:
-    """The neutral mesh as an import gives it.
+    """The vertices of the neutral mesh after an import.
 
     Args:
-        dna_mesh: risorius.Mesh with V vertices.
-        space: from the DNA's axes and unit to Blender's.
+        dna_mesh: the mesh in the DNA file, with V vertices.
+        space: conversion from the DNA's axes and unit to Blender's.
 
     Returns:
         float32[V, 3] in Blender units.
@@ -207,10 +207,10 @@ def imported_basis(dna_mesh: native.Mesh, space: Space) -> NDArray[np.float32]:
 
 
 def deltas_by_channel(dna_mesh: native.Mesh, matrix: NDArray[np.float32]) -> dict[int, Deltas]:
-    """The blend shape targets of a mesh by their channel; targets of one channel are joined.
+    """The blend shape targets of a mesh by channel; targets of the same channel are concatenated.
 
     Args:
-        dna_mesh: risorius.Mesh.
+        dna_mesh: the mesh in the DNA file.
         matrix: float32[3, 3], converts deltas from the DNA's axes and unit to Blender's.
 
     Returns:
@@ -235,7 +235,7 @@ def points_of(block: bpy.types.ShapeKey) -> NDArray[np.float32]:
 
 
 def basis_of(item: MeshObject) -> NDArray[np.float32]:
-    """Coordinates of the neutral mesh as it is now, float32[V, 3]."""
+    """Current coordinates of the neutral mesh (the reference key if any), float32[V, 3]."""
     key = item.data.shape_keys
     if key is not None:
         return points_of(key.reference_key)
@@ -247,15 +247,15 @@ def basis_of(item: MeshObject) -> NDArray[np.float32]:
 def edits_of(
     block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """The user's edits of a real key.
+    """Find the user's edits of a real key.
 
     Args:
         block: the key.
-        imported: float32[V, 3], see imported_basis.
-        deltas: (vertex indices, float32[K, 3]) of its channel.
+        imported: float32[V, 3], the neutral mesh from imported_basis.
+        deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        See user_edits.key_edits.
+        Result of user_edits.key_edits.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
@@ -301,11 +301,11 @@ def add_channel_key(
 
 
 def remove_channel_key(item: MeshObject, block: bpy.types.ShapeKey) -> None:
-    """Take one of our keys away, its driver too.
+    """Remove a shape key of add_channel_key with its driver.
 
     Args:
         item: the mesh object.
-        block: one of its keys, made by add_channel_key.
+        block: the shape key of this mesh.
     """
     path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
     parts.keys_there(item).driver_remove(path)
@@ -356,7 +356,7 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add the live key, for the sum of channels or for final positions. Args: item the mesh."""
+    """Add the live key, for the sum of channels or final positions. Args: item  the mesh object."""
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
@@ -385,7 +385,7 @@ def touched(
 
 
 def _remember_keys(item: MeshObject, labels: Sequence[str]) -> None:
-    """Keep the user's names and order of our keys while they are away."""
+    """Store names and order that the user gave to real keys, before LIVE mode removes the keys."""
     key, channels = parts.keys_there(item), real_channels(item)
     renamed = {str(c): name for name, c in channels.items() if name != labels[c]}
     if renamed:
@@ -398,12 +398,12 @@ def _remember_keys(item: MeshObject, labels: Sequence[str]) -> None:
 def drive_key(
     key: bpy.types.Key, block: bpy.types.ShapeKey, rig: ArmatureObject, channel: int
 ) -> None:
-    """Drive a key's value by its channel through a plain SUM driver.
+    """Add a driver that copies the weight of a channel to the value of a shape key.
 
     Args:
         key: the shape keys of the mesh.
-        block: the one that is driven.
-        rig: deforming armature, which has the channels' weights.
+        block: the shape key to drive.
+        rig: deforming armature, which stores the channels' weights.
         channel: index of the blend shape channel.
     """
     name = bpy.utils.escape_identifier(block.name)

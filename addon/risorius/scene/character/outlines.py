@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outlines of the control bones in the scene: hidden and shown, and in no collection."""
+"""Hides and shows the outlines of control bones, and removes them from collections."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def are_hidden(controls: ArmatureObject) -> bool:
 
 
 def hide(controls: ArmatureObject) -> None:
-    """Draw no outline of the control bones; the face board stays.
+    """Hide the outlines of the control bones by a scale of 0; the face board stays visible.
 
-    The bones are not hidden: Blender's editors leave out the keys of hidden bones.
+    The bones are not hidden, because Blender's editors leave out the keys of hidden bones.
 
     Args:
         controls: control armature of the face.
@@ -37,19 +37,19 @@ def hide(controls: ArmatureObject) -> None:
 
 
 def show(controls: ArmatureObject) -> None:
-    """Draw the outlines again, in the sizes of before. Args: controls  that they belong to."""
+    """Show hidden outlines in their earlier sizes. Args: controls  control armature of the face."""
     held: Any = controls.get(parts.OUTLINES)
     sizes = held.to_dict() if hasattr(held, "to_dict") else {}
     for part, bone in _bones(controls):
-        if not any(bone.custom_shape_scale_xyz[:]):  # else the user has given it a size meanwhile
+        if not any(bone.custom_shape_scale_xyz[:]):  # otherwise the user has set a size
             bone.custom_shape_scale_xyz = sizes.get(part, (1.0, 1.0, 1.0))
     controls.pop(parts.OUTLINES, None)
 
 
 def stand_beside(rig: ArmatureObject) -> int:
-    """Move the outlines to the places of a newly imported face.
+    """Place the outlines as on a newly imported face.
 
-    In older files they stand over the eyes. Sizes that the user changed are lost.
+    In older files they cover the eyes. Sizes and positions that the user changed are lost.
 
     Args:
         rig: the character's deforming armature.
@@ -70,7 +70,7 @@ def stand_beside(rig: ArmatureObject) -> int:
 
 
 def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]:
-    """The control bones with the name of the part that each is."""
+    """(name of the part, bone) of each control bone with an outline."""
     for bone in controls.pose.bones:
         part = bone.bone.get(parts.PART)
         if isinstance(part, str) and bone.custom_shape is not None:
@@ -87,9 +87,9 @@ def tidy(controls: ArmatureObject) -> int:
         controls: control armature of an appended face.
 
     Returns:
-        The number of objects that left the scene.
+        The number of objects that were removed from collections.
     """
-    # The pose of an object that has just been read knows no bones yet: the armature does.
+    # Pose bones of a newly appended object may lack their Bone, so names come from the armature.
     names = {b.name for b in controls.data.bones if parts.PART in b or parts.BOARD in b}
     ours = (bone for bone in controls.pose.bones if bone.name in names)
     shapes = {shape for shape in (bone.custom_shape for bone in ours) if shape is not None}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The place of a face: the rig follows the control armature, which follows a body.
+"""Places faces: the deforming armature follows the control armature, which may follow a body.
 
-Neither is a parent of the other, because an edit of a parent makes Blender deform the meshes twice.
+The armatures are not parented, because an edit of a parent makes Blender deform the meshes twice.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from ..base import last_written, parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph
 
 CONSTRAINT = "Risorius Body"
-_GAP = 1.25  # from face to face, in widths of one
-_NEAR = 1e-6  # of the largest number of the matrix: what decomposing in float32 leaves
+_GAP = 1.25  # distance between neighbouring faces, in widths of a face
+_NEAR = 1e-6  # tolerance relative to the largest number of the matrix: float32 rounding
 
 
 def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
-    """Put the rig where the control armature is, unless the user gave it a place of its own.
+    """Copy the world matrix of the control armature to the rig, if the rig follows it.
 
     Args:
-        rig: the deforming armature, the original.
+        rig: the original (not evaluated) deforming armature.
         seen: the evaluated control armature.
     """
     if not _follows(rig):
         return
-    wanted = np.array(seen.matrix_world, np.float64)  # float32 in Blender 5
-    # Write differences of rounding too, so that a frame does not depend on the frame before it.
+    wanted = np.array(seen.matrix_world, np.float64)  # Blender 5 would give float32
+    # Also write rounding differences, so that a frame does not depend on the frame before it.
     if last_written.is_new(last_written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
 
 
 def has_strayed(rig: ArmatureObject) -> bool:
-    """Whether a rig that follows was moved by another hand. Args: rig  the original."""
+    """Whether the user or a script moved a rig that follows its controls. Args: rig  original."""
     last = last_written.places.get(rig.session_uid)
     return isinstance(last, bytes) and _follows(rig) and not _is_at(rig, np.frombuffer(last))
 
@@ -49,20 +49,20 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig is at a place, but for rounding. Args: wanted  float64, 16 numbers."""
+    """Whether a rig has a matrix up to rounding. Args: wanted  float64, 16 numbers."""
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
 
 def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
-    """Move a new face to the right until no other face stands at its place.
+    """Move a new face along +x until no other face is near.
 
     Args:
         scene: the scene with the other faces, including linked ones.
-        rig: the deforming armature, at the origin.
+        rig: deforming armature of the new face.
 
     Returns:
-        Whether it was moved.
+        Whether the face was moved.
     """
     others = [r for r in parts.rigs(linked=True) if r != rig and scene in r.users_scene]
     there = [c.matrix_world.translation for c in map(parts.controls_of, others) if c is not None]
@@ -74,22 +74,22 @@ def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
 
 
 def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
-    """Move a new face beside its source mesh.
+    """Move a new face beside its source mesh, along +x.
 
     Args:
-        rig: the deforming armature; its file has the origin of the mesh.
-        item: the mesh.
+        rig: deforming armature of the face; its DNA file has the origin of the mesh object.
+        item: the mesh object.
     """
     place = item.matrix_world.translation
     parts.controls_there(rig).location = place + Vector((_GAP * _width(rig), 0.0, 0.0))
 
 
 def put_clear_of(rig: ArmatureObject, item: bpy.types.Object) -> None:
-    """Move a new face to the right where it would stand in an object that is no face.
+    """Move a new face along +x past an object if their ranges of x overlap.
 
     Args:
-        rig: the deforming armature.
-        item: the object.
+        rig: deforming armature of the face.
+        item: an object that is no face.
     """
     spot, width = parts.controls_there(rig).location, _width(rig)
     left = spot.x + min((c[0] for m in parts.meshes_of(rig) for c in m.bound_box), default=0.0)
@@ -103,7 +103,7 @@ def _taken(there: Iterable[Vector], spot: Vector, shift: float, reach: float) ->
 
 
 def _width(rig: ArmatureObject) -> float:
-    """How wide the meshes of a face are, in units of the scene."""
+    """The extent of a face's meshes in x, in Blender units without object scale."""
     ends = [corner[0] for item in parts.meshes_of(rig) for corner in item.bound_box]
     return max(ends, default=0.0) - min(ends, default=0.0)
 
@@ -135,7 +135,7 @@ def _named(bones: Iterable[bpy.types.Bone], word: str) -> str:
 
 
 def _split(name: str) -> str:
-    """`mixamorigHead` as `mixamorig Head`."""
+    """Split camel case: `mixamorigHead` becomes `mixamorig Head`."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
 
 
@@ -147,15 +147,15 @@ def attach(
     head: str = "",
     fit: str = "MOVE",
 ) -> None:
-    """Hang a face on a body.
+    """Attach a face to a body with a Child Of constraint.
 
     Args:
-        controls: the control armature.
+        controls: the control armature of the face.
         body: an armature object, at any scale.
-        base: the bone that carries the whole face.
-        neck, head: the body's bones that turn the face's own neck and head; "" for none.
-        fit: NONE keeps the place of the face; MOVE puts its head (or its neck) on the body's at
-            rest; SCALE also scales its neck to the length of the body's.
+        base: the body's bone that carries the whole face.
+        neck, head: the body's bones that rotate the face's own neck and head; "": none.
+        fit: "NONE": keep the place of the face; "MOVE": move its head bone (or neck bone) onto the
+            body's bone at rest; "SCALE": also scale the face so that the neck lengths are equal.
     """
     detach(controls)
     if fit != "NONE":
@@ -163,7 +163,7 @@ def attach(
     hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
-    # As the body rests: a body that is posed at this moment carries the face along.
+    # Relative to the body's rest pose, so that the body's current pose moves the face.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
     hold.set_inverse_pending = False
@@ -173,7 +173,7 @@ def attach(
 
 
 def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[str]:
-    """The bones from the neck bone up to below the head: a body may have several."""
+    """The body's bones from the neck bone to the head's parent, because a neck may have several."""
     if not neck:
         return []
     bone = body.data.bones.get(head)
@@ -184,7 +184,7 @@ def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[s
 
 
 def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
-    """The constraint by which a face hangs on a body, or None."""
+    """The constraint that attaches a face to a body, or None."""
     hold = controls.constraints.get(CONSTRAINT)
     if hold is None or hold.type != "CHILD_OF":
         return None
@@ -195,15 +195,15 @@ def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
 def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
     """Rotations of a body's neck and head for the face, relative to the base bone.
 
-    Copy constraints of bones are no alternative: they assume equal object rotations, and bodies
-        from other programs are rotated and scaled objects.
+    Copy Rotation constraints are no alternative, because they assume equal object rotations, and
+    bodies from other programs are rotated and scaled objects.
 
     Args:
-        controls: the control armature, the original.
+        controls: the original (not evaluated) control armature.
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; rest rotations are left out.
+        "neck" and "head" -> Quaternion in the control armature's axes; missing without a rotation.
     """
     hold = body_of(controls)
     if hold is None:
@@ -213,7 +213,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
     if rest is None or hold.mute:
         return {}
     seen = body.evaluated_get(depsgraph)
-    # From the control armature's space to the body's while the body rests.
+    # Rotation from the control armature's space to the body's space in the body's rest pose.
     axes = (rest.matrix_local @ hold.inverse_matrix @ controls.matrix_basis).to_quaternion()
     turns = {}
     for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):
@@ -228,11 +228,11 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
 
 
 def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
-    """A bone's own rotation after its constraints, in the axes of its armature.
+    """The rotation of a bone relative to rest and parent, with constraints, in the armature's axes.
 
     Args:
         seen: the evaluated armature.
-        bone: one of its pose bones.
+        bone: a pose bone of this armature.
     """
     local = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
@@ -242,7 +242,7 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move (and scale) the face so that its resting bones meet the body's."""
+    """Move (and scale) the face so that its head and neck bones meet the body's at rest."""
     own = controls.data.bones
     pairs = [
         (
@@ -269,7 +269,7 @@ def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, s
 
 
 def detach(controls: ArmatureObject) -> None:
-    """Detach a face from its body; it keeps its place."""
+    """Detach a face from its body; the face keeps its place."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiled data of a character's DNA, kept by the hash of its content.
+"""Compiles the DNA of characters, and caches the result by the hash of the DNA's content.
 
-It holds no Blender object. It is found again or rebuilt after load, undo, append and enable.
+The cache holds no Blender object, so it stays valid after load, undo and append.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ..base.blender_types import ArmatureObject, MeshObject
 
 # The bones of the control armature without the face board.
 CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
-BOARD_BONES = ("board", "board_frames")  # by which a board is taken, and what is drawn on it
+BOARD_BONES = ("board", "board_frames")  # the bone that moves the board; the bone with its lines
 COMPLETE, PRIMARY = "COMPLETE", "PRIMARY"  # the two kinds of board
-DEFAULT_EYE_ANGLE = float(np.radians(30.0))
+DEFAULT_EYE_ANGLE = float(np.radians(30.0))  # radians, for eyes that look controls do not turn
 
 
 @dataclass
@@ -34,19 +34,21 @@ class Runtime:
     """Compiled data of one DNA at one unit scale.
 
     Attributes:
-        dna: the file; rig: its risorius.Rig; space: its Space.
+        dna: the parsed file.
+        rig: its compiled risorius.Rig.
+        space: conversion from the DNA's axes and unit to Blender's.
         labels: property names of the raw controls by index.
         rests: rest values of the raw controls.
         lowest: lowest values of the raw controls; components of rotations go below 0.
-        owned: the joints that the evaluator writes.
-        rest: float64[J, 4, 4] neutral joints.
+        owned: indices of the joints that the evaluator writes.
+        rest: float64[J, 4, 4], world matrices of the neutral joints in Blender's units.
         anchors: joints of neck, head and eyes.
-        look: for each side, control name -> yaw or pitch in radians at value 1.
-        lids: controls that close and widen an eye, by eyeBlink or eyeWiden and the side.
+        look: side "L" or "R" -> (index of a look control, yaw, pitch) in radians at value 1.
+        lids: name such as eyeBlinkL or eyeWidenR -> index of the raw control.
         turning: joints whose rotation is stored in raw controls.
-        morphs: mesh index -> risorius.Morph.
-        surfaces: level of detail -> risorius.Surface.
-        chains: joint -> Chain.
+        morphs: cache, mesh index -> risorius.Morph.
+        surfaces: cache, level of detail -> risorius.Surface.
+        chains: cache, joint index -> Chain.
         board: kind of the face board of `table` and `handles`: PRIMARY or COMPLETE.
     """
 
@@ -69,21 +71,21 @@ class Runtime:
 
     @cached_property
     def mesh_count(self) -> int:
-        """Meshes of the file; `dna.meshes` makes an object of each at every look."""
+        """Number of meshes; cached, because each access to `dna.meshes` makes new objects."""
         return len(self.dna.meshes)
 
     def vertex_count(self, mesh_index: int) -> int:
-        """Vertices of a mesh of the file."""
+        """Number of vertices of a mesh of the file."""
         return self.morph(mesh_index).vertex_count
 
     def chain(self, joint: int) -> Chain:
-        """The joints from the root to one, read when first asked for."""
+        """The chain of joints from the root to a joint; computed at the first call."""
         if joint not in self.chains:
             self.chains[joint] = _chain(self.dna, self.space, joint)
         return self.chains[joint]
 
     def morph(self, mesh_index: int) -> native.Morph:
-        """The compiled shapes of a mesh, made when first asked for."""
+        """The compiled blend shapes of a mesh; compiled at the first call."""
         if mesh_index not in self.morphs:
             self.morphs[mesh_index] = native.module().Morph(
                 self.dna, mesh_index, matrix=self.space.delta_matrix
@@ -91,7 +93,7 @@ class Runtime:
         return self.morphs[mesh_index]
 
     def surface(self, lod: int) -> native.Surface:
-        """The meshes of a level as a function of the controls, made when first asked for."""
+        """The evaluator of all meshes of a level of detail; compiled at the first call."""
         if lod not in self.surfaces:
             self.surfaces[lod] = native.module().Surface(self.dna, self.rig, lod=lod)
         return self.surfaces[lod]
@@ -101,13 +103,14 @@ class Runtime:
         return replace(self, board=PRIMARY)
 
     def with_board(self, kind: str) -> Runtime:
-        """The same compiled data with a kind of face board. Args: kind  PRIMARY or COMPLETE."""
+        """This Runtime for a kind of face board. Args: kind  PRIMARY or COMPLETE."""
         assert self.board == COMPLETE or kind == PRIMARY
         return self._with_primary if kind != self.board else self
 
     @cached_property
     def table(self) -> board_table.BoardTable:
-        """The GUI controls: the primary board's, the file's, or made of its raw controls."""
+        """The table from GUI to raw controls: of the primary board, else of the file; made from the
+        raw controls if the file has none."""
         if self.board == PRIMARY:
             return primary_table.table_of(self.labels)
         if not self.dna.gui_control_names:
@@ -119,7 +122,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board; handles of a complete board have no places yet."""
+        """The handles of the face board; handles of a complete board have no positions."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -128,7 +131,7 @@ class Runtime:
         return board_layout.handles_of(self.table, ways, region_of, taken)
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
-        """The native conversion of poses for the bones of these joints."""
+        """The native converter from joint deltas to pose channels of the bones of these joints."""
         space = self.space
         return native.module().BoneSpace(
             self.dna.neutral_joint_rotations,
@@ -146,13 +149,13 @@ class Turning:
     """A joint whose rotation is stored in four raw controls.
 
     Attributes:
-        joint: its index.
+        joint: index of the joint.
         controls: indices of the raw controls of x, y, z and w.
-        bone: the control bone that turns the joint, "neck" or "head"; "" for none.
-        share: share of the control bone's rotation for the joint.
-        armature_axes: converts the vector part of a rotation from the armature's axes to the
+        bone: the control bone that rotates the joint, "neck" or "head"; "": none.
+        share: fraction of the control bone's rotation that the joint gets, 0 to 1.
+        armature_axes: converts the vector part of a quaternion from the armature's axes to the
             file's.
-        bone_axes: the same for a rotation about the axes of the joint's bone.
+        bone_axes: converts it from the axes of the joint's bone to the file's.
     """
 
     joint: int
@@ -165,12 +168,12 @@ class Turning:
 
 @dataclass
 class Chain:
-    """The joints from the root to one of them.
+    """The joints from the root to a joint.
 
     Attributes:
-        joints: their numbers, int64[n].
-        angles: float64[n, 3] neutral rotations in the file's units.
-        offsets: float64[n, 3] neutral translations in Blender's units and axes.
+        joints: int64[n], indices of the joints, root first.
+        angles: float64[n, 3], neutral rotations in the file's units.
+        offsets: float64[n, 3], neutral translations in Blender's units and axes.
     """
 
     joints: NDArray[np.int64]
@@ -188,18 +191,18 @@ def _chain(dna: native.Dna, space: Space, joint: int) -> Chain:
 
 
 _cache: dict[tuple[str, float], Runtime | None] = session.table("runtime.cache", ("unregister",))
-_LEAST_UNIT, _MOST_UNIT = 1e-9, 1e9  # metres per Blender unit that a scene can have
+_LEAST_UNIT, _MOST_UNIT = 1e-9, 1e9  # range of metres per Blender unit
 
 
 def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
     """The Runtime of a character.
 
     Args:
-        rig: its deforming armature.
-        board: the kind of face board; None for that which the character has.
+        rig: the deforming armature.
+        board: PRIMARY or COMPLETE; None: the kind of the character's board.
 
     Returns:
-        Runtime, or None where the armature has lost its DNA.
+        The Runtime; None if the DNA of the armature is missing or cannot be read.
     """
     text = rig.get(parts.DNA)
     digest = storage.content_hash(text)
@@ -223,19 +226,23 @@ def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
 
 
 def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
-    """`of` a character that has its DNA: whoever asks has looked. Args: rig, board  as there."""
+    """The Runtime of a character; the caller must have checked that `of` gives one.
+
+    Args:
+        rig, board: see `of`.
+    """
     live = of(rig, board)
     assert live is not None
     return live
 
 
 def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
-    """Keep the compiled data of an import, so that the same bytes are not compiled again.
+    """Cache the compiled data of an import, so that the same bytes are not compiled again.
 
     Args:
-        armature: the deforming armature with its Text and unit.
-        dna: the Dna of the bytes in that Text.
-        rig: its risorius.Rig.
+        armature: the deforming armature, with its properties DNA and UNIT.
+        dna: Dna parsed from the bytes in the armature's Text.
+        rig: risorius.Rig compiled from the Dna.
 
     Raises:
         PlanError: the file cannot be evaluated.
@@ -249,22 +256,22 @@ def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
 
 
 def mesh_number(live: Runtime, item: MeshObject) -> int | None:
-    """The index of the file's mesh that an object shows, or None where the file has no such mesh.
+    """The index of the DNA mesh that an object shows, or None if the file has no such mesh.
 
     Args:
         live: the Runtime of the character.
-        item: one of `parts.meshes_of`.
+        item: a mesh object of the character.
     """
     number = saved.whole(item, parts.MESH, -1)
     return number if 0 <= number < live.mesh_count else None
 
 
 def dna_mesh(live: Runtime, item: MeshObject) -> native.Mesh | None:
-    """The mesh of the file that an object shows, or None where the file has no such mesh.
+    """The DNA mesh that an object shows, or None if the file has no such mesh.
 
     Args:
         live: the Runtime of the character.
-        item: one of `parts.meshes_of`.
+        item: a mesh object of the character.
     """
     number = mesh_number(live, item)
     return None if number is None else live.dna.meshes[number]
@@ -276,7 +283,7 @@ def unit_of(rig: ArmatureObject) -> float:
 
 
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
-    """Drop compiled data of deleted characters. Args: rigs existing ones."""
+    """Drop compiled data of deleted characters. Args: rigs  deforming armatures that exist."""
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]
@@ -284,10 +291,13 @@ def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
 
 
 def compiled(content: bytes) -> Runtime:
-    """The Runtime of a file that is no character of the scene, in metres. Args: content  a DNA.
+    """Compile a DNA file that belongs to no character, with 1 metre per Blender unit.
+
+    Args:
+        content: bytes of the file.
 
     Raises:
-        DnaError, SpaceError, ValueError: it cannot be used.
+        DnaError, SpaceError, ValueError: the file cannot be compiled.
     """
     return _compile(content, 1.0)
 
@@ -351,7 +361,7 @@ def _turning(dna: native.Dna, space: Space, anchors: plans.Anchors) -> list[Turn
 
 
 def _measure_look(runtime: Runtime) -> dict[str, list[tuple[int, float, float]]]:
-    """How far each look control turns its eye: side -> list of (control, yaw, pitch) at 1."""
+    """Side "L" or "R" -> (look control, yaw, pitch) of the eye in radians at control value 1."""
     found = {}
     where = {name.rsplit(".", 1)[-1]: i for i, name in enumerate(runtime.dna.raw_control_names)}
     for side in "LR":
@@ -371,7 +381,8 @@ def _measure_look(runtime: Runtime) -> dict[str, list[tuple[int, float, float]]]
 
 
 def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> float:
-    """The angle in radians that a look control turns its eye by at full value."""
+    """The rotation of an eye by a look control at value 1, in radians; DEFAULT_EYE_ANGLE if it is
+    below 2 degrees."""
     joint = runtime.anchors.eyes.get(side)
     if joint is None:
         return DEFAULT_EYE_ANGLE

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make keys of a face visible in the animation editors.
+"""Makes keys of a face visible in the animation editors.
 
-The editors show keys of selected objects and selected bones only. Code that keys a face calls
-`show`. The existing selection stays.
+The editors show only the keys of selected objects and selected bones. Code that inserts keys calls
+`show`, which extends the selection.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject, Context, current_context
 from . import armatures
 
-# Uid of a control armature -> uid of the action that it plays, and how many keys its sliders have.
+# Session uid of a control armature -> session uid of its action, and number of its slider keys.
 _counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo", "load"))
 
 
 def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
     """Make new keys of a face visible in the animation editors.
 
-    The bone with the sliders is selected: it is locked, so nobody moves it by accident. Outside
-        pose mode the bones of head and eyes are selected too, so that moving a column of keys moves
-        their keys. In pose mode they are selected only if none of the keyed bones is selected.
-        Handles of a face board follow this rule in every mode.
+    The slider bone is selected if it is keyed; it is locked, so nobody moves it by accident.
+    Outside pose mode the keyed bones of head and eyes are selected too, so that moving a column of
+    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Handles
+    of a face board follow the rule of pose mode in every mode.
 
     Args:
         controls: control armature of the face.
@@ -46,7 +46,7 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
 
 
 def show_some(controls: ArmatureObject) -> None:
-    """Select the bone of the sliders where no bone is selected and all keys would be hidden.
+    """Select the slider bone if no bone is selected, because all keys would be hidden.
 
     Args:
         controls: control armature of a face.
@@ -57,7 +57,7 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Add the controls to the selection, in pose mode if the active object is in pose mode.
+    """Add the control armature to the selection; it enters pose mode if the active object is in it.
 
     Args:
         context: a Blender context.
@@ -76,7 +76,7 @@ def show_object(context: Context, controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject) -> None:
-    """Make keys of sliders visible that Blender's own operators inserted.
+    """Make slider keys visible if Blender's operators inserted new ones.
 
     Args:
         controls: a control armature whose action was edited.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Left and right of a face: mirrored, alike, or one led by the other; poses by region."""
+"""Mirrors poses, copies or links the sides of a face, and sets poses of regions."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from ..base.blender_types import ArmatureObject
 from . import board, runtime
 
 _FLIP = Matrix.Diagonal((-1.0, 1.0, 1.0, 1.0))
-_TWIN = "twin"  # name of the variable of the drivers that let one side follow the other
+_TWIN = "twin"  # variable name of drivers that link a slider to the other side
 _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 
 
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
-    """The sliders of a face or region with their values; of a leading board, the values of the
-    board.
+    """Slider name -> value, for a face or a region; a leading board gives the values.
 
     Args:
         rig: the character.
-        region: its name; empty for all.
+        region: name of the region; "": all regions.
     """
     of_slider = native.regions().of_slider
     values = board.raw_now(rig)
@@ -35,16 +34,16 @@ def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
 
 
 def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
-    """Set sliders within their limits. Sliders that follow others stay, missing ones are ignored.
+    """Set sliders, clamped to their limits. Linked and missing sliders are ignored.
 
-    A leading face board is moved as near as possible.
+    If a face board leads, its handles are moved to the nearest pose instead.
 
     Args:
         rig: the character.
         values: values by slider names.
 
     Returns:
-        The number of sliders set.
+        The number of sliders that were set.
     """
     face, controls, live = parts.face_bone(rig), parts.controls_there(rig), runtime.there(rig)
     assert face is not None
@@ -68,7 +67,7 @@ class Held:
 
     Attributes:
         sliders: name -> value.
-        places: bone -> place of each handle.
+        places: bone -> location of each handle.
     """
 
     sliders: Mapping[str, float]
@@ -76,7 +75,7 @@ class Held:
 
 
 def hold(rig: ArmatureObject) -> Held:
-    """Store the current sliders and handles. Args: rig the character."""
+    """Store the current values of sliders and handles. Args: rig  the character."""
     face, live, controls = parts.face_bone(rig), runtime.there(rig), parts.controls_there(rig)
     assert face is not None
     sliders = {label: face[label] for label in live.labels if label in face}
@@ -88,7 +87,7 @@ def restore(rig: ArmatureObject, held: Held) -> None:
 
     Args:
         rig: the character.
-        held: from `hold`.
+        held: values from `hold`.
     """
     face = parts.face_bone(rig)
     assert face is not None
@@ -98,11 +97,11 @@ def restore(rig: ArmatureObject, held: Held) -> None:
 
 
 def mirror(rig: ArmatureObject, region: str = "") -> None:
-    """Set the sliders left for right.
+    """Exchange the slider values of left and right.
 
     Args:
         rig: the character.
-        region: only of this one; empty for all, with the head, neck and eye bones.
+        region: name of the region to mirror; "": all regions and the control bones.
     """
     put(rig, slider_rows.mirrored(values_of(rig, region), native.regions()))
     if not region:
@@ -110,7 +109,7 @@ def mirror(rig: ArmatureObject, region: str = "") -> None:
 
 
 def mirror_bones(controls: ArmatureObject) -> None:
-    """Turn the bones of a control armature as in a mirror; each eye takes the other's turn."""
+    """Mirror the transforms of control bones at x = 0; the eye bones exchange their rotations."""
     bones = controls.pose.bones
     turned = {}
     for name in runtime.CONTROL_BONES:
@@ -128,31 +127,31 @@ def mirror_bones(controls: ArmatureObject) -> None:
 
 
 def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
-    """Make one side like the other; eyes go on looking the same way.
+    """Copy slider values from one side to the other; both eyes look in the same direction.
 
     Args:
         rig: the character.
-        from_left: its own left side is the one that is copied.
-        region: only of this one; empty for all.
+        from_left: True: copy the character's left side to the right; False: right to left.
+        region: name of the region to copy; "": all regions.
 
     Returns:
-        How many sliders were set.
+        The number of sliders that were set.
     """
     values = values_of(rig, region)
     return put(rig, slider_rows.across_from(values, native.regions(), from_left))
 
 
 def link(rig: ArmatureObject, from_left: bool) -> int:
-    """Let the sliders of one side follow the other side with visible drivers.
+    """Link the sliders of one side to the other side with drivers, replacing earlier links.
 
-    A slider with a driver stays as it is.
+    Pairs in which a slider has another driver are left out.
 
     Args:
         rig: the character.
         from_left: True: the character's left side leads.
 
     Returns:
-        The number of following sliders.
+        The number of linked sliders.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     unlink(rig)
@@ -175,7 +174,7 @@ def link(rig: ArmatureObject, from_left: bool) -> int:
 
 
 def unlink(rig: ArmatureObject) -> None:
-    """Free both sides at their current values."""
+    """Remove the links between the sides; the sliders keep their current values."""
     controls, face = parts.controls_there(rig), parts.face_bone(rig)
     assert face is not None
     for follower, leader in followers(controls).items():
@@ -186,7 +185,7 @@ def unlink(rig: ArmatureObject) -> None:
 
 
 def followers(controls: ArmatureObject) -> dict[str, str]:
-    """The sliders that follow their twin, each with the one that leads it."""
+    """Slider that is linked to the other side -> slider that drives it."""
     data = controls.animation_data
     if data is None or not len(data.drivers):
         return {}
@@ -205,7 +204,8 @@ def _label(path: str, start: str, end: str) -> str:
 
 
 def in_use(rig: ArmatureObject) -> set[str]:
-    """The sliders that are not at rest or have keys in the face's action, with their twins."""
+    """The sliders that are not at rest or have keys in the active action, and their counterparts on
+    the other side."""
     live, controls = runtime.there(rig), parts.controls_there(rig)
     data = controls.animation_data
     action = data.action if data is not None else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights of a mesh object, read and written in bulk."""
+"""Reads and writes all skin weights of a mesh object at once."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ Weights = dict[str, dict[int, float]]  # bone or vertex group -> vertex -> weigh
 
 
 def file_pairs(mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> Weights:
-    """The weights that a file gives: {bone name: {vertex: weight}}, repeated ones summed.
+    """The skin weights of a DNA mesh: {bone name: {vertex: weight}}.
+
+    If a vertex lists a joint more than once, the weights are summed.
 
     Args:
-        mesh_plan: MeshPlan.
-        labels: bone name by joint.
+        mesh_plan: skin weights of the mesh.
+        labels: bone names by joint index.
     """
     counts = np.diff(mesh_plan.skin_offsets)
     vertices = np.repeat(np.arange(len(counts)), counts).tolist()
@@ -44,11 +46,11 @@ def read(item: MeshObject) -> Weights:
 
 
 def write(item: MeshObject, groups: Weights) -> None:
-    """Make these the weights of the named groups; other groups keep theirs.
+    """Replace the weights of the given vertex groups; other groups keep their weights.
 
     Args:
         item: mesh object, in object mode.
-        groups: {vertex group name: {vertex: weight}}; missing groups are made.
+        groups: {vertex group name: {vertex: weight}}; missing groups are created.
     """
     there = item.vertex_groups
     index_of = {n: (there.get(n) or there.new(name=n)).index for n in groups}
@@ -75,7 +77,7 @@ def edited_vertices(present: Weights, wanted: Weights) -> set[int]:
 
     Args:
         present: {group: {vertex: weight}} of the object.
-        wanted: weights of the file; only its groups are compared.
+        wanted: {group: {vertex: weight}} of the file; only its groups are compared.
     """
     edited = set()
     for name, values in wanted.items():

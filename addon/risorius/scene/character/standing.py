@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Controls that are not at rest and that nothing moves: an animation leaves them unchanged."""
+"""Finds controls that are not at rest and that no animation moves, to warn after an import."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 from . import board, runtime
 
-_SEEN = 1e-3  # a value that is off by less is not worth a word
-_NAMED = 12  # controls that a sentence names
+_SEEN = 1e-3  # smaller differences from rest are ignored
+_NAMED = 12  # number of controls that the sentence names
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Controls that are not at rest and that nothing moves.
+    """Controls that are not at rest and that no action or driver moves.
 
     Attributes:
         sliders: values by name.
-        handles: bones of the face board that are not at rest.
+        handles: bones of the handles of a leading face board.
     """
 
     sliders: dict[str, float]
@@ -29,7 +29,7 @@ class Standing:
 
     @property
     def sentence(self) -> Sentence | None:
-        """The sentence for the user, or None."""
+        """The sentence for the user; None if there are no such controls."""
         values = {**self.sliders, **dict.fromkeys(self.handles)}
         if not values:
             return None
@@ -72,11 +72,11 @@ def beside(rig: ArmatureObject) -> Standing:
 
 
 def bring_to_rest(rig: ArmatureObject, found: Standing) -> None:
-    """Set these controls to rest.
+    """Set controls to rest.
 
     Args:
         rig: the character.
-        found: from `beside`.
+        found: the controls, from `beside`.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     face = controls.pose.bones[parts.FACE]

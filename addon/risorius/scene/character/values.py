@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The arrays of channels and animated maps that drivers of a character read."""
+"""Writes the arrays of channels and animated maps that drivers of a character read."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def write(
     channels: NDArray[np.float32],
     simulated: Callable[[bpy.types.Object], bool],
 ) -> None:
-    """Write the arrays of a face.
+    """Write the values of channels and animated maps to a face.
 
     Args:
-        rig: deforming armature; Blender is not notified.
-        maps: float32[M], of the animated maps.
-        channels: float32[C].
-        simulated: returns whether an edit of a mesh resets a simulation.
+        rig: deforming armature; Blender is not notified of its change.
+        maps: float32[M], values of the animated maps.
+        channels: float32[C], values of the blend shape channels.
+        simulated: function that returns whether an edit of a mesh object resets a simulation.
     """
     _fill(rig, parts.CHANNELS, channels)
     _fill(rig, parts.MAPS, maps)
@@ -42,7 +42,10 @@ def write(
 def _fill_unheard(
     rig: ArmatureObject, carrier: bpy.types.Object, maps: NDArray[np.float32]
 ) -> None:
-    """Write maps to the evaluated copies of their carrier, and make materials read them again."""
+    """Write maps to the evaluated copies of the carrier, and let Blender update the materials.
+
+    This does not tag the carrier, which would reset its simulation.
+    """
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     for graph in (layer.depsgraph for layer in layers):
         seen = carrier.evaluated_get(graph) if graph is not None else carrier
@@ -62,20 +65,20 @@ def _fill(owner: bpy.types.Object, name: str, values: NDArray[np.float32]) -> bo
 
 
 def carry(rig: ArmatureObject, item: MeshObject) -> None:
-    """Let the materials of a character read animated maps from one of its meshes from now on.
+    """Make a mesh of a character the carrier of its animated maps, which materials read.
 
     Args:
         rig: deforming armature.
-        item: the mesh; Blender has to evaluate it before drivers are pointed at it.
+        item: the mesh; Blender must evaluate it before drivers are pointed at it.
     """
-    item.pop(parts.MAPS, None)  # an overridable array keeps its length
+    item.pop(parts.MAPS, None)  # the length of an overridable array cannot change
     item[parts.MAPS] = rig[parts.MAPS].to_list()
     item.property_overridable_library_set(f'["{parts.MAPS}"]', True)
     parts.point(rig, parts.VALUES, item)
 
 
 def carry_on_largest(rig: ArmatureObject) -> None:
-    """Let the largest mesh of a character carry its maps. Args: rig  deforming armature."""
+    """Make the mesh with most vertices the carrier of the maps. Args: rig  deforming armature."""
     items = [item for item in parts.meshes_of(rig) if item.library is None]
     if items and saved.length(rig, parts.MAPS):
         carry(rig, max(items, key=lambda item: len(item.data.vertices)))
@@ -86,7 +89,7 @@ def point_materials(rig: ArmatureObject, owner: bpy.types.Object) -> None:
 
     Args:
         rig: deforming armature.
-        owner: the deforming armature, or the mesh that carries its maps.
+        owner: the deforming armature, or the mesh that carries the maps.
     """
     for item in parts.meshes_of(rig):
         for slot in item.material_slots:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dragging the face itself: a point of the skin is pulled, and the sliders follow."""
+"""Drags the face in the viewport: the user pulls a point of the skin, and the sliders follow."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A few vertices that are offered to be dragged: where the controls reach most."""
+"""Chooses the drag handles of a face: the vertices that its controls move most."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from ..character import board, runtime
 from . import kept_points, sliders
 from .skin import Point, Skin
 
-COUNT = 18
-_SHARE = 0.1  # of the farthest that a slider moves a handle: what moves it less is not its own
+COUNT = 18  # handles of a face
+_SHARE = 0.1  # least motion of a handle by a slider, divided by the motion of its strongest slider
 _placed: WeakKeyDictionary[native.Surface, list[Point]] = session.keep(
     "handles.placed", WeakKeyDictionary, ("unregister",)
 )
 
 
 def of(surface: native.Surface) -> list[Point]:
-    """The handles of a face: mesh and vertex of each, computed at the first call.
+    """The (mesh, vertex) of each handle of a face; computed at the first call.
 
     Args:
-        surface: surface of the visible level of detail; its largest mesh is the skin.
+        surface: surface of the visible level of detail; its largest mesh gets the handles.
     """
     if surface not in _placed:
         shown = surface.mesh_indices
@@ -48,15 +48,15 @@ def offered(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 
 
 def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
-    """Handles that are selected and not hidden. Args: rig, surface  as for `offered`."""
+    """The handles that are selected and not hidden. Args: rig, surface  see `offered`."""
     chosen = kept_points.of(rig, kept_points.SELECTED, surface.vertex_counts)
     return [point for point in offered(rig, surface) if point in chosen]
 
 
 def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
-    """The sliders that move a selected handle noticeably.
+    """The sliders that move a selected handle at least _SHARE as far as its strongest slider.
 
-    Sliders led by drivers or layers are left out.
+    Sliders that drivers or layers lead are left out.
 
     Args:
         context: has the visible scene.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transformations from the space of the solver to the world.
+"""Transforms vertices of the drag solver (file space) to world space.
 
-They include the rotations of neck and head bones, the user's edits of joints that the evaluator
-does not write, the place of the rig, and axes and unit of the file.
+The transforms include the rotations of neck and head bones, edits of joints that the evaluator does
+not write, the rig's object transform, and axes and unit of the file.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ..skinning import conditions, direct
 
 Float = NDArray[np.float64]
 
-_STRAIGHT = np.eye(4)
+_STRAIGHT = np.eye(4)  # no motion
 _LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
 
 
 class HeadTurns:
-    """Rotations of the head beside the face's own controls, at one moment.
+    """Head and joint motions that the raw controls do not contain, at one moment.
 
-    Holds Blender objects: it exists within one operator only.
+    It holds Blender objects, so it must not outlive the operator that creates it.
     """
 
     def __init__(
@@ -37,13 +37,13 @@ class HeadTurns:
         turns: Mapping[str, Quaternion],
         depsgraph: Depsgraph,
     ) -> None:
-        """Look at a face.
+        """Read the joints of a face.
 
         Args:
-            rig: the deforming armature, the original.
-            live: its Runtime.
-            turns: "neck" and "head" -> Quaternion in the armature's axes, as read_inputs gives.
-            depsgraph: where the rig was evaluated.
+            rig: the original (not evaluated) deforming armature.
+            live: Runtime of the character.
+            turns: "neck" and "head" -> Quaternion in the armature's axes, from read_inputs.
+            depsgraph: graph in which the rig was evaluated.
         """
         seen = rig.evaluated_get(depsgraph)
         self._live, self._bones, self._rests = live, seen.pose.bones, rig.data.bones
@@ -65,11 +65,11 @@ class HeadTurns:
         self._known: dict[int, Float] = {}
 
     def at(self, mesh: int, vertices: NDArray[np.int64]) -> Float:
-        """The affine maps from the file's space to the world: float64[V, 4, 4].
+        """float64[V, 4, 4]: affine transforms of vertices from file space to world space.
 
         Args:
-            mesh: its index in the DNA.
-            vertices: int64[V] of it.
+            mesh: index of the mesh in the DNA file.
+            vertices: int64[V], indices of vertices of the mesh.
         """
         data, space = self._live.dna.meshes[mesh], self._live.space
         offsets = np.asarray(data.skin_offsets)
@@ -84,11 +84,11 @@ class HeadTurns:
         return self._place @ maps @ _file_matrix(space.axes, space.scale)
 
     def positions(self, mesh: int, points: NDArray[np.float32]) -> Float:
-        """All vertices of a mesh where the scene has them: float64[V, 3] in the world.
+        """float64[V, 3]: all vertices of a mesh in world space.
 
         Args:
-            mesh: its index in the DNA.
-            points: float32[V, 3] of the face's own space.
+            mesh: index of the mesh in the DNA file.
+            points: float32[V, 3], vertices of the evaluated face in file space.
         """
         data, space = self._live.dna.meshes[mesh], self._live.space
         count = len(points)
@@ -109,9 +109,9 @@ class HeadTurns:
         return (result @ self._place.T)[:, :3]
 
     def of_joint(self, joint: int) -> Float:
-        """The motion of a joint on top of its evaluated pose: float64[4, 4].
+        """float64[4, 4]: motion of a joint on top of its evaluated pose, in the armature's axes.
 
-        In axes of the armature. Children of the joint follow.
+        It includes the motions of the joint's parents.
         """
         if joint not in self._known:
             parent = int(self._live.dna.joint_parents[joint])
@@ -139,7 +139,7 @@ class HeadTurns:
         name = self._names.get(joint)
         if name is None:
             return Matrix()
-        if self._posed is not None:  # natively, in Direct mode
+        if self._posed is not None:  # in Direct mode the native bones have the pose
             return Matrix([*self._posed[self._places[name]].tolist(), _LAST])
         return self._bones[name].matrix @ self._rests[name].matrix_local.inverted_safe()
 

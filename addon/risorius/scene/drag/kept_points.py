@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stored points of a face on its control armature: pins, and selected and hidden handles.
+"""Stores points of a face on its control armature: pins, and selected and hidden handles.
 
-Pins stay while other points are dragged. Handles can be selected together or hidden.
+A pinned point keeps its position while other points are dragged.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from ..base import parts, saved
 from ..base.blender_types import ArmatureObject
 
-Point = tuple[int, int]  # a mesh of the DNA, one of its vertices
+Point = tuple[int, int]  # index of a mesh in the DNA file, index of its vertex
 
 PINS, SELECTED, HIDDEN = parts.PINS, parts.HANDLES_SELECTED, parts.HANDLES_HIDDEN
 
@@ -22,7 +22,7 @@ def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        counts: number of vertices of each mesh of its DNA; points beyond belong to another file.
+        counts: number of vertices of each mesh of the DNA; points beyond them are left out.
     """
     controls = parts.controls_of(rig)
     numbers = saved.wholes(controls, kind) if controls is not None else []
@@ -31,16 +31,16 @@ def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
 
 
 def put(rig: ArmatureObject, kind: str, points: Iterable[Point]) -> None:
-    """Give a face these points of a kind and no others.
+    """Replace the stored points of a kind.
 
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        points: from now on.
+        points: the new points.
     """
     controls, flat = parts.controls_there(rig), [number for point in points for number in point]
     if kind in controls:
-        del controls[kind]  # Blender keeps the length of an array that is there
+        del controls[kind]  # the length of an existing array cannot change
     if flat:
         controls[kind] = flat
         controls.property_overridable_library_set(f'["{kind}"]', True)
@@ -52,11 +52,11 @@ def toggle(rig: ArmatureObject, kind: str, point: Point, counts: list[int]) -> b
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        point: point of the character.
+        point: the point to add or remove.
         counts: see `of`.
 
     Returns:
-        Whether it is stored now.
+        True if the point was added, False if it was removed.
     """
     points = of(rig, kind, counts)
     if point in points:

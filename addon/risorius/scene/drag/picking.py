@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face and vertex under a ray through the scene."""
+"""Finds the face and the vertex under a ray through the scene."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from . import handles
 from .head_turns import HeadTurns
 from .skin import Point, Skin
 
-_FAR = 0.05  # of the face's size: a hit farther from all vertices is another's skin
-NEAR = 0.06  # of the face's size: a handle farther from what is under the cursor is hidden by it
-_THROUGH = 16  # objects that are drawn as wires or bounds, and looked through
+_FAR = 0.05  # of the face's size: a hit farther from all vertices does not count as this face
+NEAR = 0.06  # of the face's size: a handle farther from the hit surface counts as occluded
+_THROUGH = 16  # largest number of wire or bounds objects that a ray passes
 
 
 @dataclass
@@ -32,9 +32,9 @@ class Hit:
 
     Attributes:
         rig: the character.
-        point: mesh and vertex of its DNA.
-        place: float64[3] of that vertex in the world.
-        is_handle: whether it is a visible handle.
+        point: index of the mesh in the DNA, index of the vertex.
+        place: float64[3], position of the vertex in world space.
+        is_handle: whether the vertex is a visible handle.
     """
 
     rig: ArmatureObject
@@ -47,11 +47,11 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
     """The vertex of the first face on a ray, or None if another object comes first.
 
     Args:
-        context: its scene as the viewport evaluated it.
-        origin, direction: of the ray, in the world; the direction of length 1.
+        context: its evaluated scene is searched.
+        origin, direction: of the ray, in world space; the direction has length 1.
 
     Raises:
-        FaceError: the face is linked, or has lost its DNA.
+        FaceError: the face is linked, or has lost its controls or its DNA.
     """
     met = _first(context, origin, direction)
     if met is None:
@@ -59,7 +59,7 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
     item, place, index, matrix = met
     rig = parts.rig_of(item) if parts.MESH in item else None
     if rig is None or np.abs(np.array(matrix) - np.array(item.matrix_world)).max() > 1e-4:
-        return None  # no face, or an instance of one
+        return None  # no face, or an instance of a face
     if rig.library is not None:
         name = rig.name.removesuffix("_rig")
         raise FaceError(told("{name} is linked: make a library override of it first.", name=name))
@@ -72,8 +72,8 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
 def _first(
     context: Context, origin: Vector, direction: Vector
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
-    """The first object on a ray that is drawn as a solid: object, location, polygon, object
-    matrix."""
+    """The first object on a ray that is not drawn as wire or bounds: (original object, location,
+    polygon, object matrix)."""
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
         met, place, _normal, index, item, matrix = context.scene.ray_cast(
@@ -96,7 +96,7 @@ def _nearest(
     place: NDArray[np.float64],
     index: int,
 ) -> Hit | None:
-    """The vertex of a face's mesh nearest to the hit of a ray."""
+    """The vertex of a face's mesh nearest to the hit of a ray; None if it is too far away."""
     mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
     if mesh not in skin.surface.mesh_indices:
         return None
@@ -115,7 +115,8 @@ def _nearest(
 def computed(
     context: Context, rig: ArmatureObject, live: runtime.Runtime, skin: Skin, mesh: int
 ) -> NDArray[np.float64]:
-    """Vertices of a mesh below all other modifiers: float64[V, 3] in the world.
+    """float64[V, 3]: vertices of a mesh in world space, after the armature and without the other
+    modifiers.
 
     Args:
         context: has the visible scene.
@@ -133,12 +134,12 @@ def computed(
 def places(
     context: Context, rig: ArmatureObject, live: runtime.Runtime, points: list[Point]
 ) -> list[NDArray[np.float64]]:
-    """Visible places of points of a face: float64[3] each, in the world.
+    """float64[3] for each point: its visible position in world space.
 
     Args:
         context: has the visible scene.
         rig, live: the character and its Runtime.
-        points: mesh and vertex of each; points of another level of detail are left out.
+        points: (mesh, vertex) pairs; points of another level of detail are left out.
     """
     if not points:
         return []
@@ -155,10 +156,10 @@ def places(
 def handles_of(
     context: Context, rig: ArmatureObject, live: runtime.Runtime
 ) -> list[tuple[Point, NDArray[np.float64]]]:
-    """The handles of a face that are offered: each point with its place in the world.
+    """(point, position in world space) of each handle of a face that is not hidden.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         rig, live: the character and its Runtime.
     """
     points = handles.offered(rig, Skin.of(context, rig, live).surface)
@@ -167,7 +168,11 @@ def handles_of(
 
 
 def size_of(rig: ArmatureObject, live: runtime.Runtime) -> float:
-    """How large a face is in the world. Args: rig, live  the character and its Runtime."""
+    """The largest extent of the first mesh at rest, in world space.
+
+    Args:
+        rig, live: the character and its Runtime.
+    """
     first = np.asarray(live.dna.meshes[0].positions) if live.dna.meshes else np.zeros((1, 3))
     across = float(np.ptp(first, axis=0).max()) * live.space.scale
     return across * float(np.abs(np.array(rig.matrix_world)[:3, :3]).max())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin of a face as it is seen: its vertices in the world, and which one is under a place."""
+"""Reads the visible meshes of a face: vertices in world space, and mirrored vertices."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ from ..character import runtime
 from ..lod import lods
 
 Float = NDArray[np.float64]
-Point = tuple[int, int]  # a mesh of the DNA, one of its vertices
+Point = tuple[int, int]  # index of a mesh in the DNA file, index of its vertex
 
-_BESIDE = 0.02  # of the face's size: how far off the middle a mirrored vertex may be
+_BESIDE = 0.02  # of the face's size: largest distance of a vertex from the mirrored position
 
 
 @dataclass
 class Skin:
-    """A face's meshes in the scene. It holds Blender objects, so it exists within one operator
-    only.
+    """A face's meshes in the scene.
+
+    It holds Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
-        surface: the face in its own space, at the visible level of detail.
+        surface: the face in file space, at the visible level of detail.
         items: mesh index -> mesh object.
-        size: of the face, in Blender units.
+        size: largest extent of the face at rest, in Blender units.
         depsgraph: dependency graph of the view.
-        pressed: float64[3], visible place of the dragged vertex at the press, or None.
+        live: Runtime of the character.
+        pressed: float64[3], world position of the dragged vertex at the mouse press, or None.
     """
 
     surface: native.Surface
@@ -46,9 +48,9 @@ class Skin:
         """The skin of a character.
 
         Args:
-            context: has the scene that is seen.
+            context: has the visible scene.
             rig: the character.
-            live: its Runtime.
+            live: Runtime of the character.
         """
         last = last_written.inputs.get(rig.session_uid)
         level = lods.expected(rig, False, last[1] if isinstance(last, tuple) else None)
@@ -61,15 +63,15 @@ class Skin:
         return cls(surface, items, size or 1.0, context.evaluated_depsgraph_get(), live)
 
     def show(self, context: Context) -> None:
-        """Bring the face up to its sliders. Args: context  its view layer is evaluated."""
-        context.view_layer.update()  # the handler of updates writes the bones
+        """Evaluate the face with changed sliders. Args: context  its view layer is evaluated."""
+        context.view_layer.update()  # its handler writes the bones, which need a second update
         context.view_layer.update()
         self.depsgraph = context.evaluated_depsgraph_get()
 
     def seen(self, mesh: int) -> Float | None:
-        """Visible vertices of a mesh: float64[V, 3] in the world.
+        """float64[V, 3]: evaluated vertices of a mesh in world space.
 
-        None if it is hidden, or a modifier after the armature changes its vertices.
+        None if the mesh is hidden or in edit mode, or a modifier changes its vertex count.
 
         Args:
             mesh: index of the mesh in the DNA file.
@@ -82,18 +84,18 @@ class Skin:
         return flat.reshape(-1, 3).astype(np.float64) @ place[:3, :3].T + place[:3, 3]
 
     def seen_at(self, point: Point) -> Float | None:
-        """One vertex as `seen` gives it: float64[3] or None. Args: point  mesh and vertex."""
+        """float64[3]: one vertex of the result of `seen`, or None. Args: point  mesh and vertex."""
         data, place = self._evaluated(point[0])
         if data is None:
             return None
         return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
 
     def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
-        """The vertices of a polygon with their places in the world; None as in `seen`.
+        """(vertex, position in world space) of a polygon's vertices; None as in `seen`.
 
         Args:
             mesh: index of the mesh in the DNA file.
-            polygon: index in the evaluated mesh.
+            polygon: index of the polygon in the evaluated mesh.
         """
         data, place = self._evaluated(mesh)
         if data is None or not 0 <= polygon < len(data.polygons):
@@ -114,10 +116,10 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The mirrored vertex of a vertex on the face at rest; None if there is none.
+        """The vertex nearest to the mirrored position at rest; None if none is near.
 
         Args:
-            point: mesh and vertex; a vertex of the middle mirrors itself.
+            point: mesh and vertex; a vertex on the middle line is its own mirror.
         """
         at = self._rest(point[0])[point[1]] * (-1.0, 1.0, 1.0)
         best: tuple[float, Point] | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sliders of a face as unknowns of the solver: their effect on the visible face."""
+"""Converts between sliders and the raw controls of the drag solver, including layers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ..frame import inputs
 
 Float = NDArray[np.float64]
 
-_TRIED = 1.0 / 64  # of a slider, to see what layers above it let through
-_LEAST = 1e-3  # of a slider's change that must come through
+_TRIED = 1.0 / 64  # test change of a slider, to measure the gain through its layers
+_LEAST = 1e-3  # smallest gain of a slider that can be dragged
 
 
 @dataclass
@@ -27,13 +27,13 @@ class Sliders:
 
     Attributes:
         before: property name -> value to restore.
-        start: float64[R] the sliders.
-        seen: float32[R] the raw controls of the face, with layers and eye bones.
-        gain: float64[R], visible share of a slider's change.
-        free: bool[R] sliders that can move.
-        low, high: float64[R] the limits of `seen`.
+        start: float64[R], values of the sliders or of the leading board.
+        seen: float32[R], the raw controls of the face, with layers and eye bones.
+        gain: float64[R], change of a raw control divided by the change of its slider.
+        free: bool[R], sliders that can move.
+        low, high: float64[R], the limits of `seen`.
         linked: (leader, follower) indices of linked sides.
-        places: bone -> place of each handle of a leading face board; empty without one.
+        places: bone -> location of each handle of a leading face board; empty if sliders lead.
     """
 
     before: dict[str, float]
@@ -47,7 +47,7 @@ class Sliders:
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def values(self, raw: NDArray[np.float32]) -> Float:
-        """The sliders that show these raw controls: float64[R]. Args: raw  float32[R]."""
+        """float64[R]: slider values that result in raw controls. Args: raw  float32[R]."""
         change = raw.astype(np.float64) - self.seen
         moved = self.free & (np.abs(change) > 1e-7)
         values = np.where(moved, self.start + change / self.gain, self.start)
@@ -58,12 +58,12 @@ class Sliders:
 
 
 def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sliders:
-    """Look at the sliders of a face.
+    """Read the sliders of a face and their effect on the raw controls.
 
     Args:
         rig: the deforming armature.
-        live: its Runtime.
-        depsgraph: where its controls were evaluated.
+        live: Runtime of the character.
+        depsgraph: graph in which the controls were evaluated.
     """
     controls = parts.controls_there(rig)
     bone, seen = controls.pose.bones[parts.FACE], controls.evaluated_get(depsgraph)
@@ -94,13 +94,13 @@ def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sl
 def write(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """Set the sliders so that the face shows given raw controls.
+    """Set the sliders, or a leading board, so that the face shows given raw controls.
 
     Args:
         rig: the character.
-        live: its Runtime.
+        live: Runtime of the character.
         sliders: sliders at the start of the drag.
-        raw: float32[R].
+        raw: float32[R], wanted raw controls.
 
     Returns:
         The names of sliders that differ from the start.
@@ -128,7 +128,7 @@ def write(
 def _write_board(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """`write` for a leading face board: it moves as near as possible, from its start."""
+    """`write` for a leading face board: its handles move from their start to the nearest pose."""
     board.put_places(parts.controls_there(rig), live, sliders.places)
     values = sliders.values(raw)
     moved = {
@@ -141,7 +141,7 @@ def _write_board(
 
 
 def restore(rig: ArmatureObject, sliders: Sliders) -> None:
-    """Restore all sliders.
+    """Restore all sliders and handles.
 
     Args:
         rig: the character.
@@ -152,14 +152,14 @@ def restore(rig: ArmatureObject, sliders: Sliders) -> None:
 
 
 def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
-    """int64[R]: the mirrored partner of each control, or itself."""
+    """int64[R]: index of each control's partner on the other side, or its own index."""
     where = {label: i for i, label in enumerate(live.labels)}
     partner = native.regions().mirrored
     return np.array([where.get(partner(n), i) for n, i in where.items()], np.int64)
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: the controls of a region. Args: live  the Runtime; region  its name."""
+    """bool[R]: whether a control is in a region. Args: live  the Runtime; region  its name."""
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 
@@ -171,9 +171,10 @@ def _gains(
     maximum: float,
     start: Float,
 ) -> Float:
-    """The share of a small change of each slider that passes the layers: 1 without layers.
+    """float64[R]: change of the raw control divided by a small change of the slider; 1 without
+    layers.
 
-    Each slider is tried alone, because the layers let only one of two opposites pass, such as
+    Each slider is changed alone, because layers can suppress one of two opposite controls, such as
     looking left and right.
     """
     gain = np.ones(len(start))

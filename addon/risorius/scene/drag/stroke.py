@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One drag of a face, from the press to the release: targets in the scene to sliders.
+"""Runs one drag of a face from mouse press to release: solves sliders for a target position.
 
-Each target is solved from the pose at the press, so the result depends on the place of the pointer
-and not on its path.
+Each target is solved from the pose at the press, so the result depends on the position of the
+pointer and not on its path.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from .skin import Point, Skin
 
 Float = NDArray[np.float64]
 
-_STILL = 1e-6  # of the face's size that a control must move a point by
-_SMALL = 0.02  # of the largest change: what is smaller is not worth a key
+_STILL = 1e-6  # of the face's size: smaller motions of a point by a control are ignored
+_SMALL = 0.02  # of the largest change of a control: smaller changes are not keyed
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class Options:
 
     Attributes:
         symmetric: move the mirrored point too.
-        method: "near": few sliders that belong to the place; "least_squares": all sliders; or
-            "transpose".
+        method: "near": few sliders that mainly move the dragged area; "least_squares": all sliders;
+            or "transpose", see solve_drag.
         single: move only the best control; with `symmetric` its partner too.
-        choice: 0: the best control, 1: the next.
-        region: only controls of the region of the point.
-        others: points that move with the dragged one.
+        choice: with `single`: 0: the best control, 1: the second best, and so on.
+        region: use only controls of the region of the point.
+        others: points that move together with the dragged point.
     """
 
     symmetric: bool = False
@@ -60,11 +60,11 @@ class _Anchors:
     """The points of a drag at the press.
 
     Attributes:
-        points: the dragged point, points that move with it, their mirrors, then pins.
-        mirrored: for each pulled point, whether it is a mirror; pins are left out.
-        rest: float64[P, 3] in the file's space.
-        world: float64[P, 3] in the scene.
-        maps: float64[P, 3, 3] from directions of the file to directions of the world.
+        points: the dragged point, points that move with it, their mirrored points, then pins.
+        mirrored: for each point except pins: whether it is a mirrored point.
+        rest: float64[P, 3], positions at the press in file space.
+        world: float64[P, 3], positions at the press in world space.
+        maps: float64[P, 3, 3], transforms of directions from file space to world space.
     """
 
     points: list[Point]
@@ -78,13 +78,17 @@ class _Anchors:
 class Stroke:
     """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    It holds Blender objects, so it exists within one operator only.
+    It holds Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         rig, live: the character and its Runtime.
         point: dragged (mesh, vertex).
         options: options; they may change during the drag.
-        raw: float32[R], raw controls of the face now.
+        skin: the meshes in the scene.
+        state: sliders at the press.
+        turns: transforms from file space to world space.
+        reach: float32[3, R], motion of the point per control, in file units.
+        raw: float32[R], current raw controls of the face.
         best: single controls for this drag, best first: (index, value, remaining distance).
     """
 
@@ -95,17 +99,17 @@ class Stroke:
     skin: Skin
     state: sliders.Sliders
     turns: HeadTurns
-    reach: NDArray[np.float32]  # [3, R] what each control does to the point, file units
+    reach: NDArray[np.float32]
     raw: NDArray[np.float32]
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
-    _was: NDArray[np.float32] | None = None  # [V, 3] of the dragged mesh at the press, file space
+    _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at the press in file space
     _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
-    _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen less predicted, world
+    _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen minus predicted, world space
 
     @property
     def start(self) -> Float:
-        """float64[3]: where the point was at the press, in the world."""
+        """float64[3]: position of the point at the press, in world space."""
         return self._of().world[0]
 
     @property
@@ -115,15 +119,15 @@ class Stroke:
         return native.regions().of_slider(self.live.labels[strongest])
 
     def to(self, context: Context, target: Float, view: Float | None = None) -> Float:
-        """Drag the point to a place and show the face.
+        """Drag the point to a target and show the face.
 
         Args:
             context: its view layer is evaluated.
-            target: float64[3] in the world.
-            view: float64[3] a direction along which the place of the point is free; None for none.
+            target: float64[3], wanted position in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
 
         Returns:
-            float64[3]: where the point is then.
+            float64[3]: the reached position in world space.
         """
         self.raw, predicted = self._solve(target - self._apart, view, self._free(target, view))
         sliders.write(self.rig, self.live, self.state, self.raw)
@@ -144,7 +148,7 @@ class Stroke:
         self.to(context, target, view)
         change = np.abs(self.raw - self.state.seen)
         held = self._free(target, view) & (change >= _SMALL * change.max(initial=0.0))
-        for _ in range(4):  # again where bones of the head move with the controls
+        for _ in range(4):  # repeat, because bones of the head may move with the controls
             self.raw, predicted = self._solve(target - self._apart, view, held)
             sliders.write(self.rig, self.live, self.state, self.raw)
             at = self._seen(context)
@@ -163,19 +167,23 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the face at the press. Args: context with the visible view layer."""
+        """Restore the sliders of the press. Args: context  with the visible view layer."""
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)
 
     def moved(self, count: int = 3) -> list[tuple[str, float]]:
-        """The controls that changed most, with their change. Args: count  how many at most."""
+        """(name, change) of the controls that changed most. Args: count  largest number of them."""
         change = (self.raw - self.state.seen).astype(np.float64)
         order = np.argsort(-np.abs(change), kind="stable")[:count]
         return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]
 
     def heat(self) -> tuple[Float, Float]:
-        """The dragged mesh: float64[V, 3] vertices in the world, float64[V] how far each moved."""
+        """Data for a heat map of the dragged mesh.
+
+        Returns: float64[V, 3] vertices in world space, float64[V] their motion since the press in
+        Blender units.
+        """
         mesh = self.point[0]
         if self._was is None:
             self._was = self.skin.surface.positions(self.state.seen, mesh)
@@ -191,7 +199,8 @@ class Stroke:
         if self.options.region:
             free &= sliders.of_region(self.live, self.dragged_region)
         if self._is_symmetric:
-            # To one side goes no face that shall stay alike on both.
+            # A symmetric pose cannot use opposite controls that are partners, such as jaw left and
+            # right.
             pairs = [p for p in self._opposites if self._partners[p[0]] == p[1]]
             free[[control for pair in pairs for control in pair]] = False
         if not self.options.single:
@@ -214,7 +223,7 @@ class Stroke:
     def _solve(
         self, target: Float, view: Float | None, free: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], Float]:
-        """float32[R] and where the point should be seen with it."""
+        """Returns: float32[R] solved raw controls, and the predicted world position float64[3]."""
         anchors = self._of()
         goal, axes = self._goal(anchors, target, view)
         near = self.options.method == "near"
@@ -235,12 +244,12 @@ class Stroke:
         return native.module().ControlLimits(free, self.state.low, self.state.high)
 
     def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
-        """Targets float64[P, 3] and axes float64[P, 3, 3] of the file's space."""
+        """Targets float64[P, 3] and axes float64[P, 3, 3] of the solver, in file space."""
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
         along = np.eye(3)
         if view is not None:
-            # Along a screen two directions count; a third of no length leaves the depth free.
+            # Two axes lie in the screen plane; the third has length 0, so that the depth is free.
             rows = _across(view) @ anchors.maps[0]
             along[:2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
             along[2] = 0.0
@@ -265,7 +274,8 @@ class Stroke:
         return list(known.rules_of(index)[1])
 
     def _ease(self) -> Float:
-        """float64[R]: how readily the controls change where the points are that are dragged."""
+        """float64[R]: weights of the controls, larger for controls that move mainly the dragged
+        points, see local_ease."""
         surface, key = self.skin.surface, self.options.others
         if key not in self._eases:
             low, high = self.state.low, self.state.high
@@ -288,7 +298,7 @@ class Stroke:
         points = [self.point, *others]
         mirrored = [False] * len(points)
         for point in (self.point, *others) if symmetric else ():
-            other = self.skin.mirrored(point)  # one of the middle is its own, and stays there
+            other = self.skin.mirrored(point)  # itself for a point on the middle line
             if other is not None and (other == point or other not in points):
                 points.append(other)
                 mirrored.append(True)
@@ -305,7 +315,8 @@ class Stroke:
         return _Anchors(points, mirrored, rest.astype(np.float64), world, maps[:, :3, :3])
 
     def _seen(self, context: Context) -> Float:
-        """Where the point is after the face was evaluated."""
+        """Evaluate the face. Returns: the world position of the point. Raises FaceError if Blender
+        refuses to write to the override."""
         self.skin.show(context)
         if last_written.is_refused(self.rig):
             self.restore(context)
@@ -328,7 +339,7 @@ def begin(context: Context, rig: ArmatureObject, point: Point, options: Options)
     Args:
         context: has the visible scene.
         rig: the character.
-        point: (mesh, vertex) of its DNA.
+        point: (mesh, vertex) in the DNA.
         options: options of the drag.
 
     Raises:
@@ -365,7 +376,7 @@ _LED = told("What moves this point is led by drivers or layers: drag there has n
 
 
 def _usable(context: Context, rig: ArmatureObject) -> runtime.Runtime:
-    """The Runtime of a face that can be dragged now."""
+    """The Runtime of a face. Raises FaceError, with the reason, if it cannot be dragged now."""
     name = rig.name.removesuffix("_rig")
     if rig.library is not None:
         raise FaceError(told("{name} is linked: make a library override of it first.", name=name))
@@ -395,5 +406,5 @@ def _across(view: Float) -> Float:
 
 
 def _flip(live: runtime.Runtime) -> Float:
-    """float64[3, 3]: left for right, in the file's axes."""
+    """float64[3, 3]: the reflection that exchanges left and right, in the file's axes."""
     return live.space.axes.T @ np.diag([-1.0, 1.0, 1.0]) @ live.space.axes

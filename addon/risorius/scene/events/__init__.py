@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When characters are brought up to their controls: Blender's handlers."""
+"""Registers Blender's application handlers, which update characters."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When characters are brought up to their controls."""
+"""Handlers that update characters at frames, edits, load, undo, save and render."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids: of known objects; of known control armatures; of characters that were repaired at
-# the last update.
+# Session uids of known objects, of known control armatures, and of deforming armatures that were
+# repaired since the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))
@@ -75,8 +75,8 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether the changing frame belongs to a render; the interface changes frames of its own
-    beside it."""
+    """Whether the changing frame belongs to a render; during a render job, frames that the
+    interface changes in the main thread do not."""
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -85,13 +85,13 @@ def _is_rendered() -> bool:
 @persistent
 def _render_begins(*_arguments: object) -> None:
     conditions.look_quickly()
-    refresh(evaluate.Moment.ANEW)  # modes do not change while it runs
+    refresh(evaluate.Moment.ANEW)  # shape modes must not change during the render
     _work.rendering = True
 
 
 @persistent
 def _render_ended(*_arguments: object) -> None:
-    """The viewport shows its own level of detail again."""
+    """Update faces whose render differs from the viewport in level of detail, solo or mute."""
     _work.rendering = False
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
@@ -104,12 +104,12 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
+    """React to edits. The writes tag rigs but not controls, so that updates do not repeat."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
     board.note_edit()
-    # While a render runs beside the interface, only frames of the render are written.
+    # During a render job only the frames of the render may be written.
     if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
         return
     if evaluate.is_paused():
@@ -118,7 +118,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         known = _objects.now
         _notice_copies(depsgraph.updates)
-        # A change of a colour space is among the updates, one of pixels is not.
+        # Blender reports a change of an image's colour space as an update, a change of pixels not.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
@@ -134,7 +134,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
         with evaluate.together():
             for rig in edited:
                 if _mend(rig):
-                    continue  # the evaluated copy knows of it only after the next update
+                    continue  # the evaluated copy has the repair only after the next update
                 evaluate.evaluate(rig, depsgraph)
     finally:
         conditions.end_updates(depsgraph)
@@ -159,7 +159,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
-    come = bool(known)  # else all was there: a file was loaded, or an edit undone
+    come = bool(known)  # empty after load and undo, when no object counts as new
     if new or len(bpy.data.objects) != len(known):
         _objects.now = frozenset(item.session_uid for item in bpy.data.objects)
         runtime.forget_unused(parts.rigs())
@@ -182,7 +182,7 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Outlines of appended faces leave the scene; objects that the user links later stay."""
+    """Remove outlines of newly appended faces from the scene; later links by the user stay."""
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
@@ -208,7 +208,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        last_written.forget()  # the rest pose of the bones with it
+        last_written.forget()  # includes the cached rest pose of the bones
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -219,7 +219,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Look for keys that Blender's own operators gave to sliders, and for sliders that moved."""
+    """Let shown_keys and tweak_guard react to keys and moves by Blender's own operators."""
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None
@@ -266,7 +266,7 @@ def _loaded(*_arguments: object) -> None:
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             shown_keys.show_some(controls)
         last_written.forget()
-        look_masks.take_away()  # of a file that Blender saved by itself, before a crash
+        look_masks.take_away()  # a file from auto-save may contain the setting
         heat.end_all()
         refresh(evaluate.Moment.LOAD)
     _restored()
@@ -274,10 +274,10 @@ def _loaded(*_arguments: object) -> None:
 
 @persistent
 def _restored(*_arguments: object) -> None:
-    """After load, undo and redo: forget the last written values, which no longer apply.
+    """After load, undo and redo: forget the last written values, because they do not apply.
 
-    Nothing is read here: until the next update, pose bones of restored objects point to freed
-        bones, and reading them crashes Blender.
+    Pose bones must not be read here: until the next update, those of restored objects point to
+    freed bones, and Blender would crash.
     """
     session.end("undo")
     joint_readings.note_edit()
@@ -298,7 +298,7 @@ def _undone(*_arguments: object) -> None:
 
 @persistent
 def _before_restoring(*_arguments: object) -> None:
-    """Before load, undo and redo: release references to data that they free."""
+    """Before load, undo and redo: release references to data that Blender frees."""
     session.end("free")
 
 
@@ -307,7 +307,7 @@ def _before_save(*_arguments: object) -> None:
     if native.problem():
         return
     console.say(*duplicates.separate_all())
-    console.say(*migrations.bring_up_all())  # whose late caches are free now
+    console.say(*migrations.bring_up_all())  # retry migrations that waited for freed caches
     _end_tests()
     heat.take_away()
     if look_masks.take_away():
@@ -342,10 +342,10 @@ def _end_tests(*_arguments: object) -> None:
 
 
 def refresh(moment: evaluate.Moment = evaluate.Moment.UPDATE) -> None:
-    """Bring all characters up to their controls now, each in the scenes that it is in.
+    """Evaluate all characters now, in every scene and view layer.
 
     Args:
-        moment: Moment.
+        moment: the moment of this update, see evaluate.Moment.
     """
     if native.problem() or not parts.rigs():
         return
@@ -377,12 +377,12 @@ _HANDLERS = (
 
 
 def _there() -> list[tuple[str, Any]]:
-    """The handlers that this Blender calls."""
+    """The rows of _HANDLERS that this Blender version supports."""
     return [row for row in _HANDLERS if hasattr(bpy.app.handlers, row[0])]
 
 
 def register() -> None:
-    """Add the handlers, and update the characters of the open file."""
+    """Add the handlers to Blender's lists."""
     for name, handler in _there():
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
@@ -390,7 +390,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the handlers and drop all compiled data; faces are whole and without colours."""
+    """Remove the handlers, heat maps, and solo and mute settings; faces leave Direct mode."""
     heat.end_all()
     if look_masks.take_away():
         refresh()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animation and plain materials for other programs: glTF, FBX, USD, Alembic."""
+"""Exports animation and plain materials for other programs: glTF, FBX, USD, Alembic."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face's animation for other programs: a baked copy for Blender's exporters, or its controls.
+"""Prepares a face's animation for export: a baked copy for Blender's exporters, or a clip.
 
-The copy lives in a scene of its own for as long as an exporter needs it; the character itself, its
-scene and the frame that it shows are never touched.
+The copy is in a temporary scene while an exporter runs. The character, its scene and the current
+frame do not change.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class ShipOptions:
     """Options of an export.
 
     Attributes:
-        start, end, step: frames.
+        start, end, step: range and step in frames.
         lod: level of detail; -1: the level in the viewport.
-        wanted: some of "BONES", "SHAPES".
+        wanted: animation to export, from "BONES", "SHAPES".
         all_shapes: keep shape keys that the range does not use.
-        lod_groups: meshes of all levels that are built, from lod on, in groups that FBX knows.
+        lod_groups: also export the coarser built levels, in LOD groups of FBX.
     """
 
     start: float = 1
@@ -60,16 +60,17 @@ def sampled(
     Args:
         context: scene and view layer to sample.
         rigs: deforming armatures of the characters.
-        options: ShipOptions with the range of frames, its step and the level of detail.
+        options: range of frames, step and level of detail.
 
     Yields:
-        The finished share, 0 to 1.
+        The progress, 0 to 1.
 
     Returns:
-        (rig, level, Samples) of each.
+        (rig, level of detail, Samples) of each character.
 
     Raises:
-        BakeError: a character is baked, so its controls no longer give its animation.
+        BakeError: a character is baked, so that its controls do not give its animation, or the
+            level was not built.
         ValueError: the range has no frame.
     """
     for rig in rigs:
@@ -95,11 +96,11 @@ def copies(
     Args:
         context: with the window whose scene is replaced.
         characters: from `sampled`.
-        options: ShipOptions.
+        options: options of the export.
 
     Yields:
         The context override for an exporter, as a dict, and the Loans of names: the copies have the
-            names for the file, and the originals temporarily have other names.
+        names for the file, and the originals temporarily have other names.
     """
     window, user = context.window, context.scene
     before, loans = _everything(), Loans()
@@ -107,7 +108,7 @@ def copies(
     with evaluate.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
-            loans.take("scenes", stage, _name(characters[0][0]))  # a take's name, in some formats
+            loans.take("scenes", stage, _name(characters[0][0]))  # some formats name takes by it
             for rig, level, samples in characters:
                 _copy(stage, rig, level, samples, options, loans)
             layer = stage.view_layers[0]
@@ -148,7 +149,7 @@ def _copy(
     options: ShipOptions,
     loans: Loans,
 ) -> None:
-    """One character: armature, meshes of the level, and their actions."""
+    """Copy one character: armature, meshes of the exported levels, and their baked actions."""
     live = runtime.there(rig)
     pose = baked_tracks.evaluate(live, samples, level)
     copy = rig.copy()
@@ -180,7 +181,7 @@ def _copy(
 
 
 def _levels(rig: ArmatureObject, level: int, options: ShipOptions) -> list[int]:
-    """The level, and with groups the coarser ones that were built."""
+    """The exported levels: the given level, and with lod_groups the coarser built levels."""
     coarser = [other for other in lods.built(rig) if other > level] if options.lod_groups else []
     return [level, *sorted(coarser)]
 
@@ -188,10 +189,11 @@ def _levels(rig: ArmatureObject, level: int, options: ShipOptions) -> list[int]:
 def _lod_group(
     stage: bpy.types.Scene, rig_copy: ArmatureObject, base: str, loans: Loans
 ) -> bpy.types.Object:
-    """An empty that Blender writes as a LOD group of FBX; its meshes follow from fine to coarse."""
+    """An empty that Blender exports as a LOD group of FBX. Its children must be added from the
+    finest to the coarsest level."""
     group = bpy.data.objects.new(base, None)
     loans.take("objects", group, f"{base}_LODGroup")
-    group["fbx_type"] = "LodGroup"  # as Blender's FBX exporter asks for it
+    group["fbx_type"] = "LodGroup"  # Blender's FBX exporter reads this property
     group.parent = rig_copy
     stage.collection.objects.link(group)
     return group
@@ -230,7 +232,8 @@ def _shapes(
     weights: NDArray[np.float32],
     options: ShipOptions,
 ) -> None:
-    """Real keys with values that are animated, and no others of ours."""
+    """Give a copied mesh the real shape keys to export with their animation, and remove the others
+    of Risorius."""
     key = made.data.shape_keys
     if key is None:
         return
@@ -244,7 +247,7 @@ def _shapes(
     for channel in set(names) - wanted:
         made.shape_key_remove(key.key_blocks[names.pop(channel)])
     if len(key.key_blocks) < 2:
-        return  # a Key taken off a copied mesh would stay in the file for ever
+        return  # a lone basis needs no animation; removing it would leave the Key in the file
     others = samples.others.get(parts.keys_there(item))
     _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
 
@@ -264,14 +267,14 @@ def _show(item: bpy.types.Object) -> None:
 
 
 def _forget(item: bpy.types.Object) -> None:
-    """Remove the marks of a character from an object."""
+    """Remove the custom properties of Risorius from an object."""
     for name in list(item.keys()):
         if name.startswith(("risorius_", "dna_")) or name in (parts.MAPS, parts.CHANNELS):
             del item[name]
 
 
 def _everything() -> dict[str, set[bpy.types.ID]]:
-    """Every datablock of the file, by kind."""
+    """Collection in bpy.data -> its datablocks; shape keys are left out."""
     return {
         kind.identifier: set(getattr(bpy.data, kind.identifier))
         for kind in bpy.data.bl_rna.properties
@@ -280,7 +283,7 @@ def _everything() -> dict[str, set[bpy.types.ID]]:
 
 
 def _remove_all_but(before: Mapping[str, set[bpy.types.ID]]) -> None:
-    """Remove datablocks that were made since, also by a failed exporter."""
+    """Remove all datablocks that are not in `before`, also those of a failed exporter."""
     new = [
         item
         for kind, there in before.items()
@@ -299,18 +302,18 @@ def clip(
     origin: float,
     maps: bool = False,
 ) -> native.Clip:
-    """A clip of the raw controls of a range and of the rotations of neck and head.
+    """A clip with the raw controls and the rotations of neck and head in a range of frames.
 
     Args:
         rig: deforming armature.
         level: level of detail, for the maps.
-        samples: Samples of the character.
+        samples: inputs of the character from `sampled`.
         rate: frames per second of the scene.
-        origin: the scene's frame of second 0 of the clip.
-        maps: add the values of the animated maps, each by its name in the DNA.
+        origin: frame of the scene at second 0 of the clip.
+        maps: add the values of the animated maps, by their names in the DNA.
 
     Returns:
-        risorius.Clip, with names of the DNA file (Blender's name if the DNA file has a name twice).
+        A clip with names of the DNA file (Blender's name if a name occurs twice in the file).
     """
     live, names = runtime.there(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names lent to copies, so that an exported file has the user's own names."""
+"""Renames datablocks during an export, so that copies have the user's names in the file."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ...logic.base.sentences import told
 
 
 class Loans:
-    """The lent names; call `give_back` after removing the copies."""
+    """Renamed originals of an export; call `give_back` after removing the copies."""
 
     def __init__(self) -> None:
         self._lent: list[tuple[bpy.types.ID, str]] = []
         self._taken: set[tuple[str, str]] = set()
 
     def take(self, kind: str, copy: bpy.types.ID, name: str) -> None:
-        """Name a copy. An original with this name temporarily gets another one.
+        """Name a copy. An original with this name temporarily gets another name.
 
         Args:
-            kind: of datablocks, as in bpy.data.
-            copy: a new datablock.
-            name: its name in the file.
+            kind: name of the collection in bpy.data, such as "objects".
+            copy: the copy to name.
+            name: name of the copy in the exported file.
         """
         holder = next(
             (x for x in getattr(bpy.data, kind) if x.name == name and x.library is None), None
@@ -39,7 +39,7 @@ class Loans:
         self._taken.add((kind, name))
 
     def give_back(self) -> None:
-        """Everyone has the name again that it had; the copies must be gone."""
+        """Restore the names of the originals; the copies must be removed before."""
         while self._lent:
             holder, name = self._lent.pop()
             holder.name = name
@@ -47,10 +47,10 @@ class Loans:
 
 @contextmanager
 def images_as_files() -> Iterator[None]:
-    """Context manager: give all images of the file names that are valid file names.
+    """Context manager: temporarily rename images whose names are not valid file names.
 
-    Blender's USD exporter writes an image without a path under its name, even if this contains
-    `../`.
+    Blender's USD exporter uses the name of an image without a path as its file name, even if the
+    name contains `../`.
 
     Raises:
         FaceError: a linked image has such a name and cannot be renamed here.

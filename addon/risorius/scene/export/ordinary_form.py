@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces in the form of files while one of Blender's own exporters works.
+"""Switches faces out of Direct mode while one of Blender's own exporters works.
 
-Exporters read bones and shape keys as they are stored. In Direct mode bones rest and live keys
-have finished positions, so a file would show each face deformed twice, or not at all.
+Exporters read the stored bones and shape keys. In Direct mode bones rest and live keys have final
+positions, so that the exported face would be deformed twice or not at all.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from ..base.blender_types import Depsgraph, current_context
 from ..frame import evaluate
 from ..skinning import conditions
 
-_LOOK_AGAIN = 0.5  # seconds between two looks whether a dialog is still open
+_LOOK_AGAIN = 0.5  # seconds between two checks whether an export dialog is open
 
-DIALOG, GLTF = "dialog", "gltf"  # who asks for the form of files
-# Reader -> names of its held deforming armatures.
+DIALOG, GLTF = "dialog", "gltf"  # readers: an export dialog, the glTF exporter
+# Reader -> names of the deforming armatures that it holds out of Direct mode.
 _held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
 _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
 
 
 def begin(reader: str) -> None:
-    """Give all faces the form of files until `end` is called.
+    """Keep all faces out of Direct mode until `end` is called.
 
     Args:
-        reader: DIALOG or GLTF; a second call of a reader has no effect.
+        reader: DIALOG or GLTF; a second call for the same reader has no effect.
     """
     if reader in _held:
         return
@@ -43,7 +43,7 @@ def begin(reader: str) -> None:
 
 
 def end(reader: str) -> None:
-    """Let the faces be in Direct mode again. Args: reader  as for `begin`."""
+    """Allow Direct mode again. Args: reader  see `begin`."""
     names = _held.pop(reader, None)
     if names is None:
         return
@@ -62,14 +62,14 @@ def _bring_up() -> None:
 
 
 def register() -> None:
-    """Watch for dialogs of exporters from now on."""
+    """Begin to watch for export dialogs."""
     if _drawing.now is None:
         space = bpy.types.SpaceFileBrowser
         _drawing.now = space.draw_handler_add(_drawn, (), "WINDOW", "POST_PIXEL")
 
 
 def unregister() -> None:
-    """Watch no longer."""
+    """Stop watching for export dialogs."""
     if _drawing.now is not None:
         bpy.types.SpaceFileBrowser.draw_handler_remove(_drawing.now, "WINDOW")
         _drawing.now = None
@@ -80,8 +80,8 @@ def unregister() -> None:
 
 
 def _drawn() -> None:
-    """Called when a file browser is drawn. Drawing code must not edit data, so a timer does the
-    work."""
+    """Called when a file browser is drawn. A timer does the work, because drawing code must not
+    edit data."""
     space = cast("bpy.types.Space | None", current_context().space_data)
     if _exports(space) and not bpy.app.timers.is_registered(_watch):
         bpy.app.timers.register(_watch, first_interval=0.0)

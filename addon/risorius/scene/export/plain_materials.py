@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials that every exporter understands: one plain shader with one image for each input.
+"""Converts materials for exporters: one Principled shader with at most one image at each input.
 
-Exporters expect a single image at each input of a Principled shader. Cycles bakes node trees into
-such images on the CPU. An image that reaches an input unchanged stays that image. Relief from nodes
-is left out, because it is finer than the images. All of this happens on the temporary copies of an
-export.
+Cycles bakes the node trees of inputs into images on the CPU. An image that reaches an input
+unchanged is reused. Relief from nodes is left out, because it is finer than the images. Only the
+temporary copies of an export are converted.
 """
 
 from __future__ import annotations
@@ -30,13 +29,13 @@ from . import shader_inputs
 from .lent_names import Loans
 
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
-_MASKS = ("alpha", "roughness")  # baked together
+_MASKS = ("alpha", "roughness")  # baked into one image, as red and green
 _SOCKETS = {"color": "Base Color", "roughness": "Roughness", "normal": "Normal"}
-# Numbers that glTF and USD support too; textures on these inputs are left out.
+# Inputs whose numbers are copied, because glTF and USD support them; their textures are left out.
 _NUMBERS = ("Metallic", "Specular IOR Level", "IOR", "Coat Weight", "Coat Roughness", "Coat IOR")
-_FILM = 0.05  # opacity of a wet film: it must show the iris; most programs fade its shine with it
-_LAYER = "risorius_flat"
-_WET = 0.08  # roughness of such a film
+_FILM = 0.05  # opacity of a wet film: low to show the iris, not 0 because its highlight fades too
+_LAYER = "risorius_flat"  # name of the UV layer and of the image node of a bake
+_WET = 0.08  # roughness of a wet film
 
 
 @dataclass
@@ -45,15 +44,16 @@ class _Flat:
 
     Attributes:
         material: the user's material.
-        name: its name before lending.
-        work: a copy for baking; None if it has no nodes.
+        name: name of the user's material before the export.
+        work: a copy for baking; None if the material has no nodes.
         users: (mesh object, slot number) with this material.
-        shader: the shader node of the copy; None for a film.
-        clear: True: transparent in places.
-        sources: input -> shader_inputs.Source.
+        shader: the shader node of the copy; None for a transparent film.
+        clear: True: the material is transparent in places.
+        sources: input "color", "alpha" or "roughness" -> shader_inputs.Source.
         images: input -> reused or baked image, including "normal".
         baked: inputs to bake.
-        mean: True: roughness becomes one number, because polygons overlap in the UV map.
+        mean: True: roughness becomes one number, because polygons overlap in the UV map; later this
+            number.
     """
 
     material: bpy.types.Material
@@ -69,15 +69,15 @@ class _Flat:
 
 
 def flatten(override: Override, loans: Loans, size: int) -> Generator[float, None, None]:
-    """Replace the materials of copied meshes; a generator.
+    """Replace the materials of copied meshes by plain ones; a generator.
 
     Args:
         override: context override of the export, from export_animation.copies.
         loans: lent_names.Loans for the names of the materials.
-        size: pixels of a side of baked images.
+        size: width and height of baked images in pixels.
 
     Yields:
-        The finished share, 0 to 1.
+        The progress, 0 to 1.
 
     Raises:
         FaceError: Cycles is missing, or a mesh has no room for a UV map.
@@ -102,13 +102,13 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
 
 
 def _join_slots(item: MeshObject) -> None:
-    """Faces that look the same get one material: an eye has two for the solid view."""
+    """Merge neighbouring slots with equal node trees: an eye has two that differ in solid view."""
     slots = item.data.materials
     for number in range(len(slots) - 1, 0, -1):
         one, other = slots[number - 1], slots[number]
         trees = [m.node_tree for m in (one, other) if m is not None and m.node_tree is not None]
         if len(trees) == 2 and shader_inputs.alike(*trees):
-            slots.pop(index=number)  # its faces go to the slot before it
+            slots.pop(index=number)  # Blender assigns its polygons to the slot before it
 
 
 def _gather(items: Iterable[MeshObject]) -> list[_Flat]:
@@ -121,11 +121,11 @@ def _gather(items: Iterable[MeshObject]) -> list[_Flat]:
     return list(found.values())
 
 
-# --- what is taken over, what is baked ---------------------------------------------------------
+# --- sources of inputs: reuse or bake -----------------------------------------------------------
 
 
 def _read(flat: _Flat) -> None:
-    """Sort the inputs of a material."""
+    """Find the source of each input of a material: a number, a reused image, or a bake."""
     if flat.material.node_tree is None:
         return
     flat.work = flat.material.copy()
@@ -147,9 +147,9 @@ def _read(flat: _Flat) -> None:
         flat.images["normal"] = normal.image
     flat.baked = {n for n, s in flat.sources.items() if s.socket and n not in flat.images}
     if "color" in flat.images:
-        flat.baked.discard("alpha")  # it is the same image's
+        flat.baked.discard("alpha")  # the reused image contains the alpha
     elif "alpha" in flat.baked:
-        flat.baked.add("color")  # may be a number, but its image bears the opacity
+        flat.baked.add("color")  # even if it is a number, because its image stores the opacity
 
 
 def _lay_out(flat: _Flat) -> None:
@@ -181,7 +181,8 @@ def _ends(parts: Iterable[NDArray[np.float32]]) -> NDArray[np.int64]:
 
 
 def _corners(item: MeshObject, slot: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Numbers of the corners of the faces of a slot, and how many each of these faces has."""
+    """The corners of the polygons with a material slot, int64[n], and the number of corners of each
+    of these polygons, int32[polygons]."""
     mesh = item.data
     index, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("material_index", index)
@@ -191,7 +192,7 @@ def _corners(item: MeshObject, slot: int) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def _coordinates(item: MeshObject) -> NDArray[np.float32]:
-    """float32[corners, 2] of the UV map that renders show."""
+    """float32[corners, 2]: the UV map that is active for rendering; 0 without a UV map."""
     mesh = item.data
     flat = np.zeros(len(mesh.loops) * 2, np.float32)
     layer = _shown_layer(mesh)
@@ -205,7 +206,7 @@ def _shown_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer | None:
 
 
 def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.float32]) -> None:
-    """Put coordinates into the layer that is baked to, which begins as a copy of the shown one."""
+    """Write UV coordinates of some corners into the bake layer, a copy of the shown layer."""
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
     begins = layer or shown
@@ -221,7 +222,7 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 
 
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
-    """Make the UV layer of the bake the active UV map."""
+    """Move the coordinates of the bake layer into the shown UV map, and remove the bake layer."""
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
         return
@@ -240,7 +241,7 @@ def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
 def _bake(
     override: Override, items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
 ) -> Iterator[float]:
-    """All that is painted: colours, then opacity and roughness together."""
+    """Bake all materials: first colours, then opacity and roughness together. Yields progress."""
     _prepare(override["scene"], size)
     spare = bpy.data.images.new("Spare", 4, 4)
     jobs = [
@@ -288,7 +289,7 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image for a bake; smooth inputs and single numbers get a small one."""
+    """An empty image for a bake; roughness without opacity gets a smaller one."""
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -298,7 +299,7 @@ def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
 
 
 def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
-    """Let the copy of a material glow with some of its inputs, and be baked into an image."""
+    """Set up a material copy to emit some of its inputs, with an image as target of the bake."""
     if flat.work is None:
         flat.work = flat.material.copy()
         compat.make_node_tree(flat.work)
@@ -332,7 +333,7 @@ def _feed(tree: NodeTree, source: shader_inputs.Source, socket: Socket) -> None:
 
 
 def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject) -> None:
-    """Bake one mesh, alone: Cycles reads the whole scene for each."""
+    """Bake one mesh; the others are hidden, because Cycles would load them for each bake."""
     for other in items:
         other.hide_render = other != item
     layer = item.data.uv_layers.get(_LAYER) or _shown_layer(item.data)
@@ -344,7 +345,7 @@ def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject)
 
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
-    """Split baked images into the images of a material."""
+    """Store baked images in a material: colour with opacity, and roughness as image or number."""
     values = _pixels(masks) if masks is not None else np.zeros((0, 0, 4), np.float32)
     if color is not None:
         _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)
@@ -362,10 +363,10 @@ def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Imag
 
 
 def _finish_color(image: bpy.types.Image, alpha: NDArray[np.float32] | None) -> None:
-    """Put the opacity in; an opaque image has no alpha that could be taken for one."""
+    """Store the opacity in the alpha channel; without opacity the alpha is 1 and unused."""
     values = _pixels(image)
     seen = values[..., 3] > 0
-    if seen.any():  # small copies of an image, as engines show from afar, mix in what lies around
+    if seen.any():  # mipmaps blend unused pixels into used ones, so fill them with the mean colour
         values[~seen, :3] = values[seen, :3].mean(axis=0)
     values[..., 3] = 1.0 if alpha is None else alpha
     _store(image, values, "NONE" if alpha is None else "STRAIGHT")
@@ -379,7 +380,7 @@ def _store(image: bpy.types.Image, values: NDArray[np.float32], alpha_mode: str)
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """float32[height, width, 4] of the stored numbers."""
+    """float32[height, width, 4]: the pixels of an image, bottom row first."""
     values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     pixels: Any = image.pixels
     pixels.foreach_get(values)
@@ -390,8 +391,8 @@ def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 
 
 def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
-    """Make the plain material for a user's material, with its name; add its image files to
-    `files`."""
+    """Make the plain material for a user's material, with the same name. The names of its image
+    files are appended to `files`."""
     user = flat.material
     material = bpy.data.materials.new(flat.name)
     loans.take("materials", material, flat.name)
@@ -411,7 +412,7 @@ def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
 
 
 def _plain_look(flat: _Flat, shader: Node) -> None:
-    """Give a material without a shader the look of a film or of the solid view."""
+    """Set up a material without a shader: a transparent film, or the colours of solid view."""
     color = tuple(flat.material.diffuse_color)
     if flat.clear:
         shader.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
@@ -451,11 +452,11 @@ def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node, files:
 
 
 def write_images(scene: bpy.types.Scene, folder: Path) -> int:
-    """Write the images of a stage as files, for formats without materials.
+    """Write the images of the export scene as files, for formats without materials.
 
     Args:
         scene: scene of the export, after `flatten`.
-        folder: created if an image needs it.
+        folder: folder for the files; created if there are images.
 
     Returns:
         The number of written files.
@@ -471,7 +472,7 @@ def write_images(scene: bpy.types.Scene, folder: Path) -> int:
 
 
 def _pack(image: bpy.types.Image) -> None:
-    """Take an image's file in. Raises: FaceError: it is gone."""
+    """Pack the file of an image. Raises FaceError if the file is missing."""
     try:
         image.pack()
     except RuntimeError as error:
@@ -482,7 +483,7 @@ def _pack(image: bpy.types.Image) -> None:
 
 
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
-    """An image that exporters write from memory, under a file's name that is not in files yet."""
+    """A packed image (a copy if reused) with a file name that is not in `files`; it is appended."""
     taken = name not in flat.baked
     if taken:
         image = image.copy()
@@ -490,13 +491,13 @@ def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) ->
         if image.packed_file is None:
             _pack(image)
     ending = PurePath(image.filepath_raw).suffix.lower() if taken else ""
-    # Exporters tell images apart by their paths, and no path of this machine goes out.
+    # Exporters identify images by their paths, and the file must not contain paths of this machine.
     known = ending if ending in texture_search.EXTENSIONS else ".png"
     files.append(native.part("files.names").file_name(image.name, known, files))
     image.filepath_raw = f"//{files[-1]}"
     if taken:
         assert image.packed_file is not None
-        data = image.packed_file.data  # packed anew: USD writes it under the path it was packed by
+        data = image.packed_file.data  # pack again, because USD uses the path at packing time
         image.pack(data=data, data_len=len(data))
     else:
         image.pack()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Source of each input of a plain shader in a node tree: a number, one image, or a network to bake.
+"""Finds the source of each shader input in a node tree: a number, an image, or nodes to bake.
 
-Animated maps are 0 here: an exported file has the look of the neutral face.
+Animated maps are set to 0, so that an exported file shows the neutral face.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Source:
 
     Attributes:
         value: value of an unconnected input, else None.
-        node: the image texture that is connected unchanged, or None.
-        channel: channel of that image: "Color" or "Alpha".
-        socket: socket to bake, or None.
+        node: the image texture node that feeds the input unchanged, or None.
+        channel: output of this node: "Color" or "Alpha".
+        socket: output socket that feeds the input; None if the input is unconnected.
     """
 
     value: float | tuple[float, ...] | None = None
@@ -35,16 +35,16 @@ class Source:
     socket: Socket | None = None
 
     def is_picture(self) -> bool:
-        """Whether it is an image's colour, unchanged."""
+        """Whether the source is the unchanged colour of an image."""
         return self.node is not None and self.channel == "Color"
 
     def picture(self) -> bpy.types.Image:
-        """The image of an input that has one."""
+        """The image of a source with an image node."""
         assert self.node is not None
         return self.node.image
 
     def is_alpha_of(self, other: Source) -> bool:
-        """Whether it is the alpha of the image that another is the colour of."""
+        """Whether the source is the alpha of the image whose colour is the other source."""
         return (
             self.node is not None
             and self.channel == "Alpha"
@@ -54,7 +54,7 @@ class Source:
 
 
 def rest_maps(tree: NodeTree) -> None:
-    """Take the drivers off a copied tree, and let its animated maps rest."""
+    """Remove the drivers of a copied node tree, and set its animated maps to 0."""
     tree.animation_data_clear()
     for node in tree.nodes:
         if node.type == "VALUE" and node.name.startswith(skin_material.MAP_PREFIX):
@@ -84,10 +84,11 @@ def _told(tree: NodeTree) -> tuple[list[tuple[object, ...]], set[tuple[str, str]
 
 
 def shader_of(tree: NodeTree) -> tuple[Node | None, bool]:
-    """The node that gives a surface its colour; None for films that one looks through.
+    """Find the shader node that gives a surface its colour.
 
     Returns:
-        The node, and whether anything at all lets light through unchanged.
+        The node (None if the surface has no such node, like a transparent film), and whether any
+        node is transparent or refractive.
     """
     output = tree.get_output_node("ALL")
     found = _upstream(output.inputs["Surface"]) if output is not None else []
@@ -134,7 +135,7 @@ def source(shader: Node, *names: str) -> Source:
 
 
 def normal_image(shader: Node) -> Node | None:
-    """The node of the normal map of a shader, also under relief that nodes add; or None."""
+    """The image node of a shader's normal map, also below Bump nodes; None if there is none."""
     socket = shader.inputs.get("Normal")
     while socket is not None and (feeding := _feeding(socket)) is not None:
         node = feeding.node
@@ -147,7 +148,7 @@ def normal_image(shader: Node) -> Node | None:
 
 
 def by_place(socket: Socket) -> bool:
-    """Whether a baked value depends on the location of the surface and not on its UV map alone."""
+    """Whether a value depends on more than the UV map, such as attributes or geometry."""
     for node in [socket.node, *(n for s in socket.node.inputs for n in _upstream(s))]:
         if node.type in ("ATTRIBUTE", "NEW_GEOMETRY", "VERTEX_COLOR"):
             return True
@@ -157,7 +158,7 @@ def by_place(socket: Socket) -> bool:
 
 
 def _plain(node: Node) -> bool:
-    """Whether an image texture shows a whole image by the mesh's UV map."""
+    """Whether an image texture maps a single (not tiled) image by the mesh's UV map."""
     image = node.image
     whole = image is not None and image.size[0] > 0 and image.source != "TILED"
     return whole and not node.inputs["Vector"].is_linked and node.projection == "FLAT"
@@ -182,7 +183,7 @@ def _enabled(node: Node, identifier: str) -> Socket:
 
 
 def _zero(socket: Socket) -> bool:
-    """Whether an input is 0 wherever one looks, because every map that it depends on rests."""
+    """Whether an input is 0 on the whole surface, because the animated maps are 0."""
     if not socket.is_linked:
         return socket.type == "VALUE" and socket.default_value == 0.0
     node = socket.links[0].from_node

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face as a web page: its file with edits, textures, animation and sound."""
+"""Makes a web page of a face: its DNA file with edits, textures, animation and sound."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def first_sound(scene: bpy.types.Scene, start: float, end: float, rate: float) -
 
     Args:
         scene: has the sequencer.
-        start, end: frames.
+        start, end: first and last frame of the range.
         rate: frames per second.
     """
     endings = native.part("web.page").SOUNDS
@@ -60,12 +60,12 @@ def page(
 
     Args:
         rig: deforming armature.
-        content: bytes of its DNA file.
-        clip: clip of raw controls to play; None: nothing.
-        sound: sound of the clip.
+        content: bytes of the DNA file.
+        clip: clip of raw controls to play; None: no animation.
+        sound: sound of the clip; None: no sound.
 
     Raises:
-        FaceError: this build of Risorius has no page, or the face cannot be shown.
+        FaceError: this build of Risorius cannot make pages, or the face cannot be shown.
     """
     web = native.part("web")
     dna = native.module().load(content)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a file of Blender's exporters has its end: USD reports success on a full disk too."""
+"""Detects truncated files of Blender's exporters, because USD reports success on a full disk."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import zipfile
 from pathlib import Path
 
 _CRATE, _OGAWA = b"PXR-USDC", b"Ogawa"
-_SECTION = struct.Struct("<16sqq")  # of a crate's table of contents: name, first byte, bytes
+_SECTION = struct.Struct("<16sqq")  # section of a USD crate file: name, offset, size in bytes
 
 
 def is_cut(path: Path) -> bool:
-    """Whether the end of a file is missing, by the sizes stored in its format.
+    """Whether the end of a USD or Alembic file is missing; in other formats, whether it is empty.
 
     Args:
-        path: path of a closed file. For formats without stored sizes the result is False.
+        path: path of a closed file.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     if path.suffix.lower() == ".usdz":
-        return not zipfile.is_zipfile(path)  # its directory is at its end
+        return not zipfile.is_zipfile(path)  # a ZIP file has its directory at the end
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(24)
@@ -29,7 +29,7 @@ def is_cut(path: Path) -> bool:
             contents = int.from_bytes(head[16:24], "little")
             file.seek(min(contents, size))
             return _contents_cut(file.read(), size) or not 0 < contents < size
-        if head.startswith(_OGAWA):  # a byte that is set last, the version, the root's place
+        if head.startswith(_OGAWA):  # byte 5: 0xff if finished; bytes 8 to 15: position of the root
             return head[5:6] != b"\xff" or not 0 < int.from_bytes(head[8:16], "little") < size
         if head.startswith(b"#usda"):
             file.seek(max(0, size - 64))

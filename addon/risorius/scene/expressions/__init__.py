@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions: libraries, sliders, pictures and pose assets."""
+"""Manages expressions: libraries, blending onto sliders, pictures and pose assets."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions as pose assets of this file, in catalogues, with their pictures."""
+"""Makes pose assets of expressions in this file, with asset catalogues and pictures."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from ..character import runtime
 from . import poses, thumbnails
 from .library import MARK
 
-CATALOG = "Faces"
+CATALOG = "Faces"  # the parent catalogue
 _NAMESPACE = uuid.UUID("6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a11")
 _CATALOG_FILE = "blender_assets.cats.txt"
 _HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
 
 
 def all_expressions() -> dict[str, native.Expression]:
-    """Name -> risorius Expression, in the order of their files."""
+    """Name -> built-in expression, in the order of the files."""
     return native.part("expressions").load()
 
 
 def groups() -> dict[str, list[native.Expression]]:
-    """Group -> its expressions, in their order."""
+    """Group -> built-in expressions of the group, in the order of the files."""
     found = {}
     for expression in all_expressions().values():
         found.setdefault(expression.group, []).append(expression)
@@ -39,10 +39,10 @@ def groups() -> dict[str, list[native.Expression]]:
 
 
 def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]:
-    """Make a pose asset of every expression that this face can show.
+    """Make a pose asset of every built-in expression that this face can show.
 
     An asset contains all sliders of the regions of its expression, so that the result does not
-    depend on the earlier pose. An existing unedited asset is made again.
+    depend on the earlier pose. An existing asset is replaced unless it was edited.
 
     Args:
         rig: the character.
@@ -64,7 +64,7 @@ def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]
 
 
 def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.Action:
-    """Make the pose asset of an expression, with its picture if it exists.
+    """Make the pose asset of an expression, with its picture if the picture file exists.
 
     Args:
         rig: the character.
@@ -75,7 +75,7 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
-    # A sound has its name in files and libraries: its label is for panels.
+    # A viseme is named by its name, because its label is only meant for panels.
     sound = expression.group == "viseme"
     name = f"Face {expression.name if sound else expression.label}"
     old = _named(name)
@@ -94,38 +94,38 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
         poses.held_by(expression, poses.weights_for(runtime.there(rig), expression))
     ):
         asset.tags.new(region, skip_if_exists=True)
-    # Store it in the asset data too, because a shelf reads these without loading the file.
+    # Store the expression in the asset data too, which an asset shelf reads without loading a file.
     action[MARK] = asset[MARK] = native.part("expressions").text_of(expression)
     give_picture(action, picture_of(rig, expression))
     return action
 
 
 def _named(name: str) -> bpy.types.Action | None:
-    """The action of a name, also in the small letters that labels had."""
+    """The action with a name, ignoring case, because labels of older versions were lower case."""
     wanted = name.casefold()
     return next((action for action in bpy.data.actions if action.name.casefold() == wanted), None)
 
 
 def picture_of(rig: ArmatureObject, expression: native.Expression) -> Path:
-    """The file of an expression's picture on a character, whether it exists or not.
+    """The path of the picture of an expression on a character; the file may be missing.
 
     Args:
         rig: the character.
-        expression: risorius.expressions.Expression.
+        expression: the expression.
     """
     weights = poses.weights_for(runtime.there(rig), expression)
     return thumbnails.path_of(thumbnails.look_of(rig), weights)
 
 
 def give_picture(action: bpy.types.Action, path: Path) -> bool:
-    """Let an asset show a picture in libraries and shelves.
+    """Set the preview picture of an asset.
 
     Args:
         action: the asset.
         path: of the PNG file.
 
     Returns:
-        Whether the picture exists.
+        Whether the preview was set; False if the file is missing or no PNG.
     """
     try:
         image = native.part("files.png").read_png(path.read_bytes())
@@ -146,7 +146,7 @@ def give_picture(action: bpy.types.Action, path: Path) -> bool:
 
 
 def catalog_id(group: str) -> uuid.UUID:
-    """The number of a group's catalogue, the same in every file."""
+    """The UUID of a group's catalogue, the same in every file."""
     return uuid.uuid5(_NAMESPACE, group)
 
 
@@ -154,7 +154,7 @@ def write_catalogs(wanted: Iterable[str]) -> list[str]:
     """Write the catalogues into Blender's catalogue file beside the .blend.
 
     Args:
-        wanted: groups of expressions.
+        wanted: names of groups of expressions, each of which gets a catalogue.
 
     Returns:
         Sentences for the user.
@@ -177,5 +177,5 @@ def _add_catalogs(path: Path, wanted: Iterable[str]) -> None:
             plain = "".join(c for c in group if c not in ":/\\" and c.isprintable()) or "own"
             title = f"{plain[:1].upper()}{plain[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
-    # The file belongs to every .blend of the folder: it is whole at all times.
+    # All .blend files of the folder share the file, so write it atomically.
     native.part("files.fileio").write_text(path, text)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sources of expressions: Risorius, a shared folder, and this file.
+"""Reads and writes expressions from three sources: Risorius, a library folder, and this .blend.
 
-A library is a folder with a TOML file for each expression, in the form of risorius.expressions, and
-its picture beside it. Expressions of this file are pose assets with the same text.
+A library is a folder with a TOML file for each expression, in the format of risorius.expressions,
+and a picture with the same name. Expressions of the .blend are pose assets with the same text.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from ..base.blender_types import Context
 RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
 MARK = "risorius_expression"  # on an action and its asset: the text of the expression
 _FAVOURITES = "favourites.txt"
-_MOST = 2000  # files of a library that are read
-_AT_ONCE = 100  # expressions whose files are open together while they are written
+_MOST = 2000  # largest number of files that are read from a library
+_AT_ONCE = 100  # expressions that are written together, all or none
 
 
 class LibraryError(FaceError):
-    """A library or an expression that cannot be used; the text is one sentence for users."""
+    """A library or an expression cannot be used; the text is one sentence for users."""
 
 
 class TakenError(LibraryError):
@@ -39,13 +39,13 @@ class TakenError(LibraryError):
 
 @dataclass(frozen=True)
 class Item:
-    """An expression of the grid.
+    """An expression of the grid in the panel.
 
     Attributes:
-        expression: risorius.expressions.Expression.
+        expression: the expression.
         source: RISORIUS, LIBRARY or FILE.
         path: path of its file in the library, or None.
-        action: name of its pose asset in this file, if any.
+        action: name of its pose asset in this .blend; "" if there is none.
     """
 
     expression: native.Expression
@@ -55,7 +55,7 @@ class Item:
 
 
 def own_folder(part: str) -> Path:
-    """A folder of the extension's own, which stays when it is updated; made when needed.
+    """A user folder of the add-on, which updates of the add-on keep; created if missing.
 
     Args:
         part: "expressions" or "thumbnails".
@@ -64,14 +64,16 @@ def own_folder(part: str) -> Path:
 
 
 def folder(context: Context) -> Path:
-    """The folder of the library in the preferences, or the extension's own folder."""
+    """The library folder from the preferences, or the add-on's own folder if none is set."""
     addon = context.preferences.addons.get(native.ADDON)
     chosen = getattr(addon.preferences, "expression_library", "") if addon is not None else ""
     return Path(bpy.path.abspath(chosen)) if chosen else own_folder("expressions")
 
 
 def all_items(where: Path) -> tuple[dict[str, Item], list[str]]:
-    """The expressions by name, Risorius' own first, and a sentence for each that cannot be used.
+    """Name -> expression from all sources, and a sentence for each unusable file.
+
+    If several sources have the same name, Risorius takes precedence, then the library.
 
     Args:
         where: the folder of the library.
@@ -97,10 +99,10 @@ def all_items(where: Path) -> tuple[dict[str, Item], list[str]]:
 
 
 def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[str]]:
-    """The expressions of a library, and a sentence for each file that cannot be used.
+    """(path, expression) pairs of a library, and a sentence for each unusable file.
 
     Args:
-        where: the folder; one that is not there has none, and a sentence.
+        where: the folder; a missing folder gives no expressions and one sentence.
     """
     try:
         files = sorted(p for p in where.iterdir() if p.suffix == ".toml" and p.name[0] != ".")
@@ -122,7 +124,8 @@ def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[s
 
 @session.cached(("unregister",), 4096)
 def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...] | str:
-    """The expressions of one file, or a sentence about its error; a changed file is read again."""
+    """The expressions of a file, or a sentence about its error. The time of the last change and the
+    size are part of the cache key, so that a changed file is read again."""
     try:
         return tuple(native.part("expressions").load(path).values())
     except native.user_errors() as error:
@@ -132,7 +135,7 @@ def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...
 
 @session.cached(("unregister",), 1024)
 def of_text(text: str) -> native.Expression | None:
-    """The expression in the text of an asset, or None."""
+    """The expression in the text of an asset; None if the text is invalid."""
     part = native.part("expressions")
     try:
         found = part.of_text(text)
@@ -142,16 +145,16 @@ def of_text(text: str) -> native.Expression | None:
 
 
 def of_action(action: bpy.types.Action) -> native.Expression | None:
-    """The expression of a pose asset of this file, or None for other assets."""
+    """The expression of a pose asset of this .blend; None for other actions."""
     text = action.get(MARK) if action.asset_data is not None else None
     return of_text(text) if isinstance(text, str) else None
 
 
 def find(items: dict[str, Item], name: str) -> Item:
-    """The expression of a name.
+    """The expression with a name.
 
     Args:
-        items: of all_items.
+        items: expressions by name, from all_items.
         name: of the expression.
 
     Raises:
@@ -163,15 +166,15 @@ def find(items: dict[str, Item], name: str) -> Item:
 
 
 def name_for(label: str) -> str:
-    """The name of an expression and its file, from its label."""
+    """Make the name of an expression, as used for its file, from its label."""
     return re.sub(r"\W+", "_", label.strip().lower()).strip("_")
 
 
 def free_label(items: dict[str, Item], label: str) -> str:
-    """A unique label, with a number if needed.
+    """A label whose name is not used, with a number if needed.
 
     Args:
-        items: of all_items.
+        items: expressions by name, from all_items.
         label: wanted label.
     """
     taken, number, tried = {*items, ""}, 1, label
@@ -185,8 +188,8 @@ class Entry(NamedTuple):
     """An expression to write into a library.
 
     Attributes:
-        expression: risorius.expressions.Expression.
-        picture: a PNG file beside it; empty keeps the existing one.
+        expression: the expression.
+        picture: bytes of a PNG file; empty: keep the existing picture.
         over: the file to replace; None: a new file.
     """
 
@@ -196,21 +199,21 @@ class Entry(NamedTuple):
 
 
 def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
-    """Write expressions into a library; each file is complete at all times.
+    """Write expressions into a library, in groups of _AT_ONCE that are written all or none.
 
-    An expression's name only proposes the name of its file, and only files named by entries are
-    replaced.
+    A file gets the name of its expression, or another name if a file of this name exists. Only the
+    files in `over` of the entries are replaced.
 
     Args:
         where: the folder; created if missing.
-        entries: entries to write. Of more than _AT_ONCE entries, those that fit on the disk are
-            written.
+        entries: expressions to write.
 
     Returns:
-        The paths of their files.
+        The path of each entry's file.
 
     Raises:
-        ValueError: an entry cannot be written in this form; nothing was written. OSError.
+        ValueError: an entry cannot be written as TOML; nothing was written.
+        OSError: a file cannot be written; earlier groups were written.
     """
     part, taken = native.part("expressions"), _stems(where)
     files: list[dict[Path, bytes]] = []
@@ -227,11 +230,11 @@ def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
 
 
 def in_the_way(where: Path, entries: Sequence[Entry]) -> list[Entry]:
-    """The same entries, each over the file in a folder that has its name.
+    """Return the entries with `over` set to the existing file with the entry's file name.
 
     Args:
         where: the folder.
-        entries: without a file to replace.
+        entries: entries without a file to replace.
     """
     folded = native.part("files.names").folded
     there = {folded(name): name for name in reversed(_stems(where))}
@@ -251,14 +254,14 @@ def _file_name(expression: native.Expression, taken: Sequence[str]) -> str:
 
 
 def _stems(where: Path) -> list[str]:
-    """The names of files of expressions in a folder, including names of pictures."""
+    """The names of TOML files in a folder; a picture counts as the TOML file of the same name."""
     try:
         return sorted(
             p.name if p.suffix == ".toml" else f"{p.stem}.toml"
             for p in where.iterdir()
             if p.suffix.lower() in (".toml", ".png")
         )
-    except FileNotFoundError:  # it is made
+    except FileNotFoundError:  # the folder is created later
         return []
 
 
@@ -266,10 +269,10 @@ def check_own(item: Item) -> None:
     """Check that an expression may be changed.
 
     Args:
-        item: of the grid.
+        item: an expression of the grid.
 
     Raises:
-        LibraryError: it belongs to Risorius, or its file has other expressions too.
+        LibraryError: the expression belongs to Risorius, or its file has several expressions.
     """
     if item.source == RISORIUS:
         raise LibraryError(
@@ -285,13 +288,14 @@ def check_own(item: Item) -> None:
 
 
 def remove(item: Item) -> None:
-    """Remove the user's own expression from the library and from this file.
+    """Remove the user's own expression from the library and from this .blend.
 
     Args:
-        item: of the grid.
+        item: an expression of the grid.
 
     Raises:
-        LibraryError: see check_own. OSError.
+        LibraryError: the expression may not be changed, see check_own.
+        OSError: its file cannot be removed.
     """
     check_own(item)
     if item.path is not None:
@@ -303,13 +307,13 @@ def remove(item: Item) -> None:
 
 
 def read_all(where: Path) -> list[native.Expression]:
-    """The expressions of a folder, all or none.
+    """The expressions of a folder; fails if any of them is unusable.
 
     Args:
         where: a folder with TOML files.
 
     Raises:
-        LibraryError: one cannot be used, two have one name, or there are none.
+        LibraryError: a file cannot be used, two expressions have the same name, or there are none.
     """
     found, troubles = of_folder(where)
     if troubles:
@@ -330,7 +334,7 @@ def read_all(where: Path) -> list[native.Expression]:
 
 
 def favourites() -> set[str]:
-    """Names of the expressions with a star, the same in all files."""
+    """Names of the expressions with a star. The list is shared by all .blend files."""
     path = own_folder("expressions") / _FAVOURITES
     try:
         return set(path.read_text(encoding="utf-8").split("\n")) - {""}
@@ -342,7 +346,7 @@ def set_favourite(names: Iterable[str], on: bool) -> None:
     """Add a star to expressions, or remove it.
 
     Args:
-        names: of expressions.
+        names: names of the expressions.
         on: True: add; False: remove.
 
     Raises:

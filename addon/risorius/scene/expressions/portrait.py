@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face with an expression as a small picture, drawn in NumPy without a window.
+"""Draws small pictures of a face with an expression, in NumPy.
 
-A Sitter contains all data for drawing and no Blender data. So a thread draws the pictures, and the
-user's scene does not change.
+A Sitter contains all data for drawing and no Blender data. So a thread can draw the pictures, and
+the user's scene does not change.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from ..character import runtime
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SIZE = 160  # pixels each way
-VERSION = 1  # of the look: pictures of another one are made anew
-_SMOOTH = 2  # samples a pixel each way
-_KEY = np.array([-0.45, 0.55, 0.70])  # light from the upper left
-_FILL = np.array([0.75, 0.05, 0.65])
-_TOP = np.array([0.42, 0.42, 0.43])  # behind the face
-_BOTTOM = np.array([0.27, 0.27, 0.28])
-_STILL_GLOSS = 0.07  # of a mesh that is no character's
-_FAR = 15.0  # where one looks from, in distances between the eyes
+SIZE = 160  # width and height of a picture in pixels
+VERSION = 1  # of the drawing code; cached pictures of other versions are not used
+_SMOOTH = 2  # samples per pixel in each direction
+_KEY = np.array([-0.45, 0.55, 0.70])  # direction to the key light at the upper left
+_FILL = np.array([0.75, 0.05, 0.65])  # direction to the fill light
+_TOP = np.array([0.42, 0.42, 0.43])  # background colour at the top
+_BOTTOM = np.array([0.27, 0.27, 0.28])  # background colour at the bottom
+_STILL_GLOSS = 0.07  # gloss of a mesh that belongs to no character
+_FAR = 15.0  # distance of the viewpoint, in half heights of the picture
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class Piece:
 
     Attributes:
         index: of the mesh in the DNA.
-        triangles: int64[F, 3] of its vertices.
-        uvs: float64[F, 3, 2] of their corners.
-        colors: float64[F, 3] in [0, 1], used without an image.
+        triangles: int64[F, 3], vertex indices.
+        uvs: float64[F, 3, 2], UV coordinates of the triangles' corners.
+        colors: float64[F, 3] in [0, 1], colours of triangles without an image, and of hairs.
         image: float32[h, w, 4] in [0, 1], row 0 at v = 0; or None.
-        gloss: strength of the highlight.
-        hairs: True: keep the alpha of the image or of hairs, as for lashes.
-        weights: float32[V, J] of the joints.
-        shapes: channel, vertex indices and deltas of each target.
+        gloss: strength of the highlight, 0 to 1.
+        hairs: True: transparent hair cards, such as lashes, whose alpha comes from the image.
+        weights: float32[V, J], skin weights of the joints.
+        shapes: (channel, vertex indices, deltas in file units) of each blend shape target.
     """
 
     index: int
@@ -60,11 +60,11 @@ class Piece:
 
 @dataclass(frozen=True)
 class Sitter:
-    """A character as its pictures need it.
+    """The data for drawing pictures of a character.
 
     Attributes:
-        live: its Runtime.
-        pieces: its meshes, each in the level of detail that is drawn.
+        live: Runtime of the character.
+        pieces: meshes of the character, each in the level of detail to draw.
     """
 
     live: runtime.Runtime
@@ -72,11 +72,11 @@ class Sitter:
 
 
 def skin_of(mesh: native.Mesh, joint_count: int) -> NDArray[np.float32]:
-    """The weights of a mesh, float32[V, J]; rows of vertices without weights are 0.
+    """The skin weights of a mesh, float32[V, J]; rows of vertices without weights are 0.
 
     Args:
         mesh: mesh of the DNA file.
-        joint_count: of the DNA.
+        joint_count: number of joints in the DNA file.
     """
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     count = len(mesh.positions)
@@ -89,7 +89,7 @@ def skin_of(mesh: native.Mesh, joint_count: int) -> NDArray[np.float32]:
 
 
 def shapes_of(mesh: native.Mesh) -> tuple[tuple[int, Ints, Floats], ...]:
-    """Channel, vertex indices and deltas of each target of a mesh, in the file's units."""
+    """(channel, vertex indices, deltas in file units) of each blend shape target of a mesh."""
     return tuple(
         (
             int(target.blend_shape_channel_index),
@@ -101,12 +101,12 @@ def shapes_of(mesh: native.Mesh) -> tuple[tuple[int, Ints, Floats], ...]:
 
 
 def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floats:
-    """The face with these sliders, seen from the front.
+    """Draw a face with given slider values, seen from the front.
 
     Args:
         sitter: the face.
         sliders: values by property name; other sliders are at rest.
-        size: pixels each way.
+        size: width and height in pixels.
 
     Returns:
         float64[size, size, 3] in [0, 1], row 0 at the bottom.
@@ -115,7 +115,7 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
 
 
 def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
-    """The vertices of each piece: float64[V, 3] in file space.
+    """float64[V, 3] for each piece: its posed vertices in file space.
 
     Args:
         sitter, sliders: see draw.
@@ -129,11 +129,11 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
 
 
 def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
-    """The face with given vertices, drawn as by `draw`.
+    """Draw a face like `draw`, with given vertices.
 
     Args:
         sitter, size: see draw.
-        placed: from `places`.
+        placed: vertices of each piece, from `places`.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
@@ -151,17 +151,17 @@ def draw_still(
     frame: tuple[Floats, float],
     size: int = SIZE,
 ) -> Floats:
-    """A mesh that is no character's, seen from the front.
+    """Draw a mesh that belongs to no character, seen from the front.
 
     Args:
         points: float64[V, 3] in Blender's axes; the face looks along -y.
-        triangles: int64[F, 3].
-        colors: float64[F, 3] in [0, 1].
-        frame: the middle of the picture, and half its height.
-        size: pixels each way.
+        triangles: int64[F, 3], vertex indices.
+        colors: float64[F, 3] in [0, 1], colours of the triangles.
+        frame: the centre of the picture, and half its height, in the units of points.
+        size: width and height in pixels.
 
     Returns:
-        As draw.
+        float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
     high = size * _SMOOTH
     uvs, none = np.zeros((*triangles.shape, 2)), np.zeros((len(points), 0), np.float32)
@@ -172,7 +172,7 @@ def draw_still(
 
 
 def _moves(live: runtime.Runtime, deltas: Floats) -> Floats:
-    """float64[J, 4, 4] from the neutral place of each joint to the posed one, in file space."""
+    """float64[J, 4, 4]: transforms of joints from neutral to posed, in file space."""
     dna, space = live.dna, live.space
     turns = np.asarray(dna.neutral_joint_rotations, np.float64)
     places = np.asarray(dna.neutral_joint_translations, np.float64)
@@ -187,7 +187,7 @@ def _moves(live: runtime.Runtime, deltas: Floats) -> Floats:
 def _posed(
     live: runtime.Runtime, piece: Piece, moves: Floats, channels: NDArray[np.float32]
 ) -> Floats:
-    """float64[V, 3] of a mesh, in file space."""
+    """float64[V, 3]: vertices of a mesh after blend shapes and skinning, in file space."""
     points = np.asarray(live.dna.meshes[piece.index].positions, np.float64).copy()
     for channel, vertices, deltas in piece.shapes:
         if channel < len(channels) and channels[channel]:
@@ -200,7 +200,7 @@ def _posed(
 
 
 def _frame(sitter: Sitter) -> tuple[Floats, float]:
-    """The middle of the picture in Blender's axes, and half its height: the face fills it."""
+    """The centre of the picture in Blender's axes, and half its height, to frame the face."""
     live = sitter.live
     eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
     if len(eyes) == 2:
@@ -215,7 +215,7 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
 
 
 def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
-    """Pixels to the right and down, and depth towards the viewer, with a slight perspective."""
+    """float64[V, 3]: pixels to the right, pixels down, and depth towards the viewer in pixels."""
     seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]
@@ -226,7 +226,7 @@ def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats
 
 
 class _Picture:
-    """The samples of a picture: colour, normal, depth, gloss."""
+    """Buffers of a picture: colour, normal, depth and gloss of each sample."""
 
     def __init__(self, high: int) -> None:
         self.high = high
@@ -251,13 +251,13 @@ class _Picture:
         color, alpha = _paint(piece, which, share)
         self.color[hit] += alpha[:, None] * (color - self.color[hit])
         if piece.hairs:
-            return  # cards: what is under them keeps its shape
+            return  # hair cards change only the colour; normals and depth below them stay
         normal = np.einsum("nk,nkd->nd", share, normals[corners])
         normal *= np.where(normal[:, 2:] < 0, -1.0, 1.0)
         self.normal[hit], self.depth[hit], self.gloss[hit] = normal, depth, piece.gloss
 
     def lit(self) -> Floats:
-        """float64[h, w, 3], row 0 at the bottom."""
+        """The lit picture over its background, float64[h, w, 3] in [0, 1], row 0 at the bottom."""
         ground = np.linspace(_TOP, _BOTTOM, self.high)
         picture = np.repeat(ground[:, None], self.high, axis=1).reshape(-1, 3)
         hit = np.flatnonzero(np.isfinite(self.depth))
@@ -273,7 +273,7 @@ class _Picture:
         return picture.reshape(self.high, self.high, 3)[::-1]
 
     def _hollows(self) -> Floats:
-        """[h * w] in [0, 1]: depth of a sample behind its surroundings."""
+        """float64[h * w] in [0, 1]: how far a sample is behind the mean of its surroundings."""
         depth = self.depth.reshape(self.high, self.high)
         there = np.isfinite(depth)
         held, reach = np.where(there, depth, 0.0), max(self.high // 24, 1)
@@ -283,7 +283,8 @@ class _Picture:
 
 
 def _in_sight(corners: Floats, high: int) -> Ints:
-    """The triangles that face us and touch the picture. Args: corners  float64[F, 3, 3]."""
+    """Indices of the finite triangles that may overlap the picture. Args: corners  float64[F, 3, 3]
+    in pixels; high  height of the picture."""
     low, top = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
     inside = (top >= 0).all(axis=1) & (low <= high - 1).all(axis=1)
     return np.flatnonzero(inside & np.isfinite(corners).all(axis=(1, 2)))
@@ -311,7 +312,7 @@ def _paint(piece: Piece, which: Ints, share: Floats) -> tuple[Floats, Floats]:
 
 
 def _blurred(values: Floats, reach: int) -> Floats:
-    """Means over squares of 2 reach + 1 samples; beyond the edge the edge goes on."""
+    """Means over squares of 2 * reach + 1 samples; samples beyond the edge repeat the edge."""
     for axis in (0, 1):
         edges = [(0, 0), (0, 0)]
         edges[axis] = (reach + 1, reach)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions on the sliders of a face, and the face as an expression."""
+"""Applies expressions to the sliders of a face, and makes expressions of its pose."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _MOUTH = {"mouth", "jaw", "tongue"}
 
 
 def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """The sliders of an expression that the face has.
+    """The slider values of an expression, without sliders that the face lacks.
 
     Args:
         live: the character's Runtime.
-        expression: risorius.expressions.Expression, with weights by the DNA's control names.
+        expression: an expression with weights by the DNA's control names.
 
     Returns:
         Property name -> value.
@@ -32,15 +32,15 @@ def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[st
 
 
 def check(live: runtime.Runtime, item: Item) -> None:
-    """Check that a face can show an expression. Expressions of Risorius may use controls that the
-    face lacks.
+    """Check that a face can show an expression.
 
     Args:
         live: the character's Runtime.
-        item: of the grid.
+        item: an expression of the grid.
 
     Raises:
-        LibraryError: it was made for another rig.
+        LibraryError: the face lacks all controls of the expression; for expressions that are not
+            from Risorius, if it lacks any.
     """
     sliders = clip_actions.sliders_of(live)
     weights = item.expression.weights
@@ -61,16 +61,16 @@ def check(live: runtime.Runtime, item: Item) -> None:
 def goals(
     rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
 ) -> dict[str, float]:
-    """The target values of an expression for its sliders.
+    """The slider values after blending an expression onto a pose, without limits.
 
     Args:
         rig: the character.
-        item: of the grid.
-        way: how it is blended.
+        item: an expression of the grid.
+        way: options of the blending.
         present: values to start from; None: the current values.
 
     Raises:
-        LibraryError: it was made for another rig.
+        LibraryError: the expression was made for another rig.
     """
     live = runtime.there(rig)
     check(live, item)
@@ -87,19 +87,19 @@ def goals(
 def apply(
     rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
 ) -> list[str]:
-    """Move the sliders towards an expression.
+    """Blend an expression onto the sliders of a face.
 
     Args:
         rig: the character.
-        item: of the grid.
-        way: how it is blended.
+        item: an expression of the grid.
+        way: options of the blending.
         present: values to start from; None: the current values.
 
     Returns:
-        The property names of its sliders.
+        The property names of the sliders that were set.
 
     Raises:
-        LibraryError: it was made for another rig; nothing was moved.
+        LibraryError: the expression was made for another rig; nothing was moved.
     """
     values = goals(rig, item, way, present)
     sides.put(rig, values)
@@ -114,15 +114,15 @@ def captured(
     values: Mapping[str, float],
     regions: Collection[str] = (),
 ) -> native.Expression:
-    """Make an expression of the current pose.
+    """Make an expression from slider values.
 
     Args:
         rig: the character.
         values: values by slider names.
-        name: of the expression.
-        label: its label.
-        group: its category.
-        regions: its regions; none: all regions with a slider that is not at rest.
+        name: name of the expression.
+        label: label for panels.
+        group: group of the expression.
+        regions: regions of the expression; empty: all regions with a slider that is not at rest.
 
     Raises:
         LibraryError: all sliders of these regions are at rest.
@@ -147,8 +147,8 @@ def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
     """The regions of an expression; a viseme always has the whole mouth.
 
     Args:
-        expression: risorius.expressions.Expression.
-        weights: the names of its sliders on this face, from weights_for.
+        expression: the expression.
+        weights: names of the expression's sliders on this face, from weights_for.
     """
     if expression.regions:
         return set(expression.regions)
@@ -157,11 +157,11 @@ def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
 
 
 def pose_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """All sliders of the regions of an expression, as in its pose asset.
+    """Values of all sliders in the regions of an expression, as its pose asset contains them.
 
     Args:
         live: the character's Runtime.
-        expression: risorius.expressions.Expression.
+        expression: the expression.
 
     Returns:
         Property name -> value.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of expressions on a character, cached in files by the hash of their content.
+"""Makes pictures of expressions on a character, and caches them in files by a hash of their input.
 
-The files lie in the extension's own folder, so that every .blend with this character has them.
+The files are in the add-on's user folder, so that every .blend with this character shares them.
 """
 
 from __future__ import annotations
@@ -24,23 +24,22 @@ from ..base.blender_types import ArmatureObject
 from ..character import runtime
 from . import library, portrait
 
-_MOST_FACES = 5000  # of a mesh that is drawn, where a level of detail has one so small
-_TEXELS = 640  # of an image, each way: a picture shows no more
-_MOST_FILES = 3000  # that are kept; the oldest go
-_DIM = {"teeth": 0.9, "tongue": 0.75, "gum": 0.7}  # the mouth lies in the shade
-_GLOSS = {"eyes": 0.45, "teeth": 0.3, "skin": 0.07}
+_MOST_FACES = 5000  # polygons of a drawn mesh, if a level of detail has so few
+_TEXELS = 640  # largest width and height of a reduced image in pixels
+_MOST_FILES = 3000  # number of cached pictures; the oldest are removed
+_DIM = {"teeth": 0.9, "tongue": 0.75, "gum": 0.7}  # factor on colours in the shaded mouth
+_GLOSS = {"eyes": 0.45, "teeth": 0.3, "skin": 0.07}  # strength of the highlight; others: 0.1
 
 
 class Job(NamedTuple):
-    """A picture to be made: where, and of which sliders by property name."""
+    """A picture to draw: path of its file, and slider values by property name."""
 
     path: Path
     sliders: Mapping[str, float]
 
 
 def look_of(rig: ArmatureObject) -> str:
-    """A key for the pictures of a character: its DNA, its images, and the version of the drawing
-    code.
+    """A hash that identifies the look of a character: DNA, images, and version of the drawing code.
 
     Args:
         rig: the character.
@@ -55,11 +54,11 @@ def look_of(rig: ArmatureObject) -> str:
 
 
 def path_of(look: str, sliders: Mapping[str, float]) -> Path:
-    """The file of a picture.
+    """The path of a picture.
 
     Args:
-        look: from look_of.
-        sliders: sliders of the expression, by property name.
+        look: hash of the character's look, from look_of.
+        sliders: slider values of the expression, by property name.
     """
     text = look + repr(sorted((name, round(value, 4)) for name, value in sliders.items()))
     name = hashlib.sha1(text.encode(), usedforsecurity=False).hexdigest()
@@ -74,7 +73,7 @@ def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
     """
     live = runtime.there(rig)
     names = live.dna.mesh_names
-    paints = {}  # by the mesh's name without its level: all levels share their materials
+    paints = {}  # mesh name without its level -> materials, which all levels share
     for item in parts.meshes_of(rig):
         index = int(item[parts.MESH])
         if 0 <= index < len(names):
@@ -88,14 +87,17 @@ def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
 
 
 def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
-    """The data for drawing pictures of a file that is not in the scene, without materials. Args:
-    live its Runtime."""
+    """The data for drawing pictures of a file that is not in the scene, without materials.
+
+    Args:
+        live: Runtime of the file.
+    """
     return [_piece(live, index, (), {}) for index in _meshes(live)]
 
 
 def _meshes(live: runtime.Runtime) -> list[int]:
-    """For each mesh of the finest level, its finest level with few enough polygons, or the
-    coarsest."""
+    """Indices of the meshes to draw: for each mesh of the finest level, the finest level with at
+    most _MOST_FACES polygons, else the coarsest. Wet films are left out."""
     dna = live.dna
     rows = dna.lod_mesh_mapping.rows or [range(len(dna.meshes))]
     chosen: dict[str, int] = {}
@@ -146,7 +148,10 @@ def _piece(
 
 
 def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Mask of vertices of eyeballs that belong to the iris, around the axis of the nearest eye."""
+    """bool[n]: whether a point of the eyeballs is near the front axis of the nearest eye.
+
+    places: float[n, 3], centres of triangles in file space.
+    """
     points = live.space.points(places)
     eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
     if not eyes:
@@ -159,8 +164,8 @@ def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool
 
 
 def _image_of(material: bpy.types.Material | None) -> bpy.types.Image | None:
-    """The colour image of a material, in its active node (see materials.py); for lashes the image
-    with the hairs."""
+    """The image of a material's active node (see materials.py), else of its node "Alpha", as for
+    lashes; None if it has neither."""
     tree = material.node_tree if material is not None else None
     if tree is None:
         return None
@@ -171,7 +176,7 @@ def _image_of(material: bpy.types.Material | None) -> bpy.types.Image | None:
 
 
 def _color_of(material: bpy.types.Material | None) -> list[float]:
-    """The colour of the solid view, as it is seen."""
+    """The viewport colour of a material, converted from linear to sRGB; grey without a material."""
     linear = np.array(material.diffuse_color[:3] if material is not None else (0.5, 0.5, 0.5))
     low = linear * 12.92
     return (
@@ -182,7 +187,8 @@ def _color_of(material: bpy.types.Material | None) -> list[float]:
 def _pixels(
     image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
 ) -> NDArray[np.float32] | None:
-    """float32[h, w, 4] of a reduced image; without alpha its lightness is used."""
+    """float32[h, w, 4]: a reduced image; without alpha, the mean of its colours becomes the alpha.
+    None if its file is missing."""
     if image.name_full not in known:
         copy = image.copy()
         try:
@@ -192,7 +198,7 @@ def _pixels(
             held = np.empty(width * height * 4, np.float32)
             floats: Any = copy.pixels
             floats.foreach_get(held)
-        except (RuntimeError, TypeError):  # its file is gone
+        except (RuntimeError, TypeError):  # its file is missing
             return None
         finally:
             bpy.data.images.remove(copy)
@@ -213,12 +219,12 @@ def make(
 
     Args:
         sitter: the character.
-        jobs: the pictures.
-        progress: called with the finished share, 0 to 1.
-        cancelled: returns whether to stop.
+        jobs: the pictures to draw.
+        progress: function that is called with the progress, 0 to 1.
+        cancelled: function that returns whether to stop.
 
     Returns:
-        The number of pictures.
+        The number of written pictures.
 
     Raises:
         OSError: a file cannot be written.

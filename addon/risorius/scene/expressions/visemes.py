@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The visemes that come with a face, used for speech instead of those of Risorius."""
+"""Finds visemes that were made for a face; speech uses them instead of the built-in visemes."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from . import library
 
 
 class Visemes(NamedTuple):
-    """Visemes of a face itself.
+    """Visemes that were made for a face.
 
     Attributes:
-        own: risorius.expressions.Expression by the names of visemes.
-        troubles: a sentence for each file that cannot be used.
+        own: viseme name -> expression.
+        troubles: a sentence for each unusable file.
     """
 
     own: Mapping[str, native.Expression]
@@ -29,13 +29,13 @@ class Visemes(NamedTuple):
 
 
 def of(rig: ArmatureObject, shared: Path) -> Visemes:
-    """The visemes of a face: beside its DNA file, where `author` writes them, and in a library.
+    """The visemes of a face from the folder near its DNA file and from a library.
 
-    A viseme with a control that the face lacks belongs to another face and is left out.
+    Visemes with a control that the face lacks are left out, because they belong to another face.
 
     Args:
         rig: the face.
-        shared: folder of the library; visemes beside the file take precedence.
+        shared: folder of the library; visemes near the DNA file take precedence.
     """
     known, names = set(runtime.there(rig).labels), native.part("expressions").VISEMES
     own: dict[str, native.Expression] = {}
@@ -51,7 +51,8 @@ def of(rig: ArmatureObject, shared: Path) -> Visemes:
 
 
 def beside(rig: ArmatureObject) -> Path | None:
-    """The folder of expressions beside a face's DNA file; None if the file is unknown.
+    """The folder near a face's DNA file in which authoring stores expressions; None if the path of
+    the DNA file is unknown.
 
     Args:
         rig: the face.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Another DNA file for a character, and its edits as a DNA file."""
+"""Replaces the DNA file of a character, exports its edits, and builds new DNA files."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character's DNA file with the user's edits; all other bytes as imported."""
+"""Exports a character's DNA file with the user's edits; unedited data stay as imported."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from . import refit_joints, refit_meshes
 
 
 class ExportError(FaceError):
-    """A character that cannot be written; the text is one sentence for users."""
+    """A character cannot be exported; the text is one sentence for users."""
 
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """Which edits are written."""
+    """Kinds of edits to write: shape keys, neutral mesh, neutral joints, skin weights."""
 
     shapes: bool = True
     neutral: bool = True
@@ -44,14 +44,15 @@ def export(
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
-        options: ExportOptions; None writes every edit.
+        options: kinds of edits to write; None: all.
 
     Returns:
-        The bytes, and sentences about the changes with their amount. Without edits the imported
-        bytes are returned.
+        The bytes, and sentences about the changes with their sizes. Without edits the bytes equal
+        the imported file.
 
     Raises:
-        ExportError: a mesh has other polygons than its file, or the character has lost its data.
+        ExportError: the polygons of a mesh differ from its file, a mesh is in edit mode, or the
+            data of the file are missing.
     """
     options = options or ExportOptions()
     live = runtime.of(rig)
@@ -66,7 +67,7 @@ def export(
     unit = runtime.unit_of(rig)
     levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
-    written = native.module().load(content)  # the Runtime's own must stay as it is
+    written = native.module().load(content)  # a separate Dna, because the Runtime's must not change
     job = _Job(rig, live, plan, written, unit)
     names_of_bones = refit_joints.bones_by_joint(rig)
     labels = [names_of_bones.get(j, label) for j, label in enumerate(plan.armature.labels)]
@@ -103,13 +104,13 @@ def _check(item: MeshObject, mesh_plan: plans.MeshPlan) -> None:
 
 
 class _Job:
-    """One export: puts edits into a Dna and words for them into a report.
+    """One export: writes edits into a Dna and sentences about them into a report.
 
     Args:
         rig: deforming armature.
-        live: its Runtime.
-        plan: its CharacterPlan.
-        dna: a Dna of its own that is edited.
+        live: Runtime of the character.
+        plan: names, joints and meshes of the imported character.
+        dna: a separate Dna, which is changed.
         unit: metres per Blender unit.
     """
 
@@ -127,7 +128,7 @@ class _Job:
         self.edited = False
 
     def content(self) -> bytes:
-        """The edited file in the version of the imported one."""
+        """The bytes of the edited file, in the file version of the import."""
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             content = self._dna.to_bytes(version=f"2.{self._live.dna.version}")
@@ -148,7 +149,7 @@ class _Job:
         )
 
     def mesh(self, item: MeshObject, mesh_plan: plans.MeshPlan, options: ExportOptions) -> None:
-        """Neutral vertices and shapes of one mesh."""
+        """Write edits of the neutral vertices and the shape keys of a mesh."""
         shape = refit_meshes.read_shape(self._live, item, mesh_plan, known=True)
         dna_mesh = self._dna.meshes[mesh_plan.index]
         name = self._dna.mesh_names[mesh_plan.index]
@@ -186,9 +187,9 @@ class _Job:
     def _neutral(
         self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
     ) -> None:
-        """Only coordinates that differ from the imported ones are converted back."""
+        """Write the neutral coordinates that differ from the import; others keep their bits."""
         moved = user_edits.changed(shape.points, mesh_plan.positions)
-        # The axes are exchanged and mirrored, never mixed: a coordinate of ours is one of theirs.
+        # The axes are only exchanged and mirrored, so each Blender coordinate is one of the file.
         theirs = moved @ (np.abs(self._space.axes) > 0.5)
         positions = dna_mesh.positions.copy()
         positions[theirs] = self._space.file_points(shape.points)[theirs]
@@ -201,7 +202,7 @@ class _Job:
         key: str,
         difference: NDArray[np.float64],
     ) -> None:
-        """Only the edited vertices' deltas are written."""
+        """Write the deltas of the edited vertices of a shape key."""
         vertices = np.flatnonzero(np.any(difference != 0, axis=1))
         base = shape.keys[shape.relative[key]]
         delta = shape.keys[key][vertices].astype(np.float64) - base[vertices]
@@ -217,13 +218,13 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Write skin weights of painted vertices; other weights keep their bits."""
+        """Write skin weights of vertices that the user painted; other weights keep their bits."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
         known = {name for name in ours if name in present}
         used = {labels[j] for j in np.unique(mesh_plan.skin_joints)}
-        for name in known - used:  # groups of joints that this mesh had no weights of
+        for name in known - used:  # groups of joints without weights on this mesh in the file
             painted.update(present[name])
         if not painted:
             return
@@ -250,7 +251,7 @@ class _Job:
         )
 
     def joints(self, found: Mapping[int, refit_joints.JointEdit]) -> None:
-        """Neutral joints that were moved or turned."""
+        """Write translations and rotations of neutral joints that the user edited."""
         offsets = self._dna.neutral_joint_translations.copy()
         angles = self._dna.neutral_joint_rotations.copy()
         for joint, edit in found.items():
@@ -280,7 +281,7 @@ class _Job:
 def _normalised(
     present: skin_weights.Weights, known: Iterable[str], ours: Mapping[str, int], vertex: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Joints and weights of one vertex, the largest first, their sum 1."""
+    """Joints and weights of a vertex, with the largest weight first and a sum of 1."""
     held = [(present[n][vertex], ours[n]) for n in known if present[n].get(vertex, 0.0) > 0.0]
     held.sort(key=lambda pair: (-pair[0], pair[1]))
     total = sum(weight for weight, _ in held)
@@ -289,7 +290,7 @@ def _normalised(
 
 
 def _keep_report(rig: ArmatureObject, sentences: Sequence[str]) -> None:
-    """The report as a Text, and on the console."""
+    """Write the report to a Text and to the console."""
     title = f"{rig.name.removesuffix('_rig')} export report"
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
     text.from_string("\n".join(sentences) + "\n")

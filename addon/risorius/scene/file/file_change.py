@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The data of replacing one file by another in the same objects."""
+"""Data of a replacement of a character's DNA file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Change:
 
     Attributes:
         rig: the deforming armature, which stays.
-        before, after: Runtimes of the two files.
-        old, new: CharacterPlans of the two files.
-        old_bones, new_bones: name of the bone of each joint of the old, then of the new file.
-        report: sentences.
+        before, after: Runtimes of the old and the new file.
+        old, new: CharacterPlans of the old and the new file.
+        old_bones, new_bones: bone names by joint index of the old and the new file.
+        report: sentences for the user.
     """
 
     rig: ArmatureObject
@@ -33,13 +33,13 @@ class Change:
     report: list[str] = field(default_factory=list)
 
     def channel_map(self) -> list[int]:
-        """New channel of each old one, -1 if it no longer exists."""
+        """New index of each old blend shape channel; -1 if the new file lacks it."""
         return user_edits.index_map(
             *(build.channel_labels(r.dna) for r in (self.before, self.after))
         )
 
     def mesh_map(self) -> list[int]:
-        """New mesh of each old one, -1 if it no longer exists."""
+        """New index of each old mesh; -1 if the new file lacks it."""
         return user_edits.index_map(
             *(names.unique_labels(r.dna.mesh_names) for r in (self.before, self.after))
         )

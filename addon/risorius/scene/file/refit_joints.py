@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joints of one file become joints of another in the same armature; edits of joints are found."""
+"""Replaces the joints of an armature by the joints of another DNA file, and finds edited joints."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, bone_shapes
 from .file_change import Change
 
-_EPS = float(np.finfo(np.float32).eps)
+_EPS = float(np.finfo(np.float32).eps)  # relative rounding of float32
 
 
 @dataclass(frozen=True)
 class JointEdit:
-    """How a user moved a joint's rest.
+    """A user's edit of a joint's rest pose.
 
     Attributes:
-        before, after: parent-relative matrices float64[4, 4], Blender units.
-        moved, turned: which of both it was.
+        before, after: float64[4, 4], rest matrices relative to the parent, in Blender units.
+        moved, turned: whether the position and the rotation changed.
     """
 
     before: NDArray[np.float64]
@@ -38,17 +38,17 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """The matrix applied after the file's own local matrix."""
+        """float64[4, 4]: the matrix to append to the file's local matrix."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
     def distance(self) -> float:
-        """In Blender units."""
+        """Distance of the move in Blender units."""
         return float(np.linalg.norm(self.after[:3, 3] - self.before[:3, 3]))
 
     @property
     def angle(self) -> float:
-        """In radians."""
+        """Angle of the rotation in radians."""
         return _angle(self.change)
 
 
@@ -59,8 +59,7 @@ def _angle(matrix: NDArray[np.float64]) -> float:
 
 
 def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
-    """Joint -> bone name; if several bones have the same joint index, the first belongs to the
-    file."""
+    """Joint index -> bone name; the first bone if several have the same joint index."""
     found = {}
     for bone in rig.data.bones:
         joint = saved.whole(bone, parts.JOINT, -1, 0)
@@ -72,17 +71,18 @@ def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
 def joint_edits(
     context: Context, rig: ArmatureObject, plan: plans.CharacterPlan
 ) -> dict[int, JointEdit]:
-    """The joints whose rest a user moved or turned in edit mode.
+    """The joints whose rest a user moved or rotated in edit mode.
+
+    The rest is compared with a newly built armature. Differences count only beyond the rounding of
+    a bone's direction in float32, because edit mode recomputes roll and tail.
 
     Args:
         context: a Blender context with a view layer.
         rig: deforming armature.
-        plan: CharacterPlan of its file.
+        plan: joints of the armature's DNA file.
 
     Returns:
-        Joint -> JointEdit. Compared with a new armature of the same plan, bit for bit. Edit mode
-        recomputes roll and tail, so a difference counts only beyond the rounding of a bone's
-        direction from float32 ends.
+        Joint index -> edit.
     """
     wanted = _fresh_rest(context, plan)
     names = bones_by_joint(rig)
@@ -120,7 +120,7 @@ def _relative(
 
 
 def _fresh_rest(context: Context, plan: plans.CharacterPlan) -> NDArray[np.float64]:
-    """Rest matrices of all joints as an import gives them, float64[J, 4, 4]."""
+    """float64[J, 4, 4]: rest matrices of all joints after an import."""
     made = []
     workshop = bpy.data.collections.new("rest")
     context.scene.collection.children.link(workshop)
@@ -133,11 +133,11 @@ def _fresh_rest(context: Context, plan: plans.CharacterPlan) -> NDArray[np.float
 
 
 def replace_joints(context: Context, change: Change) -> None:
-    """Give the armature the joints of the new file; bones are kept by the names of joints.
+    """Give the armature the joints of the new file; bones of joints with the same names are kept.
 
     Args:
         context: a Blender context with a view layer.
-        change: file_change.Change; its bone names are filled in.
+        change: the replacement; its bone names are filled in.
     """
     rig, old, new = change.rig, change.old.armature, change.new.armature
     if rig.data.users > 1:
@@ -183,10 +183,11 @@ def _new_rest(
     moved: Sequence[int],
     edited: Mapping[int, JointEdit],
 ) -> tuple[dict[int, NDArray[np.float64]], set[int]]:
-    """Rest matrices of the new joints with the user's edits, and the joints that must move."""
+    """Rest matrices of the new joints with the user's edits, and the joints whose bones must be
+    changed in edit mode."""
     back = {k: j for j, k in enumerate(moved) if k >= 0}
     rest, changed = {}, set()
-    bent = set()  # joints at or below an edited one: no longer where the file has them
+    bent = set()  # edited joints and their descendants, whose rest differs from the file
     for joint in new.order:
         parent = new.parents[joint]
         former = back.get(joint)
@@ -220,7 +221,7 @@ def _edit(
     rest: Mapping[int, NDArray[np.float64]],
     changed: Collection[int],
 ) -> list[str]:
-    """Do it in edit mode. Returns the bone name of each new joint."""
+    """Remove, add and move bones in edit mode. Returns: the bone name of each new joint."""
     old, new = change.old.armature, change.new.armature
     follow = _followers(edit_bones, kept, gone)
     for name in gone:
@@ -237,7 +238,7 @@ def _edit(
         bone.use_connect = False
         length = new.lengths[joint]
         if not fresh and abs(bone.length - old.lengths[back[joint]]) > 1e-4 * bone.length:
-            length = bone.length  # the user's
+            length = bone.length  # keep a length that the user edited
         bone.head, bone.tail, bone.roll = (0, 0, 0), (0, length, 0), 0.0
         bone.matrix = Matrix(rest[joint].tolist())
         parent = new.parents[joint]
@@ -254,8 +255,8 @@ def _edit(
 def _followers(
     edit_bones: bpy.types.ArmatureEditBones, kept: Mapping[int, str], gone: Collection[str]
 ) -> list[tuple[str, str | None, Matrix | None]]:
-    """Bones of the user's own: (name, bone to be hung under or None, place under it), so that
-    they go where their joints go; parents first."""
+    """The user's own bones, parents first: (name, new parent or None to keep it, matrix relative to
+    the parent), so that they follow their joints."""
     ours = set(kept.values()) | set(gone)
     found = []
     for bone in edit_bones:
@@ -275,7 +276,7 @@ def _depth(bone: bpy.types.EditBone) -> int:
 
 
 def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> None:
-    """Store the new joint indices on the bones, also on the user's copies of bones."""
+    """Store the new joint indices on the bones and on the user's copies of these bones."""
     by_name = {name: joint for joint, name in enumerate(names)}
     for bone in rig.data.bones:
         former = saved.whole(bone, parts.JOINT, -1, 0)
@@ -290,7 +291,7 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Set joints to rest that the new file no longer moves."""
+    """Set joints to rest that the evaluator moved with the old file but not with the new file."""
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]
@@ -299,10 +300,10 @@ def _release(change: Change, moved: Sequence[int]) -> None:
 
 
 def rename_groups(change: Change, item: MeshObject) -> None:
-    """Name the vertex groups of a separately built mesh after the bones of this rig.
+    """Name the vertex groups of a newly built mesh after the bones of the existing rig.
 
     Args:
-        change: the replacement, with the names of the bones of the new file's joints.
+        change: the replacement, with the bone names of the new joints.
         item: the mesh object.
     """
     labels = change.new.armature.labels
@@ -314,7 +315,7 @@ def rename_groups(change: Change, item: MeshObject) -> None:
 
 
 def replace_control_places(context: Context, change: Change) -> None:
-    """Move the bones of the control armature to the new face, unless the user moved them.
+    """Move the control bones to the positions for the new face, except bones that the user moved.
 
     Args:
         context: its scene is used to edit bones.

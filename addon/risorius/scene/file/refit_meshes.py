@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replacing meshes and shape keys of one file by another in the same objects and datablocks."""
+"""Replaces meshes and shape keys by those of a new file, in the same objects and datablocks."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class Shape:
     """Positions of a mesh object with the user's edits.
 
     Attributes:
-        points: float32[V, 3] the basis.
-        moved: float64[V, 3] the user's edit of the basis.
-        keys: key name -> float32[V, 3]; without unedited keys of Risorius.
+        points: float32[V, 3], the basis.
+        moved: float64[V, 3], offsets of the basis by the user's edit.
+        keys: key name -> float32[V, 3] positions; most unedited keys of Risorius are left out.
         relative: key name -> name of its relative key.
-        channels: name of a key of Risorius -> its old channel.
-        edits: name of an edited key of Risorius -> float64[V, 3].
-        own: the user's keys.
+        channels: name of a key of Risorius -> index of its channel in the old file.
+        edits: name of an edited key of Risorius -> float64[V, 3] offsets by the edit.
+        own: names of the user's own keys.
     """
 
     points: NDArray[np.float32]
@@ -57,11 +57,11 @@ def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> se
     """Move the new file's meshes into the existing objects.
 
     Args:
-        change: file_change.Change.
-        fresh_meshes: new mesh index -> its new object.
+        change: the replacement.
+        fresh_meshes: mesh index in the new file -> newly built object.
 
     Returns:
-        The new mesh indices with an existing object.
+        The mesh indices of the new file that an existing object shows.
     """
     moved = change.mesh_map()
     old_plans = {m.index: m for m in change.old.meshes}
@@ -97,11 +97,11 @@ def _faces_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32
 
 
 def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
-    """Whether a mesh has as many vertices as a plan, and the same faces.
+    """Whether a mesh has the number of vertices and the polygons of a plan.
 
     Args:
-        mesh: a Mesh.
-        plan: MeshPlan.
+        mesh: the mesh to check.
+        plan: the mesh in the DNA file.
     """
     corners, starts = _faces_of(mesh)
     return (
@@ -114,7 +114,7 @@ def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
 def _refit(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """One mesh: faces, weights, layers, then shapes."""
+    """Refit one mesh: polygons, weights and layers, then shape keys."""
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
     same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
@@ -139,28 +139,28 @@ def _refit(
 
 
 class _Nothing:
-    """There is no surface that anything could be carried from."""
+    """Transfer from a mesh without polygons: nothing is carried over."""
 
     def __init__(self, count: int) -> None:
         self._count = count
 
     def vertices(self, values: Values) -> Values:
-        """Zeros."""
+        """Zeros for each new vertex."""
         return np.zeros((self._count, *np.shape(values)[1:]))
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The same indices, without those beyond the number of vertices."""
+        """The indices, limited to the last vertex."""
         return [min(i, self._count - 1) for i in indices]
 
 
 def read_shape(live: runtime.Runtime, item: MeshObject, old: plans.MeshPlan, known: bool) -> Shape:
-    """The user's edits of the positions of a mesh, relative to the old file.
+    """Read the positions of a mesh and the user's edits relative to the old file.
 
     Args:
         live: Runtime of the old file.
         item: mesh object.
-        old: its MeshPlan in the old file.
-        known: whether its number of vertices equals the file.
+        old: the mesh in the old file.
+        known: whether the object's number of vertices equals the old file.
     """
     points = meshes.basis_of(item)
     shape = Shape(points, np.zeros(points.shape))
@@ -200,7 +200,7 @@ def _own_groups(change: Change, item: MeshObject) -> list[str]:
 def _things(
     change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
 ) -> list[str]:
-    """Names of the user's additions to a mesh."""
+    """Descriptions of the user's edits of a mesh and additions to it, for a report."""
     layers, lost = transfer.own_attributes(item.data)
     things = {
         "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),
@@ -221,7 +221,7 @@ def _things(
 def _back_up(
     change: Change, item: MeshObject, old: plans.MeshPlan, shape: Shape, known: bool
 ) -> None:
-    """Keep a copy of a mesh with the user's additions before it gets other polygons."""
+    """Keep a copy of a mesh with edits or additions by the user, before its polygons change."""
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
     if bound:
@@ -247,7 +247,7 @@ def _back_up(
 
 
 def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None:
-    """Remove a mesh that the new file lacks, unless it has additions of the user."""
+    """Remove a mesh that the new file lacks, or hide it if the user edited or extended it."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
     things = ["its unknown origin"]
@@ -283,7 +283,7 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
 def _refit_weights(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan
 ) -> None:
-    """The new file's weights, except at vertices where the user painted."""
+    """Write the new file's skin weights, except at vertices that the user painted."""
     before = skin_weights.file_pairs(old, change.old_bones)
     after = skin_weights.file_pairs(new, change.new_bones)
     if before == after:
@@ -309,7 +309,7 @@ def _refit_weights(
 
 
 def _masks(item: MeshObject) -> set[str]:
-    """Vertex groups that modifiers and keys use by their names."""
+    """Names of the vertex groups that modifiers and shape keys use."""
     used = {group for m in item.modifiers if (group := getattr(m, "vertex_group", ""))}
     key = item.data.shape_keys
     used.update(b.vertex_group for b in key.key_blocks if b.vertex_group) if key else None
@@ -319,7 +319,7 @@ def _masks(item: MeshObject) -> set[str]:
 def _refit_corners(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """UVs, normals and the materials' attributes, where the files differ."""
+    """Update UVs, normals and the materials' attributes if the old and the new file differ."""
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
     if new.uvs is not None and not _equal(old.uvs, new.uvs):
@@ -346,7 +346,7 @@ def _equal(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool
 
 
 def _copy_attributes(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
-    """The attributes that our materials read."""
+    """Copy the attributes that the add-on's materials read."""
     attributes: list[Attribute] = list(source.attributes)
     for theirs in [a for a in attributes if a.name.startswith(transfer.OUR_PREFIX)]:
         kind = (theirs.name, theirs.data_type, theirs.domain)
@@ -365,7 +365,7 @@ def _rebuild(
     surface: transfer.OldSurface,
     bearer: transfer.Carry,
 ) -> None:
-    """Exchange the faces inside the datablock: keys, drivers and pointers to it stay."""
+    """Replace the polygons inside the mesh datablock, so that keys, drivers and pointers stay."""
     mesh = item.data
     own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
     count = len(mesh.vertices)
@@ -375,7 +375,7 @@ def _rebuild(
         edit.from_mesh(fresh.data, use_shape_key=False)
         deform = edit.verts.layers.deform.active
         if deform is not None:
-            edit.verts.layers.deform.remove(deform)  # its numbers are of other groups
+            edit.verts.layers.deform.remove(deform)  # its indices refer to groups of another object
         edit.to_mesh(mesh)
     finally:
         edit.free()
@@ -400,7 +400,7 @@ def _rebuild(
 def _refit_shape(
     change: Change, item: MeshObject, shape: Shape, new: plans.MeshPlan, bearer: transfer.Carry
 ) -> None:
-    """Set the new neutral mesh with the user's edits, and every key on top of it."""
+    """Set the new neutral mesh with the user's edits, and all shape keys relative to it."""
     channel_map = change.channel_map()
     dna_mesh = change.after.dna.meshes[new.index]
     deltas = meshes.deltas_by_channel(dna_mesh, change.after.space.delta_matrix)
@@ -437,11 +437,11 @@ def _points(
     channel_map: Sequence[int],
     bearer: transfer.Carry,
 ) -> NDArray[np.float32] | None:
-    """New coordinates of a key, its relative key's first; kept in `done`."""
+    """New coordinates of a key, after its relative key's; both are stored in `done`."""
     if name in done:
         return done[name]
     above = shape.relative[name]
-    done[name] = None  # a circle of relative keys ends here
+    done[name] = None  # stops the recursion if relative keys form a circle
     base = _points(above, shape, done, deltas, channel_map, bearer)
     if base is None:
         base = next(p for p in done.values() if p is not None)
@@ -465,7 +465,8 @@ def _drop_gone_keys(
     channel_map: Sequence[int],
     deltas: Mapping[int, meshes.Deltas],
 ) -> None:
-    """Our keys of channels that are gone: away, or the user's from now on if edited."""
+    """Remove keys of Risorius whose channel is missing in the new file. Keys that are edited,
+    masked or needed by the user's keys stay as the user's own keys."""
     key = parts.keys_there(item)
     needed = {above for name, above in shape.relative.items() if name in shape.own}
     for name, channel in shape.channels.items():
@@ -489,7 +490,7 @@ def _drop_gone_keys(
 
 
 def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
-    """Lists of channels that a Key keeps."""
+    """Convert the channel indices in the custom properties of a Key to the new file."""
 
     def there(channel: int) -> int:
         return channel_map[channel] if channel < len(channel_map) else -1
@@ -510,7 +511,7 @@ def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
 
 
 def finish_shapes(change: Change) -> None:
-    """Make the keys that are new, or the channel sum, once all drivers are in their places."""
+    """Set the shape mode of all meshes, which adds new keys; drivers must be updated before."""
     live = runtime.there(change.rig)
     labels = build.channel_labels(live.dna)
     there = parts.meshes_of(change.rig)

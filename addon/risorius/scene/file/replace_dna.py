@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replace a character's file by another one in the same objects.
+"""Replaces a character's DNA file and keeps its objects.
 
-The new character is built beside the old one first, so that a bad file changes nothing. Then its
-data move into the existing objects, meshes, keys and bones. References to them stay, and so do all
-additions of the user.
+The new character is built as separate objects first, so that a bad file changes nothing. Then its
+data move into the existing objects, meshes, keys and bones. References to these and the user's
+additions stay.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .file_change import Change
 
 
 class ReplaceError(FaceError):
-    """A character that cannot be replaced; the text is one sentence for users."""
+    """A character's file cannot be replaced; the text is one sentence for users."""
 
 
 def replace_file(
@@ -39,20 +39,20 @@ def replace_file(
     path: str | Path,
     progress: Callable[[float], object] = lambda _share: None,
 ) -> list[str]:
-    """Replace a character's file by a DNA file.
+    """Replace the DNA file of a character by another DNA file.
 
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
         path: of the DNA file; it may be the same file.
-        progress: called with 0..1.
+        progress: function that is called with the progress, 0 to 1.
 
     Returns:
         Sentences about new parts, removed parts, and the user's additions.
 
     Raises:
         ReplaceError: the character cannot be changed now.
-        DnaError, PlanError, SpaceError: the file is bad; nothing was changed.
+        DnaError, PlanError, SpaceError: the file cannot be used; nothing was changed.
     """
     _check(rig)
     with armatures.kept_selection(context):
@@ -102,7 +102,7 @@ def _options(rig: ArmatureObject, levels: tuple[int, ...], unit: float) -> build
 
 
 def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
-    """Move everything of the new character into the old one, and take the rest away."""
+    """Move the data of the new character into the old objects, and remove the new objects."""
     rig = change.rig
     ordinary.leave(rig)
     refit_joints.replace_joints(context, change)
@@ -166,22 +166,22 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
-    """Take over the stored file, its arrays, and the properties of the armatures."""
+    """Copy the stored DNA file, the array lengths and the armatures' properties to the old rig."""
     rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], storage.text_of(rig)
     label = former.name if former is not None else text.name
     parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
-    # The new character loses its pointer, or its removal would take the Text along.
+    # Delete the new character's pointer, because its removal would remove the Text too.
     del fresh[parts.DNA]
     used = [r.get(parts.DNA) for r in parts.rigs()]
     if former is not None and former not in used:
         bpy.data.texts.remove(former)
-        if used.count(text) == 1:  # a Text that others share keeps its name
+        if used.count(text) == 1:  # a shared Text keeps its name
             text.name = label
     for name in armatures.LIVE_PROPERTIES:
         if saved.length(rig, name) != saved.length(fresh, name):
-            rig.pop(name, None)  # an overridable array keeps its length
+            rig.pop(name, None)  # the length of an overridable array cannot change
             rig[name] = [0.0] * saved.length(fresh, name)
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
@@ -198,7 +198,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
 
 
 def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
-    """Let a mesh that is new in the file join the character."""
+    """Add a mesh that only the new file has to the character, unless the user deleted it before."""
     rig = change.rig
     label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
     was = {names.unique_labels(change.before.dna.mesh_names)[m.index] for m in change.old.meshes}
@@ -226,7 +226,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
 
 
 def _share_materials(change: Change, item: MeshObject) -> None:
-    """A new level of an existing part gets the material of that part."""
+    """Give a mesh of a new level of detail the materials of the same part's other level."""
     by_index = {m.index: m for m in change.new.meshes}
     base = by_index[item[parts.MESH]].base
     for other in parts.meshes_of(change.rig):
@@ -239,7 +239,7 @@ def _share_materials(change: Change, item: MeshObject) -> None:
 
 
 def _number_meshes(rig: ArmatureObject) -> None:
-    """The rig's pointers to its meshes, in the order of the file."""
+    """Rewrite the rig's pointers to its meshes in the order of the file."""
     there = sorted(parts.meshes_of(rig), key=lambda m: (m[parts.MESH], m.name))
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
         del rig[key]
@@ -285,14 +285,13 @@ def _renew_board(
     led: bool,
     places: Mapping[str, tuple[float, ...]],
 ) -> None:
-    """Build the face board of the new file's GUI controls; handles of the same names keep their
-    place.
+    """Build a face board for the new file; handles with the same names keep their location.
 
     Args:
         context: with a view layer.
         change: the replacement.
-        led: whether the board led before.
-        places: bone -> place of each handle before.
+        led: whether the board led before the replacement.
+        places: bone -> location of each handle before the replacement; empty without a board.
     """
     if not places or board.is_same(change.before, change.after):
         return
@@ -313,7 +312,7 @@ def _renew_board(
 
 
 def _keep_report(change: Change) -> None:
-    """The report as a Text, and on the console."""
+    """Write the report to a Text and to the console."""
     name = change.rig.name.removesuffix("_rig")
     if not change.report:
         return

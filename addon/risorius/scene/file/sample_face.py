@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Building a sample person beside Blender."""
+"""Builds a sample person in a thread."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..base.task import Task, telling
 
 
 class SampleTask(Task[bool]):
-    """Builds a person and writes the file with its textures; its result is True.
+    """Builds a person and writes the DNA file with its textures; the result is True.
 
     Attributes:
-        fetched: downloaded share of the data, 0 to 1; None while nothing is downloaded.
+        fetched: progress of the download, 0 to 1; None while nothing is downloaded.
     """
 
     fetched: float | None = None
@@ -24,9 +24,9 @@ def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
     """A task that builds a person.
 
     Args:
-        path: of the DNA file; its folder may contain the wheel of data.
-        person: a name of the package's PEOPLE.
-        offline: do not download.
+        path: of the new DNA file; its folder may contain the data package (.whl).
+        person: a key of the sample package's PEOPLE.
+        offline: True: do not download.
     """
     sample = native.sample_module()
 
@@ -59,11 +59,11 @@ def can_be_built(folder: Path) -> bool:
     """Whether a person can be built without a download.
 
     Args:
-        folder: folder that may contain the wheel of data.
+        folder: folder that may contain the data package (.whl).
     """
     return _data(folder) is not None or bool(native.sample_module().is_fetched())
 
 
 def _data(folder: Path) -> Path | None:
-    """The wheel of data in a folder, or None."""
+    """The path of the first .whl file (data package) in a folder, or None."""
     return next(iter(sorted(folder.glob("*.whl"))), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with shape keys of any make as what a joint rig is made from."""
+"""Reads meshes and shape keys of Blender objects, and makes a joint rig (DNA file) from them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Doubles = NDArray[np.float64]
 
 
 class HeadError(FaceError, ValueError):
-    """A mesh that no rig can be made of; the sentence says why."""
+    """No rig can be made from a mesh; the text gives the reason."""
 
 
 def usable_head(item: bpy.types.Object | None) -> bool:
-    """Whether an object is a mesh with shape keys, and no part of a face."""
+    """Whether an object is a mesh with a shape key besides the basis, and no part of a face."""
     if item is None or item.type != "MESH" or parts.rig_of(item) is not None:
         return False
     keys = cast(MeshObject, item).data.shape_keys
@@ -34,28 +34,28 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is a mesh with shape keys, else the first that is selected."""
+    """The active object if it is a usable head, else the first usable selected object, or None."""
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
 
 def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
-    """The head, and all other meshes that are selected.
+    """The head and all other selected meshes that are no part of a face.
 
     Args:
         context: has the selection.
-        head: of head_of.
+        head: result of head_of.
     """
     others = [item for item in context.selected_objects if item != head and is_plain(item)]
     return [head, *(cast(MeshObject, item) for item in others)]
 
 
 def relatives_of(context: Context, taken: Sequence[MeshObject]) -> list[MeshObject]:
-    """The visible meshes that have an armature or a parent in common with those that are taken.
+    """Other visible meshes that share an armature or a parent with the chosen meshes.
 
     Args:
-        context: has the view.
-        taken: of taken_with.
+        context: has the visible objects.
+        taken: the chosen meshes, from taken_with.
     """
     above = {owner for item in taken for owner in _owners(item)}
     return [
@@ -66,14 +66,14 @@ def relatives_of(context: Context, taken: Sequence[MeshObject]) -> list[MeshObje
 
 
 def is_plain(item: bpy.types.Object | None) -> bool:
-    """Whether an object is a mesh with faces, and no part of a face that was imported."""
+    """Whether an object is a mesh with polygons, and no part of an imported face."""
     if item is None or item.type != "MESH" or parts.rig_of(item) is not None:
         return False
     return bool(cast(MeshObject, item).data.polygons)
 
 
 def _owners(item: bpy.types.Object) -> set[bpy.types.Object]:
-    """What an object hangs on or is deformed by."""
+    """The parent of an object and the armatures that deform it."""
     found = {cast(bpy.types.ArmatureModifier, m).object for m in item.modifiers
              if m.type == "ARMATURE"}  # fmt: skip
     return {owner for owner in (*found, item.parent) if owner is not None}
@@ -88,25 +88,25 @@ def shapes_of(
 ) -> native.ShapeSet:
     """A head and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
 
-    Rotation and size of the objects count, the place of the head does not. A key is what it adds to
-    the key that it is relative to; muted ones are left out.
+    Rotation and scale of the objects are applied; the location of the head is the origin. A shape
+    is the difference of a key from its relative key. Muted keys are left out.
 
     Args:
-        context: the scene says what a unit is.
-        item: has shape keys, see usable_head.
+        context: its scene gives the unit.
+        item: mesh object of the head with shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
-        height_mm: of the face from the chin to the top; 0: as large as it is.
-        said: what the user said that keys are, as risorius.author.input.said.
+        height_mm: height from the chin to the top to which the head is scaled; 0: no scaling.
+        said: the user's assignment of keys to controls, see risorius.author.input.said.
 
     Raises:
         HeadError: the keys are not relative, or the mesh has no polygons.
         ShapeFileError: no key moves a vertex.
     """
     if not item.data.polygons:
-        raise HeadError(told("{name} has no faces.", name=item.name))
+        raise HeadError(told("{name} has no polygons.", name=item.name))
     heads, face = native.part("author.heads.parts"), native.part("author.input.shape_face")
     rows = [part_of(context, one, item) for one in (item, *others)]
-    # An object has the size that it has: a face that is made smaller would not fit its body.
+    # Keep the size by default, because a scaled face would not fit its body.
     size = {"height_mm": height_mm} if height_mm else {"scale": 1.0}
     wishes = heads.Wishes(rather=item.name, **size)
     join = native.part("author.heads.joining").join
@@ -115,26 +115,26 @@ def shapes_of(
 
 
 def turn_of(context: Context, item: bpy.types.Object) -> Doubles:
-    """float64[3, 3] from an object's own coordinates to centimetres with y up, x left, z the front.
+    """float64[3, 3]: from object space to centimetres with x left, y up, z to the front.
 
     Args:
-        context: the scene says what a unit is.
-        item: its rotation and size count.
+        context: its scene gives the unit.
+        item: object whose rotation and scale are included.
     """
     return np.asarray(_axes(context) @ np.array(item.matrix_world.to_3x3(), np.float64))
 
 
 def _axes(context: Context) -> Doubles:
-    """From Blender's x, y and z to the file's: Blender's x, z and -y, in centimetres."""
+    """float64[3, 3]: from Blender's axes and unit to the axes x, z, -y in centimetres."""
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     return axes * 100.0 * context.scene.unit_settings.scale_length
 
 
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """A mesh as its first key has it, without shapes; what a Mirror modifier adds is in it.
+    """A mesh at rest, without shapes, with its Mirror modifiers applied.
 
     Args:
-        context, item, head: as for part_of.
+        context, item, head: see part_of.
     """
     author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
     keys, whole = item.data.shape_keys, _mirrored(context, item)
@@ -152,7 +152,7 @@ def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native
 
 
 def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
-    """A new mesh with what Mirror modifiers add to one; None where there is none of them."""
+    """A new mesh with the Mirror modifiers of an object applied; None if it has none."""
     kinds = [modifier.type for modifier in item.modifiers if modifier.show_viewport]
     if "MIRROR" not in kinds:
         return None
@@ -168,12 +168,12 @@ def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
 
 
 def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """A mesh and its shape keys, in turn_of's space, seen from where the head is.
+    """A mesh and its shape keys in centimetres with y up, relative to the head's location.
 
     Args:
-        context: the scene says what a unit is.
-        item: the mesh.
-        head: the mesh that is the face.
+        context: its scene gives the unit.
+        item: the mesh object.
+        head: mesh object of the head, whose location is the origin.
 
     Raises:
         HeadError: the keys are not relative.
@@ -204,7 +204,8 @@ def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.Head
 
 
 def _polygons(mesh: bpy.types.Mesh) -> tuple[Doubles, list[list[int]], list[list[int]]]:
-    """Texture coordinates, and by polygon the vertices and the places in these coordinates."""
+    """float64[n, 2] unique UV coordinates; for each polygon its vertex indices, and its indices
+    into the UV coordinates."""
     vertices = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", vertices)
     starts = np.empty(len(mesh.polygons), np.int32)
@@ -221,11 +222,11 @@ def _polygons(mesh: bpy.types.Mesh) -> tuple[Doubles, list[list[int]], list[list
 
 
 class Rigged(NamedTuple):
-    """What became of a head.
+    """Result of making a joint rig.
 
     Attributes:
-        rig: risorius.author.JointRig.
-        odd: a sentence each on what is odd about the head.
+        rig: the joint rig with its DNA.
+        odd: sentences about problems of the head's meshes and shapes.
     """
 
     rig: native.JointRig
@@ -233,14 +234,15 @@ class Rigged(NamedTuple):
 
 
 class RigWishes(NamedTuple):
-    """What a joint rig is to be.
+    """Options of a joint rig.
 
     Attributes:
-        path: of the DNA file.
-        joints: new ones.
-        levels: of detail.
-        tolerance_mm: blend shapes keep what joints leave beyond it; None: a share of the height.
-        keep: whether there are blend shapes; False: joints alone.
+        path: path of the DNA file to write.
+        joints: number of new joints.
+        levels: number of levels of detail.
+        tolerance_mm: largest error of joints alone; blend shapes correct larger errors. None: a
+            fraction of the head's height.
+        keep: True: add corrective blend shapes; False: joints only.
     """
 
     path: str
@@ -255,12 +257,12 @@ def rig_task(
     wishes: RigWishes,
     said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[Rigged]:
-    """The making of a joint rig, which ends with the file; a cancelled one leaves none.
+    """A task that makes a joint rig and writes its DNA file; if cancelled, it writes no file.
 
     Args:
-        shapes: as shapes_of gives them.
-        wishes: what it is to be.
-        said: what the user said that keys are, as risorius.author.input.said.
+        shapes: the head and its shapes, from shapes_of.
+        wishes: options of the rig.
+        said: the user's assignment of keys to controls, see risorius.author.input.said.
     """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
@@ -276,11 +278,12 @@ def make_rig(
     progress: Callable[[float], None],
     cancelled: Callable[[], bool],
 ) -> Rigged:
-    """Make a joint rig and write it. It uses nothing of Blender's.
+    """Make a joint rig and write its DNA file and expressions, without using Blender data.
 
     Args:
-        shapes, wishes, said: as for rig_task.
-        progress, cancelled: of a task's work; a cancelled one writes no file.
+        shapes, wishes, said: see rig_task.
+        progress: function that is called with the progress, 0 to 1.
+        cancelled: function that returns whether to stop; then no file is written.
     """
     face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
     library = native.part("author.input.library")
@@ -301,13 +304,13 @@ def make_rig(
 def joint_rig(
     dna: native.Dna, wishes: RigWishes, kept: Sequence[str], progress: Callable[[float], bool]
 ) -> native.JointRig:
-    """Joints for a face of blend shapes.
+    """Make a joint rig from a face of blend shapes.
 
     Args:
-        dna: the face.
-        wishes: what the rig is to be.
-        kept: beginnings of the names of meshes that stay as they hang.
-        progress: takes the share that is done; False ends the work.
+        dna: the face with blend shapes.
+        wishes: options of the rig.
+        kept: parts of the names of meshes that keep their weights and blend shapes, see RigOptions.
+        progress: function that is called with the progress, 0 to 1; it returns False to cancel.
     """
     author = native.part("author")
     options = author.RigOptions(
@@ -324,11 +327,11 @@ def joint_rig(
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
     """Give the meshes of LOD 0 the materials of the objects that the face was made from.
 
-    Both have the same polygons in the same order.
+    Both must have the same polygons in the same order.
 
     Args:
-        meshes: of the face.
-        shapes: what it was made from, of shapes_of.
+        meshes: mesh objects of the new face.
+        shapes: the result of shapes_of from which the face was made.
     """
     for number, part in enumerate(shapes.parts):
         item = bpy.data.objects.get(part.source)
@@ -343,7 +346,7 @@ def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> Non
         count = len(made.data.polygons)
         if not source.materials or not len(index) or count % len(index):
             continue
-        index = np.tile(index, count // len(index))  # what a Mirror modifier adds
+        index = np.tile(index, count // len(index))  # repeat for polygons of a Mirror modifier
         made.data.materials.clear()
         for material in source.materials:
             made.data.materials.append(material)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's additions to a mesh, transferred to another topology by nearest points of the
-surface."""
+"""Transfers the user's layers of a mesh to another topology by nearest points of the surface."""
 
 from __future__ import annotations
 
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 from ...logic.character import user_edits
 from ..base.blender_types import Attribute, Values
 
-# Attributes that a build makes itself, and Blender's own.
+# Attributes of the import or of Blender, which are not the user's.
 _OURS = {"position", "UVMap", "custom_normal", "material_index"}
 _SHADING = {"sharp_edge", "sharp_face"}
-OUR_PREFIX = "risorius_"  # of attributes that materials read
+OUR_PREFIX = "risorius_"  # prefix of attributes that the add-on's materials read
 _FIELDS = {
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -30,36 +29,36 @@ _FIELDS = {
 
 
 class Carry(Protocol):
-    """How values move from the old vertices to the new ones."""
+    """Converts values of old vertices to values of new vertices."""
 
     def vertices(self, values: Values) -> Values:
-        """Values per old vertex to values per new vertex."""
+        """Values [V, ...] of old vertices converted to values [W, ...] of new vertices."""
         ...
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The new vertices nearest to old ones."""
+        """The new vertex nearest to each old vertex."""
         ...
 
 
 class SameVertices:
-    """Vertex i stays vertex i."""
+    """Transfer between meshes with equal vertex order: vertex i stays vertex i."""
 
     def vertices(self, values: Values) -> Values:
-        """Values per vertex, [V, ...]."""
+        """The values, unchanged."""
         return values
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The vertices that take the place of these."""
+        """The indices, unchanged."""
         return indices
 
 
 class Nearest:
-    """Weights of the old surface's vertices for each new vertex.
+    """Transfer from the nearest point of the old surface to each new vertex.
 
     Args:
-        old: float64[V, 3] old neutral vertices.
-        triangles: int[T, 3] vertices of the old mesh's triangles.
-        new: float64[W, 3] new neutral vertices.
+        old: float64[V, 3], old neutral vertices.
+        triangles: int[T, 3], vertex indices of the old mesh's triangles.
+        new: float64[W, 3], new neutral vertices.
     """
 
     def __init__(
@@ -70,13 +69,13 @@ class Nearest:
         self._corners, self._weights = triangles[where], weights
 
     def vertices(self, values: Values) -> Values:
-        """Values per old vertex to values per new vertex, float64[W, ...]."""
+        """Values [V, ...] of old vertices interpolated at the new vertices, float64[W, ...]."""
         values = np.asarray(values, np.float64)
         shape = (len(self._weights), 3) + (1,) * (values.ndim - 1)
         return np.sum(values[self._corners] * self._weights.reshape(shape), axis=1)
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The new vertices nearest to old ones."""
+        """The new vertex nearest to each old vertex; negative indices stay."""
         return [
             int(np.argmin(np.sum((self._new - self._old[i]) ** 2, axis=1))) if i >= 0 else i
             for i in indices
@@ -89,12 +88,13 @@ def nearest_triangles(
     """The nearest triangle of each query point.
 
     Args:
-        points: float64[V, 3] of a mesh.
-        triangles: int32[T, 3] indices of points.
-        queries: float64[n, 3] in the same space.
+        points: float64[V, 3], vertices of a mesh.
+        triangles: int32[T, 3], indices of points.
+        queries: float64[n, 3], points in the same space.
 
     Returns:
-        int64[n] triangles, and float64[n, 3] barycentric weights of the nearest points on them.
+        int64[n] indices of triangles, and float64[n, 3] barycentric weights of the nearest points
+        on them.
     """
     tree: Any = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
     found = [tree.find_nearest(query) for query in queries.tolist()]
@@ -106,7 +106,7 @@ def nearest_triangles(
 def triangles_of(
     mesh: bpy.types.Mesh,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Triangles of a mesh: vertices int[T, 3], corners int[T, 3], face int[T]."""
+    """Triangles of a mesh: vertices int32[T, 3], corners int32[T, 3], polygon int32[T]."""
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     result = []
@@ -118,8 +118,8 @@ def triangles_of(
 
 
 def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Values]], list[str]]:
-    """The user's layers of a mesh: (name, type, domain, values) of transferable layers, and the
-    names of others."""
+    """The user's attributes of a mesh: (name, type, domain, values) of transferable ones, and the
+    names of all others."""
     kept, other = [], []
     attributes: list[Attribute] = list(mesh.attributes)
     for layer in attributes:
@@ -137,11 +137,11 @@ def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Valu
 
 
 class OldSurface:
-    """The data of a mesh that are needed after its polygons are replaced.
+    """The data of a mesh that are transferred to its new polygons.
 
     Args:
         mesh: the unchanged Mesh.
-        points: float32[V, 3] its neutral vertices.
+        points: float32[V, 3], neutral vertices of the mesh.
     """
 
     def __init__(self, mesh: bpy.types.Mesh, points: NDArray[np.float32]) -> None:
@@ -157,16 +157,16 @@ class OldSurface:
 
     @property
     def usable(self) -> bool:
-        """Whether there is a surface to be near to."""
+        """Whether the mesh has triangles, so that a nearest point exists."""
         return len(self.triangles) > 0
 
     def give(self, mesh: bpy.types.Mesh, points: NDArray[np.float32], carry: Carry) -> None:
-        """Put the user's layers and the faces' materials onto the new faces.
+        """Transfer the user's layers and the polygons' materials to the new polygons.
 
         Args:
-            mesh: the Mesh with its new faces.
-            points: float32[W, 3] its neutral vertices.
-            carry: SameVertices or Nearest.
+            mesh: the Mesh with its new polygons.
+            points: float32[W, 3], new neutral vertices.
+            carry: converts values of vertices, SameVertices or Nearest.
         """
         if not self.usable or not len(mesh.polygons):
             return
@@ -190,7 +190,7 @@ class OldSurface:
                 where, _ = nearest_triangles(self.points, self.triangles, middle)
                 given = values[self.faces[where]]
             else:
-                if spots is None:  # a little inside its face, so that seams stay seams
+                if spots is None:  # slightly inside the polygon, so that seams stay sharp
                     inside = places[corner] * 0.98 + middle[face] * 0.02
                     spots = nearest_triangles(self.points, self.triangles, inside)
                 given = np.sum(values[self.corners[spots[0]]] * spots[1][..., None], axis=1)

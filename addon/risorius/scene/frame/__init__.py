@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One frame: controls in, pose out, written to the scene."""
+"""Evaluates faces at each frame: reads controls, computes the pose, writes it to the scene."""

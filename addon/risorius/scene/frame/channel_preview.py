@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A channel's test override: one blend shape set by hand until the next change.
+"""Test override of a channel: the user sets the weight of one blend shape until the next change.
 
-The deforming armature stores it with the frame and the values of the controls at that time. If
-either differs, the test is over, so that no frame depends on a forgotten test. Saving, rendering
-and loading end it too.
+The deforming armature stores the override with the frame and a hash of the raw controls. If either
+changes, the override ends, so that no frame depends on a forgotten test. Saving and rendering end
+it too.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..base import last_written, parts, saved
 from ..base.blender_types import ArmatureObject
 
-_MOST = 1000.0  # a weight beyond it is nobody's test
+_MOST = 1000.0  # largest absolute weight of an override
 
 
 def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
@@ -26,7 +26,7 @@ def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
     Args:
         rig: deforming armature.
         channel: index of the channel.
-        value: its weight.
+        value: weight of the channel.
     """
     rig[parts.TEST] = {"channel": int(channel), "value": float(value), "under": ""}
 
@@ -40,7 +40,7 @@ def clear(rig: ArmatureObject) -> bool:
 
 
 def clear_all() -> bool:
-    """End the overrides of all characters and bring the faces up without them."""
+    """End the overrides of all characters, and tag the controls. Returns: whether any ended."""
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
         last_written.forget()
@@ -51,12 +51,12 @@ def clear_all() -> bool:
 
 
 def current(rig: ArmatureObject | None) -> tuple[int, float] | None:
-    """The override: (channel, value), or None."""
+    """The override of a character: (channel, weight), or None."""
     return _kept(rig)[0] if rig is not None and parts.TEST in rig else None
 
 
 def _kept(rig: ArmatureObject) -> tuple[tuple[int, float] | None, str]:
-    """The stored override of a character, and the state in which it was set."""
+    """The stored override (channel, weight) or None, and the stored text of frame and controls."""
     kept = saved.table(rig, parts.TEST) or {}
     channel = saved.whole(kept, "channel", -1, 0)
     test = (channel, saved.number(kept, "value", 0.0, -_MOST, _MOST)) if channel >= 0 else None
@@ -74,7 +74,7 @@ def override(
         scene: the evaluated scene.
 
     Returns:
-        (channel, value), or None.
+        (channel, weight), or None.
     """
     if parts.TEST not in rig:
         return None

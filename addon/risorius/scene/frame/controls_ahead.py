@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The controls of a frame before Blender evaluates it.
+"""Evaluates the control armatures of a frame before Blender evaluates the frame.
 
-Blender evaluates a frame in one go, simulations too, and calls its handlers afterwards: values
-    written by handlers come too late for cloth and hair. So Risorius evaluates the control
-    armatures first in a separate graph, and the face has its pose when the frame begins.
+Blender evaluates a frame with its simulations, and calls handlers afterwards. Values that handlers
+write are too late for cloth and hair. So Risorius evaluates the control armatures first in a
+separate graph, and the face has its pose when the frame begins.
 
-The scene of that graph is in no file, see `stage`.
+The scene of that graph belongs to no file, see `stage`.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from . import lateness
 
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
-# Scene -> its stage.
+# Session uid of the user's scene -> temporary scene with its controls.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# Whether the file was edited since the last frame, and whether it has a simulation.
+# Whether the file was edited since the last frame; whether the file has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
-# Session uids of scenes, since the last load or undo.
+# Session uids of scenes that Blender evaluated since the last load, undo or redo.
 _evaluated_scenes: set[int] = session.keep("controls_ahead.evaluated_scenes", set, ("free",))
-_LOCK = threading.Lock()  # a render works beside the interface
+_LOCK = threading.Lock()  # a render evaluates frames in another thread than the interface
 
 
 def is_edited() -> bool:
     """Whether the file may have been edited since the last frame.
 
-    Without an interface scripts edit and step without an update between.
+    Always True in background mode, because scripts may edit without an update that would notify.
     """
     return _edited.now or bpy.app.background
 
 
 def is_needed() -> bool:
-    """Whether anything reads the faces before handlers run after the frame.
+    """Whether a simulation or a foreign handler needs the faces before the add-on's handlers run.
 
-    Otherwise the curves would be evaluated twice for nothing. The first frame after an edit always
-    counts, because edited objects may read a face.
+    If not, the evaluation ahead would only cost time. It is also needed at the first frame after an
+    edit, because edited objects may read a face.
     """
     if is_edited():
         _simulated.now = caches.any_simulates()
@@ -59,16 +59,16 @@ def is_needed() -> bool:
 
 
 def note_evaluated(scene: bpy.types.Scene) -> None:
-    """A scene of the user's was evaluated. Args: scene  the original."""
+    """Note that Blender evaluated a scene. Args: scene  the original scene."""
     _evaluated_scenes.add(scene.session_uid)
 
 
 def is_safe(user: bpy.types.Scene) -> bool:
-    """Whether a graph may be built before a frame of a scene.
+    """Whether the separate graph may be built before a frame of a scene.
 
-    Blender then rebuilds the graph of the scene. Blender 4.2 and 4.3 crash if this graph was built
-    and never evaluated, such as after switching a window to the scene. Then the first frame is
-    updated afterwards. Reading such a graph crashes too.
+    Building it makes Blender rebuild the graph of the scene. Blender 4.2 and 4.3 crash if the
+    latter was never evaluated, such as after switching a window to the scene. If this is False, the
+    faces are updated after the frame.
 
     Args:
         user: the scene to be evaluated.
@@ -80,12 +80,12 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
     """Evaluate the controls of faces at the time of a scene.
 
     Args:
-        user: the scene to be evaluated.
+        user: the scene that Blender is about to evaluate.
         faces: faces of the scene.
 
     Returns:
-        The graph, and the faces whose controls can be read in it: without faces whose controls
-            depend on a face, which is not evaluated yet. Empty if another thread uses the graph.
+        The graph, and the faces whose controls can be read in it. Faces whose controls depend on a
+        face are left out. (None, []) if another thread uses the graph.
     """
     if not _LOCK.acquire(blocking=False):
         return None, []
@@ -95,8 +95,8 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
         if graph is None or not _faces_in(graph, known, whole=_edited.now):
             _edited.now = False
             return graph, known
-        # Either Blender rebuilt the graph and added the whole faces, or an object of the graph
-        # depends on a face.
+        # The graph contains a face: either Blender rebuilt the graph while controls pointed to
+        # their faces, or an object of the graph depends on a face. Rebuild it to find out.
         _close()
         graph = _evaluated(user, known)
         if _faces_in(graph, known, whole=True):
@@ -117,10 +117,10 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
 
     Args:
         user: a scene with the face.
-        rig, controls: its armatures.
+        rig, controls: deforming and control armature of the face.
 
     Returns:
-        The reason why it cannot be baked, in one sentence; empty if it can.
+        The reason why the face cannot be baked, in one sentence; "" if it can.
     """
     lateness.forget(rig)
     with _LOCK:
@@ -141,7 +141,7 @@ def note_edit() -> None:
 
 @session.at("free")
 def close() -> None:
-    """Release the scene and its graph before undo and load, which free their data."""
+    """Release the temporary scenes and graphs before undo and load, which free their data."""
     with _LOCK:
         _close()
 
@@ -165,7 +165,7 @@ def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
 
 
 def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
-    """Whether the inputs of a face depend on one of several faces or on itself."""
+    """Whether the inputs of a face depend on a face of `others`, which includes the face itself."""
     made = stage.Stage(_roots([face]))
     try:
         with stage.alone(c for _rig, c in others):
@@ -175,7 +175,7 @@ def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
 
 
 def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
-    """The control armatures, and the bodies: only rotating bones of a body are read."""
+    """The objects to evaluate: control armatures, and the bodies to which faces are attached."""
     found: dict[bpy.types.Object, None] = {}
     for _rig, controls in faces:
         hold = rig_placement.body_of(controls)
@@ -186,7 +186,7 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 
 
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
-    """Whether a graph has a face. Args: whole  look for its meshes, too."""
+    """Whether a graph contains the rig of any face. Args: whole  True: or any mesh of a face."""
     return any(
         item.evaluated_get(graph).is_evaluated
         for rig, _controls in faces

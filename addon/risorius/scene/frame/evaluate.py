@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Controls -> pose -> scene. Every frame is a function of the controls at that frame alone.
+"""Evaluates faces: reads controls, computes the pose, and writes it to the scene.
 
-Values are read from the evaluated objects of the depsgraph that is passed in (the originals
-are stale while an animation renders) and written to the originals, in bulk.
+The result of a frame depends only on the controls at that frame. Values are read from evaluated
+objects, because the originals are outdated while an animation renders, and written to the
+originals.
 """
 
 from __future__ import annotations
@@ -27,22 +28,25 @@ from ..skinning import bone_writer, conditions, direct, live_keys
 from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
-# Deforming armature -> work done before this frame.
+# Session uid of a deforming armature -> work done before this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
-# Finished positions of several faces that are written together; None: at once.
+# Final positions of several faces, to be written together; None: write them immediately.
 _gathered = session.value(
     "evaluate.gathered", cast("list[direct.Job] | None", None), ("unregister",)
 )
-# Deforming armature -> inputs of its face when the file was opened.
+# Session uid of a deforming armature -> inputs of its face when the file was opened.
 _opened: dict[int, tuple[object, ...]] = session.table("evaluate.opened", ("load",))
 
 
 class Moment(Enum):
     """The moment of an update of a character.
 
-    UPDATE: after Blender evaluated the inputs. ANEW: the same, and unchanged values are written
-        too. FRAME: before Blender evaluates a frame. RENDER: before a rendered frame. LOAD: after
-        opening a file, whose faces keep their saved state until they move.
+    Attributes:
+        UPDATE: after Blender evaluated the inputs.
+        ANEW: like UPDATE, but unchanged values are written too.
+        FRAME: before Blender evaluates a frame.
+        RENDER: before Blender evaluates a rendered frame.
+        LOAD: after opening a file; faces keep their saved state until they move.
     """
 
     UPDATE = auto()
@@ -60,7 +64,7 @@ class _Ahead:
     """The work done for a character before its frame.
 
     Attributes:
-        glance: see _glance; None if it is incomplete.
+        glance: result of _glance; None if other inputs move the face too.
         wrote: whether anything was written.
         rendering: whether the frame is rendered.
     """
@@ -72,12 +76,12 @@ class _Ahead:
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """Context manager: no frame and no update evaluates faces meanwhile."""
+    """Context manager: frames and updates do not evaluate faces."""
     _pauses.now += 1
     try:
         yield
     finally:
-        _pauses.now = max(0, _pauses.now - 1)  # the add-on may have gone meanwhile
+        _pauses.now = max(0, _pauses.now - 1)  # disabling the add-on resets the count
 
 
 def is_paused() -> bool:
@@ -85,11 +89,11 @@ def is_paused() -> bool:
 
 
 def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
-    """Bring every character of this file up to its controls.
+    """Evaluate all characters of this file and write their poses.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
-        moment: Moment.
+        moment: the moment of the update.
     """
     if native.problem() or is_paused():
         return
@@ -99,20 +103,20 @@ def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
 
 
 def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
-    """Bring the characters of a scene up to a frame that Blender is about to evaluate.
+    """Evaluate the characters of a scene before Blender evaluates the frame.
 
     Args:
-        scene: at its new time.
+        scene: the scene, with its new frame set.
         rendering: whether the frame is rendered.
     """
     if native.problem() or is_paused():
         return
-    # Constraints on joints have to see the turns of this frame before the joints are read.
+    # If rotations are read from joints, their constraints need the rotations of this frame first.
     read = _look_at_joints(controls_ahead.is_edited())
     if not controls_ahead.is_needed() and not read:
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
-    members = set(scene.objects)  # users_scene would list them once for each face
+    members = set(scene.objects)  # read once; users_scene would search all scenes for each face
     faces = [(r, c) for r, c in found if c in members]
     if not faces or not controls_ahead.is_safe(scene):
         return
@@ -129,8 +133,10 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
 
 
 def _look_at_joints(edited: bool) -> bool:
-    """Read the rotations of joints of all faces once a frame. Returns: whether any comes from its
-    bone."""
+    """Update the Reading of all faces once per frame.
+
+    Returns: whether a joint rotation of any face is read from its bone.
+    """
     found = False
     for rig in parts.rigs():
         live = runtime.of(rig) if parts.BAKED not in rig else None
@@ -143,7 +149,8 @@ def _look_at_joints(edited: bool) -> bool:
 
 
 def after_frame(depsgraph: Depsgraph) -> None:
-    """Evaluate the faces that could not be evaluated before the frame, and count them.
+    """Evaluate the faces that were not, or not correctly, evaluated before the frame, and count
+    late ones.
 
     Args:
         depsgraph: the evaluated graph.
@@ -158,7 +165,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
                 continue
             was = last_written.inputs.get(rig.session_uid)
             if again:
-                # Other animation of its bones came over ours.
+                # Animation of the rig's bones has overwritten the pose of the evaluator.
                 last_written.inputs.pop(rig.session_uid, None)
             if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
                 now = last_written.inputs.get(rig.session_uid)
@@ -167,7 +174,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """The inputs of a simple character, for comparison only. Args: seen its controls."""
+    """The inputs of a simple character, for comparison. Args: seen  evaluated control armature."""
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
@@ -178,14 +185,17 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
 
 
 def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
-    """Whether its control armature alone moves a character. Args: seen  that, evaluated."""
+    """Whether only the control armature moves a character, without layers, body or other inputs.
+
+    Args: seen  the evaluated control armature.
+    """
     more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(seen.original)
     more = more or joint_readings.reads(rig)
     return not more and not rig_placement.body_of(seen.original) and parts.FACE in seen.pose.bones
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
-    """Whether a character's controls are the same before and after the frame."""
+    """Whether a character's controls are equal before and after the evaluation of the frame."""
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:
         return False
@@ -196,16 +206,16 @@ def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bo
 
 
 def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> bool:
-    """Bring one character up to its controls.
+    """Evaluate one character and write its pose.
 
     Args:
-        rig: its deforming armature, the original.
-        depsgraph: the evaluated dependency graph to read from; before a frame it has the controls
-            alone.
-        moment: Moment.
+        rig: the original (not evaluated) deforming armature.
+        depsgraph: the evaluated dependency graph to read from; before a frame it contains only the
+            controls.
+        moment: the moment of the update.
 
     Returns:
-        Whether there was anything to write.
+        Whether a changed pose was written.
     """
     times = [perf_counter()]
     controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
@@ -214,9 +224,9 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         return False
     seen = controls.evaluated_get(depsgraph)
     if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
-        return False  # it is not in this scene
+        return False  # the character is not in this scene
     if parts.FACE not in seen.pose.bones:
-        return False  # renamed a moment ago, and not evaluated since
+        return False  # the bone was renamed and the copy not evaluated since
     raw, turns = inputs.read_inputs(seen, live, depsgraph, parts.maximum_of(controls))
     rig_placement.follow(rig, seen)
     lod = min(max(_lod(rig, seen, depsgraph, moment), 0), max(live.rig.lod_count - 1, 0))
@@ -241,7 +251,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
         last_written.note_refusal(rig, taken)
         if not taken:
-            return False  # channels and maps shall not move without the bones
+            return False  # channels and maps must not move without the bones
         rig.update_tag(refresh={"OBJECT"})
     values.write(rig, pose.animated_maps, pose.blend_shapes, live_keys.bears_simulation)
     times.append(perf_counter())
@@ -261,10 +271,13 @@ def _write_meshes(
     anew: bool,
     ahead: bool,
 ) -> None:
-    """Write the live keys of the meshes of a level. Args: see direct.prepare, live_keys.write."""
+    """Write the live keys of the meshes that a level of detail shows.
+
+    Args: see direct.prepare and live_keys.write.
+    """
     finished = []
     for item in parts.meshes_of(rig):
-        conditions.note_written(item)  # new maps of a material update all that wear it
+        conditions.note_written(item)  # new maps of a material tag all meshes with this material
         if not lods.shows(item, lod):
             continue
         if item.session_uid in plan.direct:
@@ -285,7 +298,7 @@ def _write_finished(job: direct.Job) -> None:
 
 @contextmanager
 def together() -> Iterator[None]:
-    """While this lasts finished positions are gathered; at its end all are written at once."""
+    """Context manager: collect final positions, and write all of them together at the end."""
     if _gathered.now is not None:
         yield
         return
@@ -308,12 +321,12 @@ def _plan(
     moment: Moment,
     rendering: bool,
 ) -> conditions.Plan:
-    """The Plan of showing a face now. Args: see evaluate; asked its inputs."""
-    if rendering:  # modes do not change in a render: Blender would build its graph anew
+    """The Plan (Direct or ordinary) of a face. Args: see evaluate; asked  inputs of the face."""
+    if rendering:  # a change of mode during a render would rebuild Blender's graph
         return conditions.known(rig) or conditions.ORDINARY
     if moment is Moment.LOAD:
         _opened[rig.session_uid] = asked
-    # The skin weights of a face are read when it moves, so that a file opens as fast as before.
+    # Read the skin weights of a face only when it moves, so that files open fast.
     if _opened.get(rig.session_uid) == asked and moment is not Moment.ANEW:
         return conditions.ORDINARY
     _opened.pop(rig.session_uid, None)
@@ -321,7 +334,7 @@ def _plan(
 
 
 def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment: Moment) -> int:
-    """The level of detail to show. Args: see evaluate; seen  its controls, evaluated."""
+    """The level of detail to show. Args: see evaluate; seen  the evaluated control armature."""
     if moment not in _BEFORE_FRAME:
         return lods.choose(rig, seen, depsgraph)
     last = last_written.inputs.get(rig.session_uid)
@@ -330,16 +343,16 @@ def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment
 
 
 def bring_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a change that an operator made: bring one character up and evaluate the scene.
+    """Show a change by an operator: evaluate one character and the scene.
 
     Args:
-        context: its view layer is evaluated, before and after.
+        context: its view layer is evaluated before and after.
         rig: deforming armature of the character.
     """
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), Moment.ANEW)
     context.view_layer.update()
-    # After an operator Blender 5.2 has nothing to evaluate and would not redraw views.
+    # Blender 5.2 does not redraw views after an operator without anything left to evaluate.
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -347,5 +360,5 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
 
 
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """Objects of an override character that Blender does not allow to be written."""
+    """Objects of a library override on which Blender ignored the last write."""
     return [item for item in (rig, *parts.meshes_of(rig)) if last_written.is_refused(item)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reasons why a face does not follow its controls, as sentences for the panel."""
+"""Finds reasons why a face does not follow its controls, as sentences for the panel."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from ..base import compat, parts, saved
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
-_LEANS = 1e-4  # cosine of the angle between two axes of a place from which it counts as sheared
+_LEANS = 1e-4  # largest cosine between two axes of a matrix that does not count as sheared
 
 
 def words(rig: ArmatureObject) -> Iterator[str]:
-    """Sentences about animation that leads instead of the controls. Args: rig deforming
-    armature."""
+    """Yields sentences about joint keys that override the controls, and about sheared controls.
+
+    Args:
+        rig: deforming armature.
+    """
     controls = parts.controls_of(rig)
     if controls is None or parts.BAKED in rig:
         return
@@ -36,7 +39,7 @@ def words(rig: ArmatureObject) -> Iterator[str]:
 
 
 def _has_joint_keys(rig: ArmatureObject) -> bool:
-    """Whether an action that plays moves joints that the evaluator owns; others are the user's."""
+    """Whether a played action of the rig moves joints that the evaluator writes."""
     live, played = runtime.of(rig), compat.played_actions(rig)
     if live is None or not played:
         return False
@@ -50,6 +53,6 @@ def _has_joint_keys(rig: ArmatureObject) -> bool:
 
 
 def _is_sheared(item: ArmatureObject) -> bool:
-    """Whether the axes of an object's place are not at right angles."""
+    """Whether the axes of an object's world matrix are not perpendicular."""
     x, y, z = (axis.normalized() for axis in item.matrix_world.to_3x3().transposed())
     return max(abs(x.dot(y)), abs(y.dot(z)), abs(z.dot(x))) > _LEANS

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs of a face: sliders and the bones of head, neck and eyes of the control armature."""
+"""Reads the inputs of a face: sliders, and control bones of head, neck, eyes and gaze target."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from . import joint_turns
 
 Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
 
-_STRAIGHT = Matrix.Identity(4)
-_AHEAD = Vector((0.0, -1.0, 0.0))
+_STRAIGHT = Matrix.Identity(4)  # matrix_basis of a bone at rest
+_AHEAD = Vector((0.0, -1.0, 0.0))  # direction in which a face looks
 
 
 def read_inputs(
@@ -28,17 +28,17 @@ def read_inputs(
     depsgraph: Depsgraph,
     maximum: float = 1.0,
 ) -> tuple[NDArray[np.float32], Turns]:
-    """Read the sliders and bones of an evaluated control armature, with its layers above them.
+    """Read the sliders and bones of an evaluated control armature, with its layers applied.
 
     Args:
         seen: the evaluated control armature object.
         live: the character's Runtime.
-        depsgraph: graph for reading a body's bones, if the face hangs on one.
-        maximum: upper limit of the look controls after adding the eye bones.
+        depsgraph: graph with the bones of the body to which the face may be attached.
+        maximum: upper limit of the sliders, and of look controls after adding the eye bones.
 
     Returns:
-        float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the armature's
-        axes, without rest rotations.
+        float32[R] raw controls, and rotations: "neck" and "head" -> Quaternion in the armature's
+        axes; bones at rest are left out.
     """
     raw, own = read_mixed(seen, live, depsgraph, maximum)
     return complete(seen, live, depsgraph, maximum, raw, own)
@@ -50,14 +50,14 @@ def read_mixed(
     depsgraph: Depsgraph,
     maximum: float = 1.0,
 ) -> tuple[NDArray[np.float32], layer_mixing.Bones]:
-    """Read the sliders and the control bones with the layers above them.
+    """Read the sliders and the control bones with the layers applied.
 
     Args:
         seen, live, depsgraph, maximum: see `read_inputs`.
 
     Returns:
-        float32[R], before the eye bones add to the look controls; and the rotations of the bones,
-        without the body's.
+        float32[R] raw controls, before the eye bones add to the look controls; and the rotations of
+        the control bones, before the rotations of the body are added.
     """
     bones = seen.pose.bones
     raw = read_leading(seen, live)
@@ -80,7 +80,7 @@ def seen_sliders(context: Context, rig: ArmatureObject) -> dict[str, float]:
     live, controls = runtime.there(rig), parts.controls_there(rig)
     if not layers.has_any(controls):
         return board.raw_now(rig)
-    controls.update_tag()  # a script may have set sliders that Blender has not heard of
+    controls.update_tag()  # a script may have set sliders without notifying Blender
     depsgraph = context.evaluated_depsgraph_get()
     seen = controls.evaluated_get(depsgraph)
     raw, _bones = read_mixed(seen, live, depsgraph, parts.maximum_of(controls))
@@ -102,18 +102,18 @@ def complete(
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
-        depsgraph: the evaluated graph that has the body too.
-        maximum: of the sliders.
+        depsgraph: an evaluated graph with the controls and the body.
+        maximum: largest value of the sliders.
         raw: float32[R], the sliders with their layers; the look controls and the controls of joint
             rotations are changed in place.
         own: rotations of the character's own control bones, with layers.
 
     Returns:
-        raw, and the rotations with the body's, as from `read_inputs`.
+        raw, and the rotations of neck and head including the body, see `read_inputs`.
     """
     turns = rig_placement.body_turns(seen.original, depsgraph)
     share = seen.risorius_body_turn
-    if share < 1.0:  # a turn that is left as it is stays the same to the bit
+    if share < 1.0:  # at 1 the rotation keeps its exact bits
         turns = {name: Quaternion().slerp(turn, share) for name, turn in turns.items()}
     for name in ("neck", "head"):
         turn = own.turns.get(name)
@@ -125,14 +125,14 @@ def complete(
 
 
 def read_leading(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
-    """Read the leading values of the face, from sliders or face board.
+    """Read the raw controls from the sliders, or from the face board if it leads.
 
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
 
     Returns:
-        float32[R].
+        float32[R], raw controls before layers.
     """
     if not board.leads(seen.original, live):
         return read_sliders(seen, live)
@@ -146,17 +146,17 @@ def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.floa
 
     Args:
         seen: the evaluated control armature.
-        live: the character's Runtime, for their names and order.
+        live: the character's Runtime, for the names and order of sliders.
 
     Returns:
-        float32[R].
+        float32[R], slider values.
     """
     values = dict(seen.pose.bones[parts.FACE].items())
     rests = live.rests
     found = [values.get(label, rests[i]) for i, label in enumerate(live.labels)]
     try:
         raw = np.array(found, np.float32)
-    except (TypeError, ValueError):  # words or a list: an edit makes the slider anew
+    except (TypeError, ValueError):  # a damaged slider with text or a list counts as 0
         raw = np.array([v if isinstance(v, int | float) else 0.0 for v in found], np.float32)
     if not np.isfinite(raw).all():
         np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
@@ -183,7 +183,7 @@ def _add_look(
     turns: Turns,
     own: layer_mixing.Bones,
 ) -> None:
-    """Add the rotations from eye bones and target to the look controls; the lids follow."""
+    """Add the rotations of eye bones and gaze target to the look controls, and move the lids."""
     bones = seen.pose.bones
     eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
     target = gaze.target_of(seen, live, turns, own.target)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joints that follow bones moved by their own neck poses.
+"""Detects joints whose constraints depend on the neck poses that the joints themselves drive.
 
 A constraint on the bone of a joint may depend, through any number of objects, on a bone or mesh
-that moves with the poses fired by the joint. Such a face has no consistent pose.
+that moves with the poses driven by this joint. Such a face has no consistent pose.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ..character import runtime
 
 _BONE = re.compile(r'^pose\.bones\["((?:[^"\\]|\\.)*)"\]')
 _ARRAYS = (f'["{parts.CHANNELS}"]', f'["{parts.MAPS}"]')
-_PER_JOINT = 9  # rows of a joint in the groups of joints
-Followed = tuple[bpy.types.ID, str]  # a datablock; the bone or the property of it, or ""
+_PER_JOINT = 9  # output rows of a joint in the joint groups
+Followed = tuple[bpy.types.ID, str]  # a datablock; name of its bone or property, or ""
 
 
 def words(cause: str) -> str:
-    """A sentence on a circle. Args: cause  from `cause`."""
+    """The sentence for the user about a circular dependency. Args: cause  text from `cause`."""
     return told(
         "{cause} is circular: it follows what the neck poses move. The neck poses follow the "
         "control bones instead.",
@@ -40,8 +40,8 @@ def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.type
     Args:
         rig: deforming armature.
         live: the character's Runtime.
-        joint: joint whose rotation is stored in raw controls.
-        bone: its bone.
+        joint: index of a joint whose rotation is stored in raw controls.
+        bone: bone of the joint.
     """
     moved = _moved_by_poses(live)
     if joint in moved:
@@ -59,7 +59,7 @@ def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.type
 
 
 def _moved_by_poses(live: runtime.Runtime) -> set[int]:
-    """The joints that poses of solvers and correctives move."""
+    """The joints that inputs beyond the raw controls (correctives, RBF poses) move."""
     found, raw = set[int](), len(live.dna.raw_control_names)
     for group in live.dna.joint_groups:
         columns = np.asarray(group.input_indices) >= raw
@@ -73,13 +73,13 @@ def _moved_by_poses(live: runtime.Runtime) -> set[int]:
 def _leads_to(
     rig: ArmatureObject, moved: set[str], followed: Followed, seen: set[Followed]
 ) -> bool:
-    """Whether an object or bone is moved by the neck poses or follows them.
+    """Whether the neck poses move an object or bone, directly or through dependencies.
 
     Args:
         rig: deforming armature of the face.
         moved: names of bones that the poses move; their children move too.
         followed: the object or bone to check.
-        seen: objects and bones already checked.
+        seen: objects and bones that were checked already; updated.
     """
     owner, name = followed
     if owner == rig and (name in _ARRAYS or _hangs_on(rig, name, moved)):
@@ -106,7 +106,7 @@ def _keys_of(rig: ArmatureObject) -> list[bpy.types.Key]:
 
 
 def _followed_by(owner: bpy.types.Object, bone: str) -> Iterator[Followed]:
-    """Objects and bones that an object, or one of its bones, follows directly."""
+    """Objects and bones on which an object, or the given bone of it, depends directly."""
     if owner.parent is not None:
         yield owner.parent, owner.parent_bone if owner.parent_type == "BONE" else ""
     for hold in owner.constraints:

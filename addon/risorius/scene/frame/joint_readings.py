@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The joints of neck and head that are turned by anything but the control bones.
+"""Finds joints of neck and head that constraints, keys or drivers rotate, not the control bones.
 
-Their rotations are read from the evaluated bones. This is checked once a frame and after edits.
+The rotations of these joints are read from their evaluated bones. The search runs once per frame
+and after edits.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ class Reading:
     """The sources of joint rotations of one face, valid until the file is edited.
 
     Attributes:
-        held: positions of bones whose joint rotation is stored in raw controls.
-        wiring: state that is compared to notice changes.
-        keyed: positions of bones of neck and head with keys or drivers on the deforming armature.
-            These lead, and the evaluator does not write them.
-        places: joint -> position of its bone, for rotations read from the bone.
-        circle: the reason why joints with constraints are not read; empty if all are.
-        is_fresh: whether the file is unedited since.
+        held: indices of pose bones whose joint rotation is stored in raw controls.
+        wiring: constraints, actions and drivers, compared to notice changes.
+        keyed: indices of pose bones of neck and head with keys or drivers on the deforming
+            armature, which lead; the evaluator does not write them.
+        places: joint index -> index of its pose bone, for rotations that are read from the bone.
+        circle: the reason why a joint with constraints is not read; "" if all are read.
+        is_fresh: whether the file was not edited since.
     """
 
     held: tuple[int, ...]
@@ -40,7 +41,7 @@ class Reading:
 
 
 def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
-    """The last Reading of a face.
+    """The Reading of a face, updated if the file was edited.
 
     Args:
         rig: deforming armature.
@@ -58,8 +59,8 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
     Args:
         rig: deforming armature.
         live: the character's Runtime.
-        edited: True: the file was edited since the last Reading. False: only settings of the face
-            itself are compared.
+        edited: True: the file was edited since the last Reading, so search again. False: search
+            again only if the wiring changed.
     """
     kept = last_written.readings.get(rig.session_uid)
     before = kept if isinstance(kept, Reading) else None
@@ -88,7 +89,7 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
 
 
 def reads(rig: ArmatureObject) -> bool:
-    """Whether rotations of a face are read from its bones. Args: rig  deforming armature."""
+    """Whether joint rotations of a face are read from its bones. Args: rig  deforming armature."""
     live = runtime.of(rig) if parts.BAKED not in rig else None
     return live is not None and bool(live.turning and of(rig, live).places)
 
@@ -101,7 +102,7 @@ def note_edit() -> None:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about circular joints; else empty.
+    """The sentence of the panel about circular joints; "" if there are none.
 
     Args:
         rig: deforming armature.
@@ -128,7 +129,7 @@ def _wiring(rig: ArmatureObject, held: tuple[int, ...]) -> tuple[object, ...]:
 
 
 def _keyed(rig: ArmatureObject, writer: bone_writer.Writer) -> frozenset[int]:
-    """Positions of bones of neck and head with a rotation from an action, a strip or a driver."""
+    """Indices of pose bones of neck and head that an action, a strip or a driver rotates."""
     if not drivers.moves(rig):
         return frozenset()
     places = {int(writer.where[row]) for _name, row, _share, _rest in writer.turning}

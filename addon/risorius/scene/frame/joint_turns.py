@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Filling the raw controls of joint rotations before the face is evaluated.
+"""Fills the raw controls of joint rotations before the face is evaluated.
 
-RBF poses of the file read them and repair neck and jaw when the head turns. Rotations by control
-bones, layers, live capture and a body are known before the frame. If anything else turns a joint,
-such as a constraint on its bone, Blender must evaluate the bone first: see joint_readings.
+RBF poses of the file read these controls to correct neck and jaw when the head turns. Rotations by
+control bones, layers, live capture and a body are known before the frame. If anything else rotates
+a joint, such as a constraint on its bone, Blender must evaluate the bone first: see joint_readings.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 from . import joint_readings
 
-_NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
+_NOTHING = 1e-7  # components of a quaternion up to this size count as 0
 
 
 def has_any(rig: ArmatureObject) -> bool:
-    """Whether a character has raw controls of joint rotations. Args: rig its armature."""
+    """Whether a character has raw controls of joint rotations. Args: rig  deforming armature."""
     live = runtime.of(rig)
     return live is not None and bool(live.turning)
 
 
 def are_set_by_hand(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether a slider of such a raw control has a key, a driver or a value that is not its rest.
+    """Whether a slider of a joint rotation has keys, a driver, or a value other than its rest.
 
     Args:
-        rig, controls: armatures of a character.
+        rig, controls: deforming and control armature of a character.
     """
     live = runtime.of(rig)
     if live is None or parts.FACE not in controls.pose.bones:
@@ -58,7 +58,7 @@ def fill(
         live: the character's Runtime.
         depsgraph: graph for reading bones of the deforming armature, if needed.
         raw: float32[R], the raw controls.
-        turns: "neck" and "head" -> Quaternion in the armature's axes, without rest rotations.
+        turns: "neck" and "head" -> Quaternion in the armature's axes; bones at rest may be missing.
     """
     if not live.turning or not seen.risorius_neck_poses:
         return
@@ -82,7 +82,7 @@ def _share(turn: Quaternion | None, share: float) -> Quaternion:
 def _bones(
     rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph
 ) -> dict[int, Quaternion]:
-    """Joint -> the rotation of its evaluated bone against its rest, about the bone's axes."""
+    """Joint index -> rotation of its evaluated bone relative to rest, in the bone's axes."""
     places = joint_readings.of(rig, live).places
     seen = rig.evaluated_get(depsgraph) if places else rig
     if not seen.is_evaluated:
@@ -98,6 +98,6 @@ def _bones(
 
 
 def _one_sign(turn: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """The one of q and -q whose last component other than 0 is positive."""
+    """Return q or -q, so that the last component that is not 0 is positive."""
     last = next((part for part in reversed(turn) if abs(part) > _NOTHING), 1.0)
     return tuple(-part for part in turn) if last < 0.0 else turn

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces that are evaluated after their frame, and the reasons: simulations see them one frame late.
+"""Records faces that are evaluated only after their frame, so that simulations see them late.
 
-The data are kept by session uids and never saved.
+The tables have session uids of deforming armatures as keys and are never saved.
 """
 
 from __future__ import annotations
@@ -20,25 +20,30 @@ from ..base.blender_types import ArmatureObject
 
 @dataclass
 class _Late:
-    """Attributes: cause the reason as text; wiring see _wiring; frames late frames."""
+    """Record of a late face.
+
+    Attributes:
+        cause: name of the control or constraint that is the reason.
+        wiring: result of _wiring when the reason was found.
+        frames: number of late frames.
+    """
 
     cause: str
     wiring: tuple[object, ...] = ()
     frames: int = 0
 
 
-# Deforming armature -> why its controls wait for a face.
+# Deforming armature -> reason why its controls depend on a face.
 _circles: dict[int, _Late] = session.table("lateness.circles", ("undo", "load"))
 # Deforming armature -> control whose value changed during the frame.
 _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether a face is known to depend on itself or another face; forgotten when its dependencies
-    change.
+    """Whether the inputs of a face are known to depend on a face; reset if dependencies change.
 
     Args:
-        rig, controls: its armatures.
+        rig, controls: deforming and control armature of the face.
     """
     kept = _circles.get(rig.session_uid)
     if kept is None:
@@ -50,17 +55,21 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that the inputs of a face depend on a face. Args: rig, controls its armatures."""
+    """Note that the inputs of a face depend on a face.
+
+    Args:
+        rig, controls: deforming and control armature of the face.
+    """
     cause = next(_causes(controls), told("Something that the controls follow"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
 
 def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[str]) -> None:
-    """Count a frame after which a face had to be brought up once more.
+    """Count a frame after which a face had to be evaluated again.
 
     Args:
         rig: deforming armature.
-        before, after: the states of evaluate.evaluate: bytes of the raw controls, level, ...
+        before, after: states from last_written.inputs: bytes of the raw controls, level, ...
         labels: names of the raw controls.
     """
     kept = _circles.get(rig.session_uid)
@@ -74,7 +83,7 @@ def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[s
 
 
 def _difference(before: object, after: object, labels: Sequence[str]) -> str:
-    """The control with two values; empty if the level of detail differed."""
+    """The first control with different values; "" if only the level of detail differs."""
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""
     states = cast("tuple[object, ...]", before), cast("tuple[object, ...]", after)
@@ -88,13 +97,13 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
 
 
 def circle(rig: ArmatureObject) -> str:
-    """The control of a face that depends on a face, as text; empty if none does."""
+    """The control or constraint of a face that depends on a face, as text; "" if none does."""
     kept = _circles.get(rig.session_uid)
     return kept.cause if kept is not None else ""
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about a late face; empty for others."""
+    """The sentence of the panel about a late face; "" if it is not late."""
     kept = _circles.get(rig.session_uid)
     if kept is not None:
         return told(
@@ -115,12 +124,12 @@ def words(rig: ArmatureObject) -> str:
 
 
 def total() -> int:
-    """How many frames were late, of all faces."""
+    """The number of late frames of all faces."""
     return sum(late.frames for kept in (_circles, _others) for late in kept.values())
 
 
 def forget(rig: ArmatureObject | None = None) -> None:
-    """Forget the data of a face, or of all. Args: rig its deforming armature."""
+    """Forget the records of a face. Args: rig  its deforming armature; None: all faces."""
     for kept in (_circles, _others):
         if rig is None:
             kept.clear()
@@ -129,7 +138,7 @@ def forget(rig: ArmatureObject | None = None) -> None:
 
 
 def _wiring(controls: ArmatureObject) -> tuple[object, ...]:
-    """The direct dependencies of the controls, for comparison only."""
+    """Parent, drivers and constraints of the controls, for comparison."""
     data = controls.animation_data
     return (
         controls.parent.session_uid if controls.parent is not None else 0,
@@ -147,7 +156,7 @@ def _constraints(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.Cons
 
 
 def _causes(controls: ArmatureObject) -> Iterator[str]:
-    """Names of controls that depend directly on a part of a face."""
+    """Yields names of driven controls and constraints that read a part of a face directly."""
     members = set()
     for rig in parts.rigs():
         items = parts.meshes_of(rig)
@@ -166,6 +175,6 @@ def _causes(controls: ArmatureObject) -> Iterator[str]:
 
 
 def _label(path: str) -> str:
-    """`pose.bones["face"]["jawOpen"]` as `jawOpen`."""
+    """The property name in a data path: `pose.bones["face"]["jawOpen"]` gives `jawOpen`."""
     quoted = path.rpartition('["')[2].removesuffix('"]')
     return bpy.utils.unescape_identifier(quoted) if quoted != path else path

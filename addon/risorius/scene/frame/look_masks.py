@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solo and mute: controls, joints, shapes or maps that are left out of the view of a face.
+"""Solo and mute: shows a face with some controls only, or without its joints, shapes or maps.
 
 The controls keep their values, so keys, bakes and exports do not change. The deforming armature
-stores the setting, so that undo restores it. Files never contain it: saving removes and restores
-it. Renders show the whole face unless the user asks for less.
+stores the setting, so that undo restores it. Saving removes the setting during the save, so that
+files do not contain it. Renders ignore it unless the user chooses otherwise.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
 KINDS = ("JOINTS", "SHAPES", "MAPS")
-# Deforming armature -> setting removed while a file is saved.
+# Session uid of a deforming armature -> setting that is removed while a file is saved.
 _held: dict[int, str] = session.table("look_masks.held", ("unregister",))
 
 
 @dataclass(frozen=True)
 class Look:
-    """The shown parts of a face.
+    """The solo and mute setting of a face.
 
     Attributes:
-        solo: labels of controls shown alone; none: all.
+        solo: labels of the only controls that have an effect; empty: all.
         muted: muted KINDS.
-        in_renders: whether renders use it too.
+        in_renders: whether renders use the setting too.
     """
 
     solo: frozenset[str] = frozenset()
@@ -48,7 +48,7 @@ WHOLE = Look()
 
 
 def of(rig: ArmatureObject) -> Look:
-    """The Look of a character. Args: rig its deforming armature."""
+    """The solo and mute setting of a character. Args: rig  its deforming armature."""
     kept = rig.get(parts.LOOK)
     if not isinstance(kept, str):
         return WHOLE
@@ -57,11 +57,11 @@ def of(rig: ArmatureObject) -> Look:
 
 
 def put(rig: ArmatureObject, look: Look) -> None:
-    """Set the Look of a character; the caller evaluates afterwards.
+    """Store the solo and mute setting of a character; the caller evaluates afterwards.
 
     Args:
-        rig: its deforming armature.
-        look: the new Look.
+        rig: the deforming armature.
+        look: the new setting.
     """
     if look.is_whole:
         rig.pop(parts.LOOK, None)
@@ -71,11 +71,11 @@ def put(rig: ArmatureObject, look: Look) -> None:
 
 
 def solo(rig: ArmatureObject, names: Collection[str]) -> None:
-    """Show these controls alone; muted parts stay muted.
+    """Let only some controls have an effect; muted parts stay muted.
 
     Args:
         rig: deforming armature.
-        names: labels of controls; none: show all again.
+        names: labels of these controls; empty: all controls.
     """
     put(rig, replace(of(rig), solo=frozenset(names)))
 
@@ -85,15 +85,15 @@ def mute(rig: ArmatureObject, kind: str, on: bool) -> None:
 
     Args:
         rig: deforming armature.
-        kind: of KINDS.
-        on: True: mute.
+        kind: an entry of KINDS.
+        on: True: mute; False: unmute.
     """
     look = of(rig)
     put(rig, replace(look, muted=look.muted | {kind} if on else look.muted - {kind}))
 
 
 def for_frame(rig: ArmatureObject, is_render: bool) -> Look:
-    """The Look for this evaluation.
+    """The setting that this evaluation uses.
 
     Args:
         rig: deforming armature.
@@ -104,15 +104,15 @@ def for_frame(rig: ArmatureObject, is_render: bool) -> Look:
 
 
 def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArray[np.float32]:
-    """The raw controls that are evaluated.
+    """Set the controls that solo excludes to rest.
 
     Args:
-        look: the Look.
+        look: the setting.
         raw: float32[R], raw controls.
         live: the Runtime of the character.
 
     Returns:
-        float32[R]: hidden controls are at rest.
+        float32[R], the raw controls to evaluate.
     """
     if not look.solo:
         return raw
@@ -124,10 +124,10 @@ def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> Non
     """Set muted parts to rest, in place.
 
     Args:
-        look: the Look.
-        pose: of the character's rig, changed.
-        live: its Runtime.
-        lod: the level of the pose.
+        look: the setting.
+        pose: pose of the character's rig; changed.
+        live: Runtime of the character.
+        lod: level of detail of the pose.
     """
     if not look.muted:
         return
@@ -141,7 +141,7 @@ def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> Non
 
 
 def take_away() -> bool:
-    """Show all characters whole, for a file that is saved. Returns whether one was not."""
+    """Remove the settings of all characters for a save. Returns: whether there were any."""
     _held.clear()
     for rig in parts.rigs():
         if parts.LOOK in rig:
@@ -152,7 +152,7 @@ def take_away() -> bool:
 
 
 def give_back() -> bool:
-    """Restore the settings that `take_away` removed. Returns: whether there were any."""
+    """Restore the settings that `take_away` removed. Returns: whether it had removed any."""
     given = bool(_held)
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long each stage of a frame takes, for the overlay and for benchmarks."""
+"""Measures the time of each stage of a frame, for the overlay and for benchmarks."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ...logic.base.sentences import Sentence, told
 from ..base import session
 
 STAGES = ("controls", "rig", "bones", "shapes")
-_KEPT = 30  # frames that the overlay shows the median of
+_KEPT = 30  # number of frames whose median the overlay shows
 
 
 class Frame:
-    """Milliseconds of one frame: stages of Risorius, and Blender's own part."""
+    """Times of one frame in ms: stages of Risorius, and Blender's own part."""
 
     def __init__(self) -> None:
         self.begin = self.ended = perf_counter()
@@ -27,7 +27,7 @@ class Frame:
 
     @property
     def ours(self) -> float:
-        """The add-on's own time."""
+        """The sum of the add-on's stages in ms."""
         return sum(self.stages.values())
 
 
@@ -36,12 +36,12 @@ _drawing = session.value("timing.drawing", 0.0, ("unregister",))
 
 
 def begin() -> None:
-    """A frame change, or an edit of a control, begins."""
+    """Note that a frame change, or the update after an edit, begins."""
     frames.append(Frame())
 
 
 def animated() -> None:
-    """Blender has evaluated curves, strips and drivers of the controls."""
+    """Note that Blender has evaluated curves, strips and drivers of the controls."""
     frames[-1].animation = _since(frames[-1].begin)
 
 
@@ -54,12 +54,20 @@ def evaluated() -> None:
 
 
 def looked(begin: float) -> None:
-    """The controls of a character were read, and are unchanged. Args: begin  perf_counter then."""
+    """Note that the controls of a character were read and are unchanged.
+
+    Args:
+        begin: perf_counter before the reading.
+    """
     frames[-1].stages["controls"] += _since(begin)
 
 
 def add(times: Sequence[float]) -> None:
-    """One character was brought up. Args: times  perf_counter at the stages' ends, five."""
+    """Note that a character was evaluated.
+
+    Args:
+        times: five values of perf_counter: before the first stage, and after each of the STAGES.
+    """
     for name, start, end in zip(STAGES, times[:-1], times[1:], strict=True):
         frames[-1].stages[name] += (end - start) * 1000
     frames[-1].characters += 1
@@ -67,13 +75,17 @@ def add(times: Sequence[float]) -> None:
 
 
 def skinned(begin: float) -> None:
-    """Finished positions of all faces were written. Args: begin  perf_counter then."""
+    """Note that the final positions of faces were written.
+
+    Args:
+        begin: perf_counter before the writing.
+    """
     frames[-1].stages["shapes"] += _since(begin)
     frames[-1].ended = perf_counter()
 
 
 def drawing_begins() -> None:
-    """Note that Blender has evaluated written values and begins to draw a view."""
+    """Note that Blender has evaluated the written values and begins to draw a view."""
     _drawing.now = perf_counter()
     if not frames[-1].deform:
         frames[-1].deform = _since(frames[-1].ended)
@@ -89,7 +101,7 @@ def _since(moment: float) -> float:
 
 
 def lines() -> list[Sentence]:
-    """Lines of the overlay: medians of the last frames in ms."""
+    """Lines of the overlay: median times of the last frames in ms."""
     seen = [f for f in frames if f.characters]
     if not seen:
         return [told("Risorius: no frame yet")]

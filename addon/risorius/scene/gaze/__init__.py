@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaze: eyes, their target, and lids and head that follow."""
+"""Gaze: turns the eyes towards a target, and moves the lids with the eyes."""

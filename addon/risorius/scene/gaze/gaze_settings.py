@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the eyes and the head of a character follow, as properties of its control armature."""
+"""Settings of the gaze, lids and head of a character, as properties of its control armature."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
 def _changed(self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
-    """Let Blender evaluate the character."""
+    """Let Blender evaluate the character again after a setting has changed."""
     owner = self.id_data
     assert owner is not None
     owner.update_tag()
 
 
 def _all() -> dict[str, object]:
-    """The settings by name. A missing setting has the value of files before that setting
-    existed."""
+    """The property definitions by name. Their defaults keep the motion of files that were saved
+    before a setting existed."""
     shared: Any = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "override": _OVERRIDE}
     shared |= {"update": _changed, "translation_context": tables.CONTEXT}
     return {
@@ -62,7 +62,7 @@ def _all() -> dict[str, object]:
 
 
 def register() -> None:
-    """Add them to objects."""
+    """Add the properties to Blender objects."""
     for name, kind in _all().items():
         setattr(bpy.types.Object, name, kind)
 
@@ -74,7 +74,7 @@ def unregister() -> None:
 
 
 def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
-    """Set the defaults of a new face.
+    """Set the initial gaze settings of a new face.
 
     Args:
         controls: its control armature.
@@ -85,7 +85,7 @@ def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
 
 
 def moves_lids(live: runtime.Runtime) -> bool:
-    """Whether the look controls of a rig move more than the eyes themselves."""
+    """Whether a look control up or down moves blend shapes, or joints other than the eyes."""
     eyes = set(live.anchors.eyes.values())
     for controls in live.look.values():
         for index, _yaw, pitch in controls:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The holder of the eyes' target: the head, the world, or an object such as the camera."""
+"""Lets the eyes' target follow the head, the world, or an object such as the camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
 from .gaze import CONSTRAINT
 
-_OWN = "risorius_gaze"  # on an Empty that was made to hold a target
+_OWN = "risorius_gaze"  # custom property of an Empty that `follow_world` made
 
 
 def holder_of(controls: ArmatureObject) -> bpy.types.Object | None:
@@ -21,7 +21,7 @@ def holder_of(controls: ArmatureObject) -> bpy.types.Object | None:
 
 
 def is_own(holder: bpy.types.Object) -> bool:
-    """Whether Risorius made an object as the holder of a target."""
+    """Whether an object is an Empty that `follow_world` made to hold a target."""
     return holder.get(_OWN) is not None
 
 
@@ -34,10 +34,10 @@ def _hold_of(controls: ArmatureObject) -> bpy.types.CopyLocationConstraint | Non
 
 
 def follow_head(context: Context, controls: ArmatureObject) -> None:
-    """Let the target follow the head again; it keeps its visible place.
+    """Let the target follow the head again; the target keeps its visible place.
 
     Args:
-        context: has the evaluated bones.
+        context: Blender context; its depsgraph has the evaluated bones.
         controls: control armature of the character.
     """
     hold, bone = _hold_of(controls), controls.pose.bones["eyes"]
@@ -75,7 +75,7 @@ def follow_world(context: Context, controls: ArmatureObject) -> bpy.types.Object
     """Fix the target in the world with a movable Empty.
 
     Args:
-        context: the Empty joins its scene.
+        context: Blender context; its scene gets the Empty if the armature is in no collection.
         controls: control armature of the character.
 
     Returns:

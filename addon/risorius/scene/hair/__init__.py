@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair as strands."""
+"""Shows hair cards as hair strands in renders."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of strands by kind of hair: their differences from the card that they follow."""
+"""Settings of the strands that replace hair cards, by kind of hair."""
 
 from __future__ import annotations
 
@@ -8,38 +8,38 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 _COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # mm
-# Strands in a lock and locks for each card: for large coils, for small coils.
+# (strands per lock, locks per card) for large coils and for small coils.
 _LOCKS = ((6, 5), (3, 10))
-_LARGE = 0.0013  # metres, radius of a coil
+_LARGE = 0.0013  # metres: a coil with a smaller radius is a small coil
 
 
 class Coil(NamedTuple):
-    """How strands wind about the way of their card; metres."""
+    """Radius and pitch in metres of strands that wind about the path of their card."""
 
     radius: float
     pitch: float
 
 
 class Kind(NamedTuple):
-    """How strands differ from the card that they follow."""
+    """Number and shape of the strands that follow a card."""
 
-    each: int  # strands of a card
-    radius: float  # at the root, metres
-    apart: float  # how far tips part, metres
-    cut: float  # of their length, what is cut off at most
-    # Roots also stand between cards, so that no card looks like a tuft: distance beyond either edge
-    # in widths of the card, and before its root in metres.
+    each: int  # strands per card
+    radius: float  # metres, near the root
+    apart: float  # metres: largest random displacement of a tip along each axis
+    cut: float  # largest fraction of its length by which a strand is shortened
+    # Strands also start outside their card, so that no card looks like a tuft: up to `aside` card
+    # widths beyond either edge, and up to `along` metres before the root of the card.
     aside: float
     along: float
-    # Light passes from fibre to fibre in dense hair. Single hairs over skin use the colour of the
-    # picture, because transmitting fibres would be too dark there.
+    # Dense hair has fibres that pass light on to each other. Single hairs over skin only use the
+    # colour of the picture, because such fibres would be too dark there.
     dense: bool
-    root: float = 1.0  # radius at the root itself, of `radius`, which a strand has a fifth farther
+    root: float = 1.0  # radius at the root / `radius`, which is reached at 1/5 of the length
     coil: Coil | None = None
-    lock: int = 1  # strands that begin and go together
+    lock: int = 1  # strands per lock; they share a root and a direction
 
 
-_KINDS = {  # by what the name of a mesh begins with
+_KINDS = {  # by the beginning of the mesh name
     "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.45, 0.005, True),
     "brows": Kind(5, 0.00005, 0.0004, 0.35, 0.3, 0.0013, False, 0.45),
     "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.0022, False),
@@ -48,11 +48,11 @@ _KINDS = {  # by what the name of a mesh begins with
 
 
 def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
-    """The kind of strands of a mesh.
+    """The kind of strands of a mesh, or None if its name begins with no known kind.
 
     Args:
-        name: of the mesh, in the file.
-        told: the file's metadata.
+        name: name of the mesh in the file.
+        told: the file's metadata; "coil:<mesh>" has the radius and pitch of coils in mm.
     """
     kind = next((k for begin, k in _KINDS.items() if name.startswith(begin)), None)
     found = _COIL.fullmatch(told.get(f"coil:{name}", ""))
@@ -66,10 +66,10 @@ def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
 
 
 def thicker(kind: Kind, more: float) -> Kind:
-    """The kind with more strands for each card, whole locks of them.
+    """A kind with more strands per card, rounded to whole locks.
 
     Args:
-        kind: of cards at LOD 0.
-        more: factor of the number; at least 1.
+        kind: kind of strands for the cards of LOD 0.
+        more: factor of the number of strands; values below 1 count as 1.
     """
     return kind._replace(each=kind.lock * round(max(1.0, more) * kind.each / kind.lock))

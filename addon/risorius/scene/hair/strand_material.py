@@ -10,17 +10,17 @@ import bpy
 from ..base import compat
 from ..base.blender_types import MeshObject, NodeTree, Socket
 
-PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
-_DEEPER = 1.6  # exponent of the colour of fibres that lie close
-_FAINTER = 0.75  # of single ones over skin: light passes through them, and a dark one is no wire
+PLACE = "strand_uv"  # attribute of the curves: UV coordinates of their colour in the picture
+_DEEPER = 1.6  # exponent that darkens the colour of the fibres of dense hair
+_FAINTER = 0.75  # exponent that lightens single hairs over skin; dark ones would look like wires
 
 
 def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
-    """The material of strands: colours of the picture; dense hair uses transmitting fibres.
+    """Creates a material of strands with the colours of the cards' picture.
 
     Args:
-        item: the cards.
-        dense: whether light passes from fibre to fibre.
+        item: mesh of the cards.
+        dense: True adds a hair shader for Cycles, in which light passes from fibre to fibre.
     """
     cards_look = item.data.materials[0] if item.data.materials else None
     material = bpy.data.materials.new(f"{item.name}_strands")
@@ -37,7 +37,7 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
         spot.attribute_name = PLACE
         image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
-        # Strands also lie between the hairs of the picture, where other alpha modes have no colour.
+        # Strands also cover transparent pixels, which have no colour in other alpha modes.
         image.image.alpha_mode = "CHANNEL_PACKED"
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         colour = image.outputs["Color"]
@@ -49,7 +49,7 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
 
 
 def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
-    """A colour to the power of an exponent: below 1 dark ones become lighter than light ones do."""
+    """A colour to the power of an exponent: below 1 lightens, and dark colours most."""
     node = tree.nodes.new("ShaderNodeGamma")
     node.inputs["Gamma"].default_value = exponent
     tree.links.new(colour, node.inputs["Color"])
@@ -57,11 +57,11 @@ def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
 
 
 def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
-    """Add fibres for Cycles beside the surface for EEVEE.
+    """Add a hair shader for Cycles; the existing surface shader remains for EEVEE.
 
     Args:
-        tree: of a material.
-        colour: colour of the picture.
+        tree: node tree of the material.
+        colour: colour of the picture, or None if the cards have no picture.
     """
     output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
     fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
@@ -71,8 +71,7 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
     fibre.inputs["Roughness"].default_value = 0.55
     fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
-        # Light passes several fibres, and the picture shows their sum, so a single fibre is
-        # lighter.
+        # The picture shows the light of many fibres together; one fibre gets a darker colour.
         tree.links.new(_raised(tree, colour, _DEEPER), fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"

@@ -15,15 +15,15 @@ from .strand_kinds import Coil, Kind
 from .strand_material import PLACE, material_of
 
 TREE = "Risorius Strands"
-CARDS = "Cards"  # input of the modifier: the mesh that is followed
-_OF_A_TURN = 7  # points of a strand that winds
+CARDS = "Cards"  # input of the modifier: the mesh of the cards
+_OF_A_TURN = 7  # points per turn of a coil
 _MOST_POINTS = 100
-_ROOT = 0.2  # of its length: up to there a strand grows to its full radius
-_MOST_SLID = 0.9  # rows: farther, a card that bends would be left
+_ROOT = 0.2  # fraction of its length over which a strand grows to its full radius
+_MOST_SLID = 0.9  # rows that a strand may slide; a longer way would leave a bent card
 
 
 class _Tree:
-    """Short words for a geometry node tree."""
+    """Short methods that add nodes to a geometry node tree and link them."""
 
     def __init__(self, tree: NodeTree) -> None:
         self.tree = tree
@@ -51,16 +51,16 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """The group of a number, counted from 0, in groups of a given size."""
+        """The index, from 0, of the group of `size` numbers that a number belongs to."""
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
-        """A number of its own for each strand."""
+        """A random value from low to high for each value of `number`."""
         node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
         return node.outputs[1]
 
     def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
-        """A value of a vertex of the cards."""
+        """Samples a value at vertex `index` of the mesh; `kind` is its data type."""
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
         self.put(mesh, node.inputs[0])
         self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
@@ -68,7 +68,7 @@ class _Tree:
         return next(s for s in node.outputs if s.enabled)
 
     def between(self, a: object, b: object, share: object) -> Socket:
-        """A vector between two, or beyond them where the share is."""
+        """Mixes two vectors; a share below 0 or above 1 extrapolates."""
         node = self.node("ShaderNodeMix", data_type="VECTOR", clamp_factor=False)
         where = {s.identifier: s for s in node.inputs}
         for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
@@ -77,12 +77,12 @@ class _Tree:
 
 
 def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTree:
-    """Nodes that turn the cards of a mesh into strands.
+    """Geometry nodes that replace the cards of a mesh with strands.
 
     Args:
-        item: the cards.
-        rows: of each card.
-        kind: of the strands.
+        item: mesh of the cards.
+        rows: rows of vertices per card.
+        kind: kind of strands.
         unit: metres per Blender unit.
     """
     tree: Any = bpy.data.node_groups.new(TREE, "GeometryNodeTree")
@@ -94,14 +94,14 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
     mesh = source.outputs["Geometry"]
     lines = _lines(g, kind.each * len(item.data.vertices) // (2 * rows), rows)
-    # All strands have as many points as a card has rows: numbers follow from a point's own.
+    # Each strand has one point per row, so a point's index gives its strand, card and row.
     index = g.node("GeometryNodeInputIndex").outputs[0]
     strand = g.group(index, rows)
     card = g.group(strand, kind.each)
     row = g.math("SUBTRACT", index, g.math("MULTIPLY", strand, rows))
     left = g.math("MULTIPLY", g.math("ADD", g.math("MULTIPLY", card, rows), row), 2)
     right = g.math("ADD", left, 1)
-    # A strand wanders a little across its card.
+    # Strands drift a little across their card from root to tip.
     lock = _lock(g, strand, kind)
     across = g.random(0.04 - kind.aside, 0.96 + kind.aside, 1, lock)
     lean = g.random(-0.1, 0.1, 2, lock)
@@ -109,7 +109,7 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
     if kind.along:
-        # Beyond the last row a card goes on as it went.
+        # The last row has no next row: its strands slide along the segment before it.
         back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
         most = min(_MOST_SLID, kind.along / unit / (_lengths(item, rows).mean() / (rows - 1)))
         share = g.random(-most, 0.4 * most, 5, lock)
@@ -139,7 +139,7 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
 
 
 def _lines(g: _Tree, count: int, rows: int) -> Node:
-    """Straight curves, a point of each for each row of a card. Args: count  of the curves."""
+    """Straight curves with one point per row of a card. Args: count  number of curves."""
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
     dots = g.node("GeometryNodePoints", {"Count": count})
@@ -148,7 +148,7 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A move of each lock, at most so far along each axis; its Scale is free."""
+    """A random displacement of each lock, up to `most` along each axis. The caller sets Scale."""
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
     parted.inputs["Max"].default_value = [most] * 3
@@ -162,11 +162,11 @@ def _slid(
 
     Args:
         g: the tree.
-        mesh: the cards as they are deformed.
-        place: of a vertex.
-        end: place of the vertex.
-        start: index of the vertex on its edge from which the way to the next row starts.
-        share: share of that way.
+        mesh: the deformed cards.
+        place: the position of a vertex, a field.
+        end: place of the vertex before the slide.
+        start: index of the vertex where the segment to the next row starts.
+        share: length of the slide as a fraction of that segment; negative: towards the root.
     """
     first, second = (
         g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))
@@ -180,14 +180,15 @@ def _slid(
 def _store_place(
     g: _Tree, item: MeshObject, mesh: Socket, curves: Socket, where: tuple[Socket, Socket, Socket]
 ) -> Socket:
-    """Curves with the UV coordinates of each point in the picture of the cards.
+    """Store the UV coordinates of each point, in the picture of the cards, on the curves.
 
     Args:
         g: the tree.
-        item: the cards.
-        mesh: the cards as they are deformed.
+        item: mesh of the cards.
+        mesh: the deformed cards.
         curves: the strands.
-        where: indices of the vertices left and right of a point, and its share between them.
+        where: indices of the card's left and right vertex in the point's row, and the fraction of
+            the way from left to right.
     """
     left, right, across = where
     within = g.node("ShaderNodeClamp", {0: across, 1: 0.04, 2: 0.96}).outputs[0]
@@ -207,19 +208,19 @@ def _store_place(
 
 
 def _lock(g: _Tree, strand: object, kind: Kind) -> object:
-    """The number of the lock that a strand belongs to, or its own."""
+    """The index of a strand's lock; the strand's own index if locks have one strand."""
     if kind.lock == 1:
         return strand
     return g.group(strand, kind.lock)
 
 
 def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> Socket:
-    """Strands as smooth curves of many lengths that taper to their tips.
+    """Make strands smooth, of random lengths, and tapered to their tips.
 
     Args:
         g: the tree.
         curves: the strands.
-        points: points of each strand.
+        points: points per strand.
         kind: kind of strands.
         unit: metres per Blender unit.
     """
@@ -244,7 +245,7 @@ def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> S
 
 
 def _lengths(item: MeshObject, rows: int) -> NDArray[np.float32]:
-    """float32[cards]: how long each card is along its left edge, Blender units; above 0."""
+    """float32[cards]: length of each card along its left edge in Blender units, above 0."""
     places = np.empty(3 * len(item.data.vertices), np.float32)
     item.data.vertices.foreach_get("co", places)
     edge = places.reshape(-1, rows, 2, 3)[:, :, 0]
@@ -252,7 +253,7 @@ def _lengths(item: MeshObject, rows: int) -> NDArray[np.float32]:
 
 
 def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
-    """How many points a strand of these cards needs."""
+    """The number of points per strand; coils need more, the longer the cards are."""
     if kind.coil is None:
         return 2 * rows + 2
     turns = float(np.quantile(_lengths(item, rows), 0.9)) * unit / kind.coil.pitch
@@ -260,12 +261,12 @@ def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
 
 
 def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
-    """Strands that wind about their path, nearly alike within a lock. Returns: the last node.
+    """Wind strands about their path, nearly alike within a lock. Returns: the last node.
 
     Args:
         g: the tree.
         curves: smooth strands.
-        points: points of each strand.
+        points: points per strand.
         kind: kind of strands.
         coil: radius and pitch of the winding.
         unit: metres per Blender unit.

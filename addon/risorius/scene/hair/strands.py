@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair as Blender's hair curves in renders, with nodes that follow the cards.
+"""Renders cards of hair as Blender hair curves, which geometry nodes compute from the cards.
 
-Each card is a guide with a width. Strands lie across it, follow its deformed vertices, and replace
-the cards in renders. The viewport and exports keep the cards.
+The strands are spread over the width of each card and follow its deformed vertices. They replace
+the cards in renders; the viewport and exports keep the cards.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ..character import runtime
 from .strand_kinds import Kind, kind_of, thicker
 from .strand_nodes import CARDS, TREE, strand_tree
 
-STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show instead
+STRANDS = "risorius_strands"  # property of a mesh of cards: the hair curves shown in renders
 _ROWS = re.compile(r"rows=(\d+)")
 _LEVEL = re.compile(r"_lod\d+_")
 
 
 def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
-    """The meshes of a character that are cards of hair, their names in the file, and the rows of a
-    card.
+    """Yields each mesh of hair cards of a character, its name in the file, and the rows of
+    vertices per card.
 
     Args:
         rig: the deforming armature.
@@ -54,7 +54,7 @@ def are_shown(rig: ArmatureObject) -> bool:
 
 
 def show(rig: ArmatureObject, unit: float) -> int:
-    """Let renders of a character show strands; how many meshes have them.
+    """Let renders of a character show strands. Returns: the number of meshes with strands.
 
     Args:
         rig: the deforming armature.
@@ -77,11 +77,11 @@ def show(rig: ArmatureObject, unit: float) -> int:
 
 def _cards_at_finest(live: runtime.Runtime, name: str) -> int:
     """The number of cards of a mesh at LOD 0; coarser levels have fewer and wider cards. 0 if the
-    file does not store it.
+    file has no such mesh at LOD 0.
 
     Args:
-        live: of the character.
-        name: of the mesh at its level, in the file.
+        live: Runtime of the character.
+        name: name of the mesh at its own LOD, in the file.
     """
     finest = _LEVEL.sub("_lod0_", name)
     found = _ROWS.fullmatch(live.dna.metadata.get(f"hair:{finest}", ""))
@@ -100,7 +100,7 @@ def _add(item: MeshObject, rows: int, kind: Kind, unit: float) -> None:
     modifier: Any = thing.modifiers.new(TREE, "NODES")
     tree: Any = strand_tree(item, rows, kind, unit)
     modifier.node_group = tree
-    # An input of the modifier, so that a copied face has strands that follow its own cards.
+    # The cards are an input of the modifier, so that strands of a copied face follow the copy.
     modifier[tree.interface.items_tree[CARDS].identifier] = item
     thing.hide_viewport = thing.hide_select = True
     parts.point(item, STRANDS, thing)

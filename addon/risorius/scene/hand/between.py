@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses between poses: breakdowns of the neighbouring keys, relax or push, to rest."""
+"""Moves a pose between its neighbouring keys (breakdown, relax, push) or towards rest."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..base import parts
 from ..base.blender_types import ArmatureObject
 from ..character import runtime, sides
 
-_AT = 1e-3  # frames that are the same
+_AT = 1e-3  # frames: keys closer than this are at the same frame
 
 
 @dataclass(frozen=True)
 class Neighbours:
-    """The poses on both sides of a frame.
+    """The poses at the keys before and after a frame.
 
     Attributes:
         before, after: the poses.
-        share: place of the frame between them, 0 to 1.
+        share: position of the frame between the two keys, 0 to 1.
     """
 
     before: keying.Pose
@@ -103,8 +103,8 @@ def paths_of(controls: ArmatureObject, labels: Iterable[str], bones: bool) -> se
 
     Args:
         controls: the control armature.
-        labels: the sliders.
-        bones: whether to include bones.
+        labels: names of the sliders.
+        bones: whether to include the control bones.
     """
     own = {parts.property_path(label) for label in labels}
     return own | set(keying.pose_of(controls).bones) if bones else own
@@ -127,12 +127,12 @@ def move(
 
     Args:
         rig: the character.
-        now, goal: the poses.
-        factor: 1 reaches the goal, 0 changes nothing, below 0 moves away from it.
-        paths: data paths of moving controls.
+        now, goal: start and goal.
+        factor: 1 reaches the goal, 0 changes nothing, below 0 moves away from the goal.
+        paths: data paths of the controls to move.
 
     Returns:
-        The moved sliders.
+        Names of the moved sliders.
     """
     controls = parts.controls_there(rig)
     values = {
@@ -153,7 +153,7 @@ def move(
 def _blended(
     path: str, start: tuple[float, ...], goal: tuple[float, ...], factor: float
 ) -> list[float]:
-    """Numbers between; quaternions the shorter way, and of length 1."""
+    """Mix two tuples; quaternions are mixed along the shorter arc and normalised."""
     if not path.endswith("rotation_quaternion"):
         return [a + (b - a) * factor for a, b in zip(start, goal, strict=True)]
     sign = -1.0 if sum(a * b for a, b in zip(start, goal, strict=True)) < 0.0 else 1.0
@@ -163,7 +163,7 @@ def _blended(
 
 
 def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
-    """The rest pose. Args: rig the character, now a pose with the wanted names."""
+    """The rest pose. Args: rig the character, now a pose with the wanted sliders and bones."""
     live = runtime.there(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))
     bones: Mapping[str, tuple[float, ...]] = {
@@ -178,11 +178,11 @@ def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
 
 
 def mixed(first: keying.Pose, second: keying.Pose, share: float) -> keying.Pose:
-    """The pose between two.
+    """Mix two poses.
 
     Args:
         first, second: the poses.
-        share: 0 gives the first, 1 the second.
+        share: 0 gives the first pose, 1 the second.
     """
     return keying.Pose(
         {n: v + (second.sliders[n] - v) * share for n, v in first.sliders.items()},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blinks with timing: as keys of the sliders of the lids, or in a layer above them."""
+"""Adds timed blinks, as keys of the lid sliders or in a layer over these sliders."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
 
-_MARK = "risorius_blinks"  # on the action of a layer of blinks
+_MARK = "risorius_blinks"  # custom property of the action of the blink layer
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Blink:
 
     Attributes:
         close, hold, open: length of each part.
-        strength: value of closed lids, 0 to 1.
-        offset: delay of the character's right eye; negative: it leads.
+        strength: slider value of the closed lids, 0 to 1.
+        offset: delay of the character's right eye; negative: the right eye closes first.
         sides: L, R or both.
     """
 
@@ -34,18 +34,18 @@ class Blink:
     sides: str = "LR"
 
     def begin(self, frame: float, side: str) -> float:
-        """When an eye begins to close. Args: frame  of the blink, side  L or R."""
+        """The frame at which an eye begins to close. Args: frame  of the blink, side  L or R."""
         return frame + (self.offset if side == "R" else 0.0)
 
     def keys(self, begin: float, before: float, after: float) -> list[tuple[float, float]]:
         """Frames and values of the keys of one eye.
 
         Args:
-            begin: start of closing.
+            begin: frame at which the eye begins to close.
             before, after: slider values at the start and end of the blink.
         """
         shut = begin + self.close
-        most = max(self.strength, before, after)  # an eye that is shut already stays so
+        most = max(self.strength, before, after)  # a blink never opens an eye
         return [
             (begin, before),
             (shut, most),
@@ -61,7 +61,7 @@ def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
 
 
 def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) -> int:
-    """Key a blink on the sliders; keys within it are removed.
+    """Key a blink on the lid sliders; their keys within the blink are removed.
 
     Args:
         rig: the character.
@@ -70,7 +70,7 @@ def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) ->
         rules: settings of keys.
 
     Returns:
-        The number of keys.
+        The number of inserted keys.
     """
     controls, count = parts.controls_there(rig), 0
     face = controls.pose.bones[parts.FACE]
@@ -93,19 +93,19 @@ def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) ->
 
 
 def layer_of(controls: ArmatureObject) -> layer_properties.RISORIUS_PG_layer | None:
-    """The layer of a character that has its blinks, or None."""
+    """The blink layer of a character, or None."""
     found = (y for y in layers.of(controls) if y.action is not None and y.action.get(_MARK))
     return next(found, None)
 
 
 def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> None:
-    """Add a blink to the layer of blinks, which takes effect if it closes the eyes further.
+    """Add a blink to the blink layer, which can only close the eyes further than the sliders.
 
     Args:
         rig: the character.
         frame: first frame.
         blink: its timing.
-        name: of a new layer.
+        name: name of the layer if there is none yet.
     """
     controls = parts.controls_there(rig)
     layer = layer_of(controls)
@@ -137,5 +137,5 @@ def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> 
         layer = layer_of(controls)
     assert layer is not None
     layer.start = action.frame_range[0]
-    layer_mixing.note_edits([action])  # nothing plays it that Blender would tell of
+    layer_mixing.note_edits([action])  # Blender reports no edit of an action that no object plays
     controls.update_tag()

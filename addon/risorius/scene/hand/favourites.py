@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Favourite sliders: of this file, or of the user."""
+"""Favourite sliders, stored on the character or else in the user's preferences."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Collection
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 
-_LIST = "risorius_favourites"  # on the control armature: names of sliders, a line each
+_LIST = "risorius_favourites"  # on the control armature: names of sliders, one per line
 
 
 def of(controls: ArmatureObject, users: str) -> list[str]:
-    """The favourites of a face that it has.
+    """The names of the favourite sliders that exist on a face.
 
     Args:
         controls: its control armature.
-        users: the user's own, a line each, for faces of files that have none.
+        users: the user's favourites, one name per line, for a face without its own list.
     """
     text = controls.get(_LIST)
     face = controls.pose.bones[parts.FACE]
@@ -25,15 +25,15 @@ def of(controls: ArmatureObject, users: str) -> list[str]:
 
 
 def toggle(controls: ArmatureObject, names: Collection[str], users: str) -> str:
-    """Add sliders to the favourites of a file, or remove them.
+    """Add sliders to the favourites of a face, or remove them if all are favourites already.
 
     Args:
         controls: control armature of the face.
-        names: sliders; if all are favourites, they are removed.
+        names: names of the sliders.
         users: see `of`.
 
     Returns:
-        The new list, one name in each line.
+        The new list, one name per line.
     """
     there = of(controls, users)
     if all(name in there for name in names):

@@ -24,17 +24,17 @@ from .face_writer import put_back, show
 from .recordings import Recording
 from .sessions import Session, Settings
 
-INTERVAL = 1 / 60  # seconds; faster than a phone sends helps nobody
+INTERVAL = 1 / 60  # seconds between two writes; phones send no faster
 _REDRAW = 0.25  # seconds between redraws of the status
 
 
 @dataclass
 class _State:
-    """Of the timer."""
+    """State of the timer."""
 
     error: str = ""  # why the last capture ended by itself
     since_redraw: float = 0.0  # seconds
-    undone: bool = False  # since the last beat
+    undone: bool = False  # whether undo or redo ran since the last tick
 
 
 _state = registry.keep("capture.state", _State, ("unregister",))
@@ -46,17 +46,17 @@ def last_error() -> str:
 
 
 def start(rig: ArmatureObject, settings: Settings) -> Session:
-    """Let a character follow a subject.
+    """Start the live capture of a character, which ends an earlier capture of it.
 
     Args:
         rig: its deforming armature.
-        settings: Settings.
+        settings: settings of the capture.
 
     Returns:
-        Session.
+        The running session.
 
     Raises:
-        risorius.live.LiveError: the port cannot be had; python-osc is missing.
+        risorius.live.LiveError: the port cannot be opened, or python-osc is missing.
         risorius.importing.MappingError: the mapping cannot be used.
     """
     shaper = native.part("live").Shaper(settings.mapping)
@@ -73,7 +73,7 @@ def stop(controls: bpy.types.Object | None) -> bool:
     """End the capture of a character and restore its earlier values.
 
     Returns:
-        Whether a capture ran. An unfinished recording waits, see waiting.
+        Whether a capture ran. An unfinished recording is kept, see recordings.waiting.
     """
     session = sessions.of(controls)
     if session is None:
@@ -91,7 +91,7 @@ def stop_all() -> None:
 
 
 def _end(session: Session) -> None:
-    """Close a session in any state of its character, without losing the user's recordings."""
+    """Close a session, even if its character was deleted, and keep its recording."""
     _lay_by(session)
     try:
         controls = session.controls()
@@ -102,7 +102,8 @@ def _end(session: Session) -> None:
 
 
 def _lay_by(session: Session) -> Recording | None:
-    """End a session's recording; it waits, if anything was recorded. Returns: it, or None."""
+    """End a session's recording and keep it in `recordings`. Returns: the recording, or None if
+    nothing was recorded."""
     recording, session.recording = session.recording, None
     if recording is None or not len(session.receiver.finish(recording.take)):
         return None
@@ -112,7 +113,7 @@ def _lay_by(session: Session) -> Recording | None:
 
 
 def address() -> str:
-    """The address of this computer for a phone's app; "" without a network."""
+    """The network address of this computer, to enter in a phone's app; "" without a network."""
     return native.part("live").own_address()
 
 
@@ -120,7 +121,7 @@ def begin_take(session: Session, frame: float) -> None:
     """Begin a recording.
 
     Args:
-        session: of the character.
+        session: session of the character.
         frame: first frame of the take in the scene.
     """
     take = session.receiver.record(session.subject)
@@ -135,20 +136,20 @@ def finish_take(
     Args:
         session: a Session that records.
         rig: the character.
-        scene: gives the rate.
+        scene: scene with the frame rate.
 
     Returns:
         clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: see finish; the recording then waits.
+        clip_units.ClipError: see recordings.finish; the recording is kept there.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None
 
 
 def _tick() -> float | None:
-    """One beat of the timer; returns the seconds to the next, None to end."""
+    """Called by the timer. Returns: seconds until the next call, or None to end."""
     try:
         return _beat()
     except Exception:
@@ -162,10 +163,10 @@ def _tick() -> float | None:
 
 def _beat() -> float | None:
     if bpy.app.is_job_running("RENDER"):
-        return INTERVAL  # what a render reads is not to be written
+        return INTERVAL  # values must not change while a render reads them
     if _state.undone:
         _state.undone = False
-        current_context().view_layer.update()  # bones that undo brought back are not there before
+        current_context().view_layer.update()  # bones that undo restored exist only after this
     changed = False
     for session in sessions.running():
         controls = session.controls()
@@ -179,7 +180,7 @@ def _beat() -> float | None:
 
 
 def _redraw(changed: bool) -> None:
-    """Let the views show a change at once, and the sidebars the status now and then."""
+    """Redraw the 3D views if a face has changed, and the sidebars every _REDRAW seconds."""
     _state.since_redraw += INTERVAL
     status = _state.since_redraw >= _REDRAW
     kinds = {"WINDOW": changed, "UI": status}
@@ -200,7 +201,7 @@ def _before_load(*_arguments: object) -> None:
 
 @persistent
 def _before_save(*_arguments: object) -> None:
-    """The file shall keep the face as it was; the next tick goes on."""
+    """Save the face with its values before the capture; the next tick shows the capture again."""
     for session in sessions.running():
         controls = session.controls()
         if controls is not None:

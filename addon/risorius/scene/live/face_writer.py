@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face that came in is written to the sliders and the head bone, and taken back again.
+"""Writes captured faces to the sliders and the head bone, and restores the earlier values.
 
-It is written as a hand on the sliders would: no keys, no undo steps.
+Writing makes no keys and no undo steps.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _HEAD = "head"
 
 
 def show(session: Session, controls: ArmatureObject) -> bool:
-    """Write the newest face to a character.
+    """Write the newest received face to a character.
 
     Args:
-        session: of the character.
+        session: session of the character.
         controls: its control armature.
 
     Returns:
@@ -62,7 +62,7 @@ def _follow_ranges(session: Session, controls: ArmatureObject) -> None:
 
 
 def _plan(session: Session, controls: ArmatureObject, controlled: tuple[str, ...]) -> None:
-    """Which value goes to which slider of this character."""
+    """Find the slider of this character for each control of the capture."""
     rig = parts.rig_of(controls)
     assert rig is not None
     live = runtime.there(rig)
@@ -91,12 +91,12 @@ def _turn_head(session: Session, controls: ArmatureObject, values: Mapping[str, 
 
 
 def _rotation(bone: bpy.types.PoseBone) -> tuple[str, tuple[float, ...]]:
-    """A bone's rotation mode, and its rotation as that keeps it."""
+    """A bone's rotation mode, and the values of its rotation in this mode."""
     return bone.rotation_mode, tuple(getattr(bone, clip_actions.rotation_path(bone)))
 
 
 def _as_quaternion(mode: str, values: Sequence[float]) -> Quaternion:
-    """Convert a result of _rotation for a bone whose rotation mode has changed."""
+    """Convert a result of _rotation to a quaternion."""
     if mode == "QUATERNION":
         return Quaternion(values).normalized()
     if mode == "AXIS_ANGLE":
@@ -116,10 +116,10 @@ def _rotate(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
 
 
 def put_back(session: Session, controls: ArmatureObject) -> None:
-    """Restore the values before the capture.
+    """Restore the values that sliders and head bone had before the capture.
 
     Args:
-        session: of the character.
+        session: session of the character.
         controls: its control armature.
     """
     bone = controls.pose.bones[parts.FACE]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The range of a person from the last seconds of live capture."""
+"""Gets the last seconds of live capture, from which a person's range of motion is learned."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def recent_clip(session: Session, seconds: float) -> native.Clip:
     """The recent frames of a session as captured: without ranges, gain, smoothing and neutral.
 
     Args:
-        session: of the character.
-        seconds: length.
+        session: session of the character.
+        seconds: length of the clip.
 
     Returns:
         risorius.Clip of raw controls.

@@ -20,7 +20,7 @@ from ..base import session as registry
 from ..base.blender_types import ArmatureObject
 from ..character import standing
 
-# Ended without becoming an action, the oldest first.
+# Recordings that ended and are not an action yet, the oldest first.
 _waiting: list[Recording] = registry.keep("recordings.waiting", list, ("quit",))
 
 
@@ -30,7 +30,7 @@ class Recording:
 
     Attributes:
         take: risorius.live.Take.
-        shaper: risorius.live.Shaper, of its capture.
+        shaper: risorius.live.Shaper of the capture.
         frame: frame of the scene at its start.
         face: name of the control armature.
     """
@@ -42,37 +42,36 @@ class Recording:
 
 
 def lay_by(recording: Recording) -> None:
-    """Let a recording that ended wait."""
+    """Keep an ended recording until it is finished or discarded."""
     _waiting.append(recording)
 
 
 def waiting() -> tuple[Recording, ...]:
-    """The recordings that wait to be finished: a tuple of Recordings, the oldest first."""
+    """The ended recordings that are not an action yet, the oldest first."""
     return tuple(_waiting)
 
 
 def discard(recording: Recording) -> None:
-    """Throw away a recording that waits."""
+    """Delete a waiting recording."""
     _waiting.remove(recording)
 
 
 def finish(
     recording: Recording, rig: ArmatureObject, scene: bpy.types.Scene
 ) -> clip_actions.Report:
-    """Let a character play a waiting recording and remove it from the waiting ones.
+    """Turn a waiting recording into an action that a character plays.
 
     Args:
         recording: from waiting(); made with this or another character.
         rig: the character.
-        scene: gives the rate.
+        scene: scene with the frame rate; its end is extended to the end of the recording.
 
     Returns:
         clip_actions.Report.
 
     Raises:
-        clip_units.ClipError: none of its controls fits this face, it is longer than Blender can
-        play,
-            or the NLA is being edited.
+        clip_units.ClipError: no control of the recording fits this face, the recording is longer
+            than Blender can play, or the NLA is being edited.
     """
     controls, take = parts.controls_there(rig), recording.take
     trouble = actions.busy(controls)

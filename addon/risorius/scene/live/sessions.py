@@ -20,7 +20,7 @@ from .recordings import Recording
 
 # Session uid of a control armature -> Session.
 _sessions: dict[int, Session] = registry.table("sessions.sessions", ("unregister",))
-# (source, port, host) -> the Receiver of all sessions that listen there
+# (source, port, host) -> the Receiver that the sessions with this address share
 _receivers: dict[tuple[str, int, str], native.Receiver] = registry.table(
     "sessions.receivers", ("unregister",)
 )
@@ -31,10 +31,13 @@ class Settings:
     """Settings of a capture.
 
     Attributes:
-        source: "livelink" or "osc"; port, everywhere: port, and whether to listen to the network.
+        source: "livelink" or "osc".
+        port: port to listen on.
+        everywhere: True: other computers can send; False: only this one.
         subject: name of the phone; "" for the first one received.
+        smoothing: 0 to 1.
+        gain, head_gain: factors of all units and of head rotations; head_gain 0 for none.
         mapping: name or file of the mapping to controls.
-        smoothing: 0 to 1; gain: on all units; head_gain: of head rotations, 0 for none.
     """
 
     source: str = "livelink"
@@ -49,22 +52,21 @@ class Settings:
 
 @dataclass
 class Session:
-    """A character that follows a subject.
+    """The live capture of a character that follows a subject, such as the face on a phone.
 
     Attributes:
-        uid: of the control armature; name: its last name, to find it quickly.
-        key: of its receiver.
+        uid, name: session uid and last name of the control armature.
+        key: (source, port, host) of its receiver.
         shaper: risorius.live.Shaper.
         subject: name of the subject; "" for the first one received.
         sequence: number of the last written frame.
         before: slider -> value before the capture.
-        turn: the head bone's (rotation mode, rotation as that mode keeps it) before the capture, or
-            None.
+        turn: (rotation mode, values of the rotation) of the head bone before the capture, or None.
         recording: the running Recording, or None.
-        recent: recent frames of any subject: one minute at 60 a second.
+        recent: the last 3600 frames of any subject, one minute at 60 frames per second.
         ranges_seen: value of range_properties.changes() when the shaper got the ranges.
-        names, sliders: the control names of the last frame, and (slider, place) of names that this
-            character has.
+        names: control names of the last frame.
+        sliders: (slider, index in `names`) for each name that this character has.
     """
 
     uid: int
@@ -98,7 +100,7 @@ class Session:
 
 
 def running() -> list[Session]:
-    """All sessions; one may be closed while they are gone through."""
+    """A new list of all sessions, so that sessions may be closed during a loop."""
     return list(_sessions.values())
 
 
@@ -135,8 +137,8 @@ def apply_settings(session: Session, settings: Settings) -> None:
     """Apply settings that can change during a capture: subject, smoothing, gains.
 
     Args:
-        session: of the character.
-        settings: new settings; source, port and mapping keep their values.
+        session: session of the character.
+        settings: new settings; changes of source, port and mapping are ignored.
     """
     session.subject = settings.subject
     _reserve(session.key)
@@ -145,7 +147,7 @@ def apply_settings(session: Session, settings: Settings) -> None:
 
 
 def close(session: Session) -> None:
-    """End a session, and its receiver where no other listens there."""
+    """End a session; its receiver stops if no other session uses it."""
     del _sessions[session.uid]
     if any(other.key == session.key for other in _sessions.values()):
         _reserve(session.key)
@@ -154,22 +156,22 @@ def close(session: Session) -> None:
 
 
 def _reserve(key: tuple[str, int, str]) -> None:
-    """Let a receiver keep a place for each subject that somebody chose."""
+    """Let a receiver reserve a place for each subject that a session chose by name."""
     chosen = {s.subject for s in _sessions.values() if s.key == key and s.subject}
     _receivers[key].reserve(chosen)
 
 
 def neutral_now(session: Session) -> bool:
-    """Take the face of this moment as the face at rest. Returns: whether one was there."""
+    """Take the newest received face as the face at rest. Returns: whether there was one."""
     frame = session.receiver.latest(session.subject)
     if frame is None:
         return False
     session.shaper.capture(frame)
-    session.sequence = 0  # written again, as it is now
+    session.sequence = 0  # so that the newest face is written again
     return True
 
 
 def forget_neutral(session: Session) -> None:
-    """Use received faces unchanged again."""
+    """Show received faces without subtracting a face at rest."""
     session.shaper.capture(None)
     session.sequence = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of detail: in the viewport, in renders, and by the distance to the camera."""
+"""Chooses the LOD of a character in the viewport and in renders, by hand or by camera distance."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ...logic.character import lod_distance as rules
 from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 
-_COARSEST = 255  # far beyond the levels that a file has
-SAME = -1  # as the level of renders: that of the viewport
+_COARSEST = 255  # largest level that is accepted; files have fewer
+SAME = -1  # stored as the level of renders: use the viewport's level
 
 
 def built(rig: ArmatureObject) -> list[int]:
-    """The levels that a character has meshes for, in order."""
+    """The levels for which a character has meshes, sorted."""
     return sorted({level for item in parts.meshes_of(rig) for level in levels_of(item)})
 
 
@@ -44,7 +44,7 @@ def viewport_level(rig: ArmatureObject) -> int:
 
 
 def render_level(rig: ArmatureObject) -> int:
-    """The level that renders show, where the distance does not choose it."""
+    """The level that renders show unless the camera distance chooses it."""
     level = saved.whole(rig, parts.LOD_RENDER, SAME, SAME, _COARSEST)
     return viewport_level(rig) if level == SAME else level
 
@@ -72,7 +72,8 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
 
 
 def distances(rig: ArmatureObject) -> list[float]:
-    """Where each level gives way to the next, in Blender units. Args: rig  deforming armature."""
+    """Camera distances in Blender units at which each level changes to the next one. Args: rig
+    deforming armature."""
     return saved.numbers(rig, parts.LOD_DISTANCES, 0.0)
 
 
@@ -93,7 +94,8 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
 
 
 def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
-    """The level of a frame that is not evaluated yet: the camera's distance is not known.
+    """The probable level of a frame whose camera distance is unknown because the frame is not
+    evaluated yet.
 
     Args:
         rig: the deforming armature.
@@ -106,9 +108,9 @@ def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
 
 
 def choose(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph) -> int:
-    """The level to evaluate for a dependency graph; shows it where the distance asks for it.
+    """The level to evaluate for a dependency graph; a level chosen by distance is also shown.
 
-    Renders get a function of the frame alone; hysteresis is for the viewport only.
+    In renders the level depends on the frame alone; only the viewport has hysteresis.
 
     Args:
         rig: the deforming armature, the original.
@@ -154,5 +156,5 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
-            # An override would give it back at load, and take its own flag for the user's.
+            # Otherwise a library override loses the value at load, and `flag` counts as the user's.
             item.property_overridable_library_set(f'["{written}"]', True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of hair in the solid view: mean colour and opacity of the picture on its cards."""
+"""The colour of hair cards in the solid view: mean colour and opacity of their picture."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .look import Look
 
 Color = tuple[float, float, float, float]
 
-_SAMPLES = 4096  # corners of cards, between which the picture is looked at
-_INWARD = (0.0, 0.35, 0.65)  # shares of the way from a corner to the middle of its face
-_LEAST = 0.02  # opacity: below it nobody sees where hair is
+_SAMPLES = 4096  # largest number of face corners near which the picture is sampled
+_INWARD = (0.0, 0.35, 0.65)  # sample points, as fractions of the way from corner to face centre
+_LEAST = 0.02  # smallest opacity, so that hair stays visible
 
 
 def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
@@ -23,11 +23,11 @@ def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
     would look like blocks, because most of a card is transparent and overlaps other cards.
 
     Args:
-        look: of the mesh's material.
+        look: Look of the mesh's material.
         mesh: cards of hair.
 
     Returns:
-        Linear colour and opacity, 0 to 1; None without a picture that has an opacity.
+        Linear colour and opacity, 0 to 1; None without UV map or without a picture with alpha.
     """
     picture = look.image("color")
     if picture is None or picture.channels != 4 or mesh.uvs is None or not len(mesh.face_starts):
@@ -46,7 +46,7 @@ def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
 
 
 def _places(uvs: NDArray[np.float32], starts: NDArray[np.int32]) -> NDArray[np.float64]:
-    """float64[n, 2]: places of the picture within the faces, as many on each.
+    """float64[n, 2]: UV coordinates of sample points within the faces.
 
     Args:
         uvs: float32[N, 2] per corner.
@@ -60,7 +60,7 @@ def _places(uvs: NDArray[np.float32], starts: NDArray[np.int32]) -> NDArray[np.f
 
 
 def _at(pixels: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32[n, 4]: the texels at places of a picture, which repeats."""
+    """float32[n, 4]: the texels of a repeating picture at UV coordinates."""
     height, width = pixels.shape[:2]
     column, row = (
         (np.nan_to_num(places[:, axis]) % 1.0 * size).astype(np.int64).clip(0, size - 1)

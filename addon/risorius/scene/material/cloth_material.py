@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cloth: threads across and along, a soft sheen at the edges."""
+"""Material of cloth: threads across and along, a soft sheen at the edges."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from .look import Look
 from .nodes import Graph
 
 _COLOR = (0.055, 0.065, 0.08)  # linear: a dark jersey
-_THREADS = 150.0  # for each eye distance
-_NEAR, _FAR = 7.0, 14.0  # eye distances from the camera: threads are seen, and are gone
+_THREADS = 150.0  # radians of the thread pattern per eye distance
+_NEAR, _FAR = 7.0, 14.0  # camera distances in eye distances: threads begin to fade, and are gone
 
 
 def build(graph: Graph, look: Look) -> None:
     """Fill the tree of a material.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes and textures of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     points = graph.rest_points(look.extent)
     picture = look.image("color")

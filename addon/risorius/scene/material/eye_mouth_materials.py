@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes, teeth, tongue, gums, lashes and wet films: each varies over its surface, without maps."""
+"""Materials of eyes, teeth, tongue, gums, lashes and wet films. Textures are optional, because
+node patterns vary each surface."""
 
 from __future__ import annotations
 
@@ -9,11 +10,14 @@ from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Color, Graph, Value
 
-EYES = "risorius_eye"  # mesh attribute: x and height over the eye's radius, 1 on the front half
-TEETH = "risorius_teeth"  # mesh attribute: place along the arch in teeth, height from the bite
-MOUTH = "risorius_mouth"  # mesh attribute: how far behind the mesh's front, in eyes' distances
+# Mesh attributes. EYES: x and height from the eye's axis in radii, 1 on the front half; TEETH:
+# place along the arch, pi per tooth, and height, -1 to 1; MOUTH: depth behind the foremost vertex
+# in eye distances.
+EYES = "risorius_eye"
+TEETH = "risorius_teeth"
+MOUTH = "risorius_mouth"
 
-# Linear colours, from the look of the thing.
+# Linear colours, chosen by eye.
 _SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
 _PUPIL, _IRIS_IN, _IRIS_OUT = (0.002, 0.002, 0.002), (0.19, 0.10, 0.045), (0.055, 0.066, 0.05)
 _LIMBUS = (0.022, 0.022, 0.02)
@@ -31,15 +35,15 @@ _SHADED = (
     (0.62, (0.18, 0.13, 0.11)),
 )
 _CORNEA_IOR = 1.376
-_COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
+_COARSE = 1500  # vertices: a mesh with fewer has no separate teeth, so the material draws them
 
 
 def build(graph: Graph, look: Look) -> None:
     """Fill the tree of a material by the kind of its mesh.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     _KINDS[look.kind](graph, look)
 
@@ -56,12 +60,12 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 def eyes(graph: Graph, look: Look) -> None:
     """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
 
-    The coat keeps the smooth normal of the ball while the iris below has its own, so that its
-    highlight is round and the iris is lit from the far side, as refraction does.
+    The coat keeps the smooth normal of the eyeball, so that the highlight is round. The hollow
+    iris is lit on the side away from the light, as a real one is by refraction.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     if look.cornea and look.image("color") is not None:
         _ball(graph, look)
@@ -91,11 +95,11 @@ def eyes(graph: Graph, look: Look) -> None:
 
 
 def _ball(graph: Graph, look: Look) -> None:
-    """An eye under a cornea of its own: the iris is dry and has its relief, the sclera is wet.
+    """The eyeball under a separate cornea mesh: a dry iris with relief and a wet sclera.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: has a picture of the colour.
+        graph: Graph of the material.
+        look: Look of the mesh, with a colour texture.
     """
     x, z, front = graph.split(graph.attribute(EYES))
     flat = graph.math("SQRT", graph.math("MULTIPLY_ADD", x, x, graph.math("MULTIPLY", z, z)))
@@ -149,17 +153,18 @@ def _gray(graph: Graph, value: Value) -> Socket:
 
 
 def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
-    """Uneven wetness: a roughness between two values."""
+    """Uneven wetness: a roughness that noise varies between two values."""
     uneven = graph.noise(graph.rest_points(look.extent), 14.0 / look.unit, detail=3.0)
     return graph.math("MULTIPLY_ADD", uneven, high - low, low)
 
 
 def teeth(graph: Graph, look: Look) -> None:
-    """Enamel that yellows towards the gum, single teeth where the mesh has none, gums above.
+    """Enamel that yellows towards the gum; a coarse mesh without texture also gets single teeth
+    and gums.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     picture = look.image("color")
     points = graph.rest_points(look.extent)
@@ -172,7 +177,7 @@ def teeth(graph: Graph, look: Look) -> None:
         stain = graph.math("MULTIPLY_ADD", graph.noise(points, 16.0 / look.unit), 0.5, away)
         color = graph.ramp(stain, (0.35, _ENAMEL), (1.0, _ENAMEL_ROOT))
         if look.vertices < _COARSE:
-            # |sin| falls to 0 between two teeth; narrower at the gum, as crowns are.
+            # |sin| is 0 between two teeth and 1 in the middle of a tooth.
             round_ = graph.math("ABSOLUTE", graph.math("SINE", place))
             gap = graph.ramp(round_, (0.0, (1.0,) * 3), (0.16, (0.0,) * 3))
             color = graph.mix(graph.math("MULTIPLY", gap, 0.8), color, _GAP)
@@ -194,11 +199,11 @@ def teeth(graph: Graph, look: Look) -> None:
 
 
 def tongue(graph: Graph, look: Look) -> None:
-    """Papillae, and a wet coat that breaks on them.
+    """The tongue: wet flesh with papillae as relief.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0, _shade(graph))
 
@@ -207,8 +212,8 @@ def gum(graph: Graph, look: Look) -> None:
     """Wet, mottled flesh: gums, caruncles, cartilage.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     in_eye = any(word in look.base.lower() for word in ("cartilage", "caruncle"))
     tones = (_CARUNCLE_DARK, _CARUNCLE) if in_eye else (_GUM_DARK, _GUM)
@@ -216,12 +221,12 @@ def gum(graph: Graph, look: Look) -> None:
 
 
 def _shade(graph: Graph) -> Socket:
-    """The share of the light that comes so deep into a mouth, a colour."""
+    """The colour that darkens a surface by its depth in the mouth: white in front, dark inside."""
     return graph.ramp(graph.attribute_number(MOUTH), *_SHADED)
 
 
 def _shine(graph: Graph, shade: Socket | None, coat: float, gloss: float) -> None:
-    """A wet coat and the surface under it, both duller in dark places."""
+    """Set the wet coat and the gloss of the surface under it, both weaker where `shade` is dark."""
     if shade is None:
         graph.set(Coat_Weight=coat, Specular_Ior_Level=gloss)
         return
@@ -245,7 +250,7 @@ def _flesh(
     _shine(graph, shade, coat=0.5, gloss=0.45)
     if look.simple:
         return
-    # Papillae are cells; a caruncle is smooth but for some hills.
+    # Papillae are Voronoi cells; a caruncle has only coarse noise as relief.
     relief = graph.cells(points, grain / look.unit) if grain else mottled
     graph.set(
         Normal=graph.bump(relief, look.unit * 0.012, _textured_normal(graph, look), 0.6),
@@ -256,11 +261,11 @@ def _flesh(
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards: from an alpha or colour texture, or strands across the UV map.
+    """Hairs on cards, from an alpha or colour texture, or else from a noise pattern.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     picture, mask = look.image("color"), look.image("alpha", data=True)
     strands = _strands(graph, look)
@@ -270,7 +275,7 @@ def lashes(graph: Graph, look: Look) -> None:
         alpha = graph.image(mask, label="Alpha").outputs["Color"]
     elif picture is not None:
         node = graph.image(picture, label="Colour")
-        # A picture without alpha shows its hairs dark or light on a plain ground: strands stay.
+        # A picture without alpha shows hairs on a plain ground, so the noise pattern stays.
         alpha = node.outputs["Alpha"] if picture.channels == 4 else alpha
         color = node.outputs["Color"] if picture.channels == 4 else color
     graph.set(Base_Color=color, Alpha=alpha, Roughness=_film(graph, look, 0.4, 0.6))
@@ -279,7 +284,7 @@ def lashes(graph: Graph, look: Look) -> None:
 
 
 def _strands(graph: Graph, look: Look) -> Socket:
-    """Noise drawn out along the hairs."""
+    """Noise that is stretched along the hairs: along v of the UV map, or else along y."""
     where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
     reach = 1.0 if look.has_uvs else 1.0 / look.unit
     stretched = graph.vector("MULTIPLY", where, (110 * reach, 0.6 * reach, 110 * reach))
@@ -287,21 +292,21 @@ def _strands(graph: Graph, look: Look) -> Socket:
 
 
 def wet(graph: Graph, look: Look) -> None:
-    """A film one looks through: clear, with the reflection that water has at each angle.
+    """A clear film that reflects like water at each angle.
 
-    Transparent instead of refracting, because a refracting shell keeps light from the eye under
-    it in both engines; what bends here is only the reflection. A cornea refracts in Cycles too,
-    but for the camera alone: light and shadows pass.
+    The film is transparent and does not refract, because a refracting shell keeps light from the
+    eye under it in both engines. Only a cornea refracts, in Cycles and for camera rays alone, so
+    that light and shadows pass.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes, textures and areas of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     points = graph.rest_points(look.extent)
     ripples = graph.noise(points, 18.0 / look.unit, detail=3.0)
     base = look.base.lower()
     cornea = "cornea" in base
-    still = cornea or "eyeedge" in base  # too narrow for ripples: they would break its one shine
+    still = cornea or "eyeedge" in base  # ripples would break up its single highlight
     normal = None if still else graph.bump(ripples, look.unit * 0.006, None, 0.25)
     gloss = graph.node("BsdfGlossy")
     gloss.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
@@ -311,7 +316,7 @@ def wet(graph: Graph, look: Look) -> None:
     fresnel = graph.node("Fresnel")
     fresnel.inputs["IOR"].default_value = _CORNEA_IOR if cornea else 1.336
     graph.put(normal, fresnel.inputs["Normal"])
-    # From behind there is no air above the film, and its far side must not mirror.
+    # The back of the film must not reflect, because there is no air on that side.
     facing = graph.math("SUBTRACT", 1.0, graph.node("NewGeometry").outputs["Backfacing"])
     amount = graph.math("MULTIPLY", fresnel.outputs[0], facing)
     clear = graph.node("BsdfTransparent")
@@ -335,7 +340,7 @@ def wet(graph: Graph, look: Look) -> None:
 
 
 def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
-    """A shader that has an amount of another."""
+    """A mix of two shaders; an amount of 0 gives `one`, 1 gives `other`."""
     both = graph.node("MixShader")
     graph.put(amount, both.inputs[0])
     graph.put(one, both.inputs[1])
@@ -344,7 +349,7 @@ def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
 
 
 def _transparent(material: bpy.types.Material, method: str) -> None:
-    """How EEVEE lets things through; shadows pass the clear parts."""
+    """Set EEVEE's method of transparency; light passes the clear parts in shadows too."""
     material.surface_render_method = method  # pyright: ignore[reportAttributeAccessIssue]
     material.use_transparency_overlap = False
     if hasattr(material, "use_transparent_shadow"):

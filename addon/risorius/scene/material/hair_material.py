@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on cards: opacity by the picture, a soft highlight that fades at flat angles."""
+"""Material of hair cards: opacity from the picture, a soft highlight that fades at grazing
+angles."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from .look import Look
 from .nodes import Graph
 
 _ROUGH = 0.5
-_SHINE = 0.12  # as of metal: hair reflects in its own colour, also where it is seen from aside
+_SHINE = 0.12  # metallic: hair reflects in its own colour, also at grazing angles
 _GLOSS, _GLOSS_FACING = 0.08, 0.22
 _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 
@@ -17,8 +18,8 @@ def build(graph: Graph, look: Look) -> None:
     """Fill the tree of the material of scalp hair, brows or a beard.
 
     Args:
-        graph: of the material, with its shader and its output.
-        look: sizes and textures of the mesh.
+        graph: Graph of the material.
+        look: Look of the mesh.
     """
     picture = look.image("color")
     if picture is None:
@@ -33,7 +34,7 @@ def build(graph: Graph, look: Look) -> None:
     if look.simple:
         return
     normal = outward_normal(graph)
-    # A sheet mirrors all at a flat angle, a tuft of fibres does not.
+    # A flat card would reflect everything at a grazing angle; a tuft of fibres does not.
     facing = graph.node("LayerWeight")
     graph.put(normal, facing.inputs["Normal"])
     towards = graph.math("SUBTRACT", 1.0, facing.outputs["Facing"], clamp=True)
@@ -42,9 +43,9 @@ def build(graph: Graph, look: Look) -> None:
 
 
 def outward_normal(graph: Graph) -> Socket:
-    """The normal of the file on both sides of a card, because it is the normal of the skin.
+    """The file's normal for both sides of a card, because it is the normal of the skin.
 
-    Renderers flip a normal on the back of a polygon.
+    Renderers flip normals on the back of a polygon, so the flip is undone.
     """
     geometry = graph.node("NewGeometry")
     both = graph.math("MULTIPLY_ADD", geometry.outputs["Backfacing"], -2.0, 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images: loaded once, packed, and read in the colour space that their role asks for."""
+"""Loads textures once, packs them into the .blend, and sets the colour space of their role."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ...logic.base.sentences import told
 from ...logic.material import image_size, texture_search
 from ..base import sharing, storage
 
-# Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
-# ACES CG and studio configurations, Filmic ones. The first that the running one knows is taken.
+# Names of the sRGB texture space in common OpenColorIO configurations: Blender's own, ACES 1,
+# ACES CG and studio, Filmic. The first name that the active configuration knows is used.
 COLOR_SPACES = (
     "sRGB",
     "sRGB - Texture",
@@ -29,12 +29,12 @@ COLOR_SPACES = (
     "sRGB OETF",
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
-PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
-# Largest unpacked size of one image, and of all images of an import, and the largest ratio to their
-# files. An image must exceed both to be refused: a flat picture of 8192 pixels packs to almost
-# nothing and is accepted.
+PACK_LIMIT = 64 << 20  # bytes; larger files are not packed, or a .blend would grow to gigabytes
+# In memory an image may take _ONE_IMAGE bytes + _MOST_TIMES its file size, all images of an import
+# _ALL_IMAGES bytes + _MOST_TIMES the size of their files. So 8192 x 8192 pixels of 4 bytes are
+# accepted even if the file is tiny because the picture has one colour.
 _ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
-TILE = 512  # pixels of one tile of the mask atlas, each side
+TILE = 512  # pixels, side of one tile of the mask atlas
 
 
 def set_color_space(image: bpy.types.Image, data: bool) -> None:
@@ -46,26 +46,26 @@ def set_color_space(image: bpy.types.Image, data: bool) -> None:
     """
     settings: Any = image.colorspace_settings
     if not data and image.is_float:
-        return  # linear, as Blender assumes by the configuration's role for floats
+        return  # Blender already gives float images the linear space of the configuration
     known = [item.identifier for item in settings.bl_rna.properties["name"].enum_items]
     words = ("raw", "non-col", "data") if data else ("srgb",)
     alike = [n for n in known if any(w in n.lower() for w in words)]
     for name in (*(DATA_SPACES if data else COLOR_SPACES), *alike):
         try:
             settings.name = name
-        except TypeError:  # an enum without that name: another configuration
+        except TypeError:  # the active configuration has no space of that name
             continue
         return
     if data:
-        settings.is_data = True  # at least the configuration's own role for data
+        settings.is_data = True  # falls back to the configuration's role for data
 
 
 def _room_for(path: Path) -> int:
-    """Bytes that an image takes when it is unfolded.
+    """Bytes that an image takes in memory, from the header of its file.
 
     Raises:
-        ValueError: it is no picture, or takes too much for its file.
-        OSError: it cannot be read.
+        ValueError: the file is no picture, or the picture is too large for the size of its file.
+        OSError: the file cannot be read.
     """
     with path.open("rb") as file:
 
@@ -94,20 +94,23 @@ def _room_for(path: Path) -> int:
 
 
 class Images:
-    """Loads each file once for each role and packs it into the .blend; `troubles` are sentences."""
+    """Loads each file at most once as colours and once as data, and packs it into the .blend.
+
+    New images are added to `made`; `troubles` has a sentence for each problem.
+    """
 
     def __init__(self, made: list[bpy.types.ID]) -> None:
         self.made = made
         self.troubles: list[str] = []
         self._loaded: dict[tuple[str, bool], bpy.types.Image | None] = {}
         self._small: dict[Path, NDArray[np.float32] | None] = {}
-        self._room, self._files = 0, 0  # bytes, of all images that were loaded
+        self._room, self._files = 0, 0  # bytes of all loaded images, in memory and as files
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
         """The image of a file, or None if it is missing or unreadable.
 
         Args:
-            path: of the file; None gives None.
+            path: path of the file; None gives None.
             data: whether its pixels are numbers instead of colours, as in a normal map.
         """
         if path is None:
@@ -118,10 +121,11 @@ class Images:
         return self._loaded[key]
 
     def small(self, path: Path) -> NDArray[np.float32] | None:
-        """float32[TILE, TILE, 4]: a file's stored numbers; None if it is unreadable.
+        """float32[TILE, TILE, 4]: the pixels of a file, scaled, without colour management; None if
+        the file is unreadable.
 
         Args:
-            path: of the file.
+            path: path of the file.
         """
         if path not in self._small:
             self._small[path] = _small_copy(path)
@@ -144,7 +148,7 @@ class Images:
             return None
         self.made.append(image)
         set_color_space(image, data)
-        if not image.size[0]:  # read lazily: a file of another kind shows itself only now
+        if not image.size[0]:  # Blender reads lazily: only now a file that is no image shows
             self._complain(told("The texture {file} cannot be read.", file=path.name))
             self.made.remove(image)
             bpy.data.images.remove(image)
@@ -182,11 +186,11 @@ class Images:
     def atlas(
         self, name: str, masks: Mapping[str, texture_search.Mask]
     ) -> tuple[bpy.types.Image | None, dict[str, tuple[int, int, int, int]]]:
-        """One image with the masks of many regions, three in each tile, because a render engine has
-        few samplers.
+        """Pack the masks of many regions into one image, three in each tile, because a render
+        engine limits the number of textures of a material.
 
         Args:
-            name: of the image.
+            name: name of the image.
             masks: region -> texture_search.Mask.
 
         Returns:
@@ -220,7 +224,8 @@ class Images:
         return self._shared(image), places
 
     def _shared(self, image: bpy.types.Image) -> bpy.types.Image:
-        """An image of this .blend with the same packed bytes in the place of a new one."""
+        """Replace a new image with an image of this .blend that has the same packed bytes, if there
+        is one."""
         assert image.packed_file is not None
         content = bytes(image.packed_file.data)
         digest = storage.hash_of(content)
@@ -234,7 +239,8 @@ class Images:
 
 
 def _small_copy(path: Path) -> NDArray[np.float32] | None:
-    """float32[TILE, TILE, 4] of a file's stored numbers, or None if it is unreadable."""
+    """float32[TILE, TILE, 4]: the pixels of a file, scaled, without colour management; None if
+    the file is unreadable."""
     try:
         _room_for(path)
         image = bpy.data.images.load(str(path), check_existing=False)
@@ -255,7 +261,7 @@ def _small_copy(path: Path) -> NDArray[np.float32] | None:
 
 
 def mean_of(path: Path) -> NDArray[np.float32] | None:
-    """float32[4] mean of a file's stored numbers; used to tell offsets from whole maps."""
+    """float32[4]: mean pixel of a file without colour management; None if it is unreadable."""
     small = _small_copy(path)
     return None if small is None else small.mean(axis=(0, 1))
 

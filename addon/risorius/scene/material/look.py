@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inputs of building one material: sizes, areas, textures."""
+"""The inputs from which one material is built: sizes, areas, textures."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from . import image_loading
 
 @dataclass
 class Look:
-    """Inputs of building one material.
+    """The inputs from which one material is built.
 
     Attributes:
-        kind: as in MeshPlan.
+        kind: kind of the mesh, see MeshPlan.
         base: mesh name without LOD.
         rig: the deforming armature, whose `maps` array drives the map values.
         extent: float64[3] size of the mesh in Blender units.
         unit: distance of the eyes in Blender units; patterns scale with it.
-        vertices: of the finest mesh.
-        has_uvs: whether it has a UV map.
-        simple: leave out subsurface, relief and maps.
+        vertices: number of vertices of the finest mesh.
+        has_uvs: whether the mesh has a UV map.
+        simple: True leaves out subsurface scattering, relief and maps.
         cornea: whether the face has a mesh of corneas over its eyes.
         uses: uses of the animated maps.
         areas: areas of a face that this mesh has.
@@ -59,13 +59,14 @@ class Look:
         """The image of a role, or None.
 
         Args:
-            role: "color", "cavity", "normal:2" and the like, see texture_search.
-            data: whether its pixels are numbers instead of colours.
+            role: such as "color", "cavity" or "normal:2", see texture_search.
+            data: whether the pixels are numbers instead of colours.
         """
         return self.images.load(self.found.of(self.base, role), data)
 
     def small(self, role: str) -> NDArray[np.float32] | None:
-        """float32[h, w, 4]: the stored numbers of a role's image, made small; None without it."""
+        """float32[TILE, TILE, 4]: the pixels of a role's image, scaled, without colour management;
+        None if there is no readable image."""
         path = self.found.of(self.base, role)
         return None if path is None else self.images.small(path)
 

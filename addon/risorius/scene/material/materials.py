@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One material per kind of mesh; animated maps as driven inputs of its nodes."""
+"""Builds one material per mesh name without LOD; animated maps drive inputs of its nodes."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _VIEW_COLORS = {
     "cloth": (0.10, 0.11, 0.13, 1.0),
     "hair": (0.05, 0.035, 0.025, 0.5),
 }
-_VIEW_ROUGHNESS = {"skin": 0.6, "cloth": 1.0, "hair": 0.8}  # in the solid view; others shine
+_VIEW_ROUGHNESS = {"skin": 0.6, "cloth": 1.0, "hair": 0.8}  # others keep Blender's default
 _IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
-_IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see eyes
+_IRIS_RADIUS = 0.47  # radius of iris and limbus in radii of the eye, see eye_mouth_materials.eyes
 _WIDE = 1.6  # a mesh wider than this times its height holds both eyes
 
 
@@ -44,7 +44,7 @@ def build_materials(
     found: texture_search.TexturePlan | None = None,
     simple: bool = False,
 ) -> list[str]:
-    """Build the materials of a character, one per mesh base, and put them on its meshes.
+    """Build the materials of a character, one per mesh name without LOD, and assign them.
 
     Args:
         plan: the CharacterPlan.
@@ -52,7 +52,7 @@ def build_materials(
         built: mesh objects, in the order of the plan's meshes.
         made: receives every new datablock.
         found: texture_search.TexturePlan; None for no textures.
-        simple: build the cheap variant: no subsurface, relief or maps.
+        simple: True builds cheaper materials without subsurface scattering, relief and maps.
 
     Returns:
         Sentences about textures that are missing, cannot be read or stay outside the .blend.
@@ -116,7 +116,7 @@ def _look(
 def _build(
     plan: plans.CharacterPlan, look: Look, made: list[bpy.types.ID]
 ) -> list[bpy.types.Material]:
-    """The materials of a mesh base, by slot."""
+    """Build the materials of one mesh name without LOD, in the order of their slots."""
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
     material.diffuse_color = _VIEW_COLORS[look.kind]
@@ -143,7 +143,7 @@ def _build(
 
 
 def _choose_picture(look: Look, graph: Graph) -> None:
-    """Make the colour's image active: the solid view's *Texture* shows the active one.
+    """Make the colour image active, because the solid view's *Texture* mode shows the active image.
 
     Without an image a pattern becomes active, so that the view shows the material's colour.
     Otherwise it would show the first image, such as a mask.
@@ -157,7 +157,7 @@ def _choose_picture(look: Look, graph: Graph) -> None:
 
 
 def _give_iris(mesh: bpy.types.Mesh) -> None:
-    """Put the faces of the iris and the pupil into the second slot."""
+    """Assign the faces of the iris and the pupil to the second material slot."""
     flat = np.empty(len(mesh.vertices) * 3, np.float32)
     places_of: Attribute = mesh.attributes[eye_mouth_materials.EYES]
     places_of.data.foreach_get("vector", flat)
@@ -177,7 +177,7 @@ def _give_iris(mesh: bpy.types.Mesh) -> None:
 
 
 def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
-    """The FaceFrame, or None where no skin is among the meshes."""
+    """The FaceFrame of a character, or None if no mesh is skin."""
     skins = [m for m in plan.meshes if m.kind == "skin" and len(m.positions)]
     heads = [m for m in skins if "head" in m.base.lower() or "face" in m.base.lower()]
     if not skins:
@@ -194,7 +194,8 @@ def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
 def _add_attributes(
     mesh: bpy.types.Mesh, plan: plans.MeshPlan, frame: skin_folds.FaceFrame | None
 ) -> set[str]:
-    """Write the attributes for this kind of material. Returns: the areas of a skin."""
+    """Write the mesh attributes that materials of this kind read. Returns: the areas of a face
+    on a skin mesh, else none."""
     if not len(plan.positions):
         return set()
     if plan.kind == "eyes":
@@ -222,7 +223,8 @@ def _add(
 def _add_border(
     mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
 ) -> None:
-    """Write the distance to an open border away from the face, if there is one."""
+    """Write the closeness to an open border away from the face, 1 at the border, if there is
+    one."""
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)
     used = np.empty(len(mesh.loops), np.int32)
@@ -250,7 +252,7 @@ def _add_areas(
 
 
 def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[V, 3]: x and height from the eye's axis over its radius; 1 on its front half."""
+    """float64[V, 3]: x and height from the eye's axis in radii, and 1 on the front half, else 0."""
     points = points.astype(np.float64)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
     wide = np.ptp(points[:, 0]) > _WIDE * np.ptp(points[:, 2])
@@ -271,12 +273,13 @@ def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArr
 def _tooth_coordinates(
     points: NDArray[np.float32] | NDArray[np.float64], unit: float
 ) -> NDArray[np.float64]:
-    """float64[V, 3]: pi for each tooth along the arch, height from the bite over its reach, 0."""
+    """float64[V, 3]: place along the arch, pi per tooth; height from the mesh's middle, -1 to 1;
+    0."""
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     half = max((high[0] - low[0]) / 2, 1e-9)
     across = (points[:, 0] - (low[0] + high[0]) / 2) / half
-    # Along a half circle: the length of the arch, not its width, carries the teeth.
+    # The arch is taken as a half circle, because teeth are spaced along it and not along x.
     along = np.arcsin(np.clip(across, -1, 1)) * half
     width = 0.125 * unit  # an upper front tooth is about an eighth of the eyes' distance
     height = (points[:, 2] - (low[2] + high[2]) / 2) / max((high[2] - low[2]) / 2, 1e-9)
@@ -284,7 +287,7 @@ def _tooth_coordinates(
 
 
 def map_drivers(material: bpy.types.Material | None) -> Iterator[bpy.types.FCurve]:
-    """The driver curves of the animated maps of a material, with their map index."""
+    """The driver curves of the animated maps of a material."""
     data = material.node_tree.animation_data if material and material.node_tree else None
     for curve in data.drivers if data else ():
         if skin_material.MAP_PREFIX in curve.data_path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Short words for building node trees, the same for all versions of Blender."""
+"""Short methods for building node trees that work in all supported versions of Blender."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Value = Socket | float | tuple[float, ...]  # an output to link, or a value to s
 
 
 class Graph:
-    """The tree of one material.
+    """The node tree of one material.
 
     Sockets and plain numbers are both allowed as inputs. Sockets are found by number or
-    identifier where their names differ between versions.
+    identifier if their names differ between versions.
     """
 
     def __init__(self, material: bpy.types.Material) -> None:
@@ -35,8 +35,8 @@ class Graph:
         """A new node.
 
         Args:
-            kind: its type is `ShaderNode<kind>`.
-            label: shown as its title; "" for the type's.
+            kind: type of the node without the prefix `ShaderNode`.
+            label: title of the node; "" for Blender's title of the type.
         """
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         node.label = label
@@ -59,10 +59,10 @@ class Graph:
             self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
 
     def math(self, operation: str, *values: Value, clamp: bool = False) -> Socket:
-        """A Math node; its output.
+        """Add a Math node. Returns: its output.
 
         Args:
-            operation: of Blender's Math node, "ADD" and the like.
+            operation: operation of Blender's Math node, such as "ADD".
             values: numbers or sockets for its inputs, in their order.
             clamp: clamp the result to 0..1.
         """
@@ -85,10 +85,11 @@ class Graph:
         return self.math("ADD", result, 0.0, clamp=True) if clamp and values else result
 
     def vector(self, operation: str, *values: Value) -> Socket:
-        """A Vector Math node; its vector output, or its number for lengths and products.
+        """Add a Vector Math node. Returns: its vector output, or its number for LENGTH, DISTANCE
+        and DOT_PRODUCT.
 
         Args:
-            operation: of Blender's Vector Math node, "ADD" and the like.
+            operation: operation of Blender's Vector Math node, such as "ADD".
             values: numbers, vectors or sockets for its inputs, in their order.
         """
         node = self.node("VectorMath")
@@ -104,7 +105,7 @@ class Graph:
             factor: 0 gives a, 1 gives b; clamped to 0..1.
             a: colour or socket.
             b: colour or socket.
-            blend: of Blender's Mix node, "MIX", "MULTIPLY" and the like.
+            blend: blend mode of Blender's Mix node, such as "MIX" or "MULTIPLY".
         """
         node = self.node("Mix")
         node.data_type, node.blend_type = "RGBA", blend
@@ -116,7 +117,7 @@ class Graph:
         """Mix two numbers.
 
         Args:
-            factor: 0 gives a, 1 gives b; held within 0 and 1.
+            factor: 0 gives a, 1 gives b; clamped to 0..1.
             a: number or socket.
             b: number or socket.
         """
@@ -132,10 +133,10 @@ class Graph:
         self.put(b, where[f"B_{kind}"])
 
     def ramp(self, factor: Value, *stops: tuple[float, Color]) -> Socket:
-        """A colour ramp; its colour.
+        """Add a colour ramp. Returns: its colour.
 
         Args:
-            factor: where on the ramp, 0 to 1.
+            factor: position on the ramp, 0 to 1.
             stops: (position, (r, g, b)) in rising order, linear colours; two at least.
         """
         node = self.node("ValToRGB")
@@ -153,7 +154,7 @@ class Graph:
         """Noise from 0 to 1, its mean near 0.5.
 
         Args:
-            vector: the place.
+            vector: coordinates.
             scale: cells of noise for each unit of vector.
             detail: number of octaves.
             roughness: factor of each octave relative to the one before.
@@ -166,12 +167,13 @@ class Graph:
         return node.outputs[0]
 
     def cells(self, vector: Value, scale: float, feature: str = "F1") -> Socket:
-        """Distances of Voronoi cells.
+        """The distance output of a Voronoi texture.
 
         Args:
-            vector: the place.
+            vector: coordinates.
             scale: cells for each unit of vector.
-            feature: of Blender's Voronoi node: "F1" the distance to the nearest point, or another.
+            feature: feature of Blender's Voronoi node, such as "F1", the distance to the nearest
+                point.
         """
         node = self.node("TexVoronoi")
         node.feature = feature
@@ -180,31 +182,32 @@ class Graph:
         return node.outputs["Distance"]
 
     def attribute(self, name: str) -> Socket:
-        """Vector of a mesh attribute; zero on meshes that have none."""
+        """The vector of a mesh attribute; zero on meshes without the attribute."""
         node = self.node("Attribute", name)
         node.attribute_name = name
         return node.outputs["Vector"]
 
     def attribute_number(self, name: str) -> Socket:
-        """A mesh attribute of one number; 0 on meshes that have none."""
+        """The number of a mesh attribute; 0 on meshes without the attribute."""
         node = self.node("Attribute", name)
         node.attribute_name = name
         return node.outputs["Fac"]
 
     def split(self, vector: Value) -> tuple[Socket, Socket, Socket]:
-        """Three numbers of a vector."""
+        """X, y and z of a vector."""
         node = self.node("SeparateXYZ")
         self.put(vector, node.inputs[0])
         return tuple(node.outputs[:3])
 
     def split_color(self, color: Value) -> tuple[Socket, Socket, Socket]:
-        """Three numbers of a colour."""
+        """Red, green and blue of a colour."""
         node = self.node("SeparateColor")
         self.put(color, node.inputs[0])
         return tuple(node.outputs[:3])
 
     def rest_points(self, size: NDArray[np.float64]) -> Socket:
-        """Places on the undeformed mesh, in Blender units: patterns that move with the skin."""
+        """Coordinates on the undeformed mesh in Blender units, so that patterns move with the skin.
+        `size` is the extent of the mesh."""
         generated = self.node("TexCoord").outputs["Generated"]
         return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
 
@@ -230,19 +233,19 @@ class Graph:
         node = self.node("TexImage", label)
         node.image = image
         if clamp:
-            node.extension = "EXTEND"  # repeated, its far edge would mix into the near one
+            node.extension = "EXTEND"  # otherwise filtering mixes the opposite edge in
         self.put(vector, node.inputs["Vector"])
         return node
 
     def bump(
         self, height: Value, distance: float, normal: Value | None = None, strength: float = 1.0
     ) -> Socket:
-        """A normal that a height field gives.
+        """A normal that is computed from a height field.
 
         Args:
             height: 0 to 1.
-            distance: in Blender units, how much height 1 is.
-            normal: that it is added to; None for the surface's own.
+            distance: Blender units of height 1.
+            normal: normal without the relief; None for the surface's own.
             strength: 0 to 1.
         """
         node = self.node("Bump")
@@ -254,7 +257,7 @@ class Graph:
 
     def tidy(self) -> None:
         """Lay the nodes out in columns by their distance from the output."""
-        sources = defaultdict(list)  # found once: a socket's own links search the whole tree
+        sources = defaultdict(list)  # collected once, because socket.links searches the whole tree
         for link in self.tree.links:
             sources[link.to_node].append(link.from_node)
         column = {}

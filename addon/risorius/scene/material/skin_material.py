@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin: subsurface, pores, and the effects of animated maps on colour and normals."""
+"""Material of skin: subsurface scattering, pores, and the effects of animated maps on colour and
+normals."""
 
 from __future__ import annotations
 
@@ -16,44 +17,45 @@ from .nodes import Graph, Value
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
 FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
-BORDER = "risorius_border"  # mesh attribute: 1 beside an open border, 0 on the rest
+BORDER = "risorius_border"  # mesh attribute: 1 near an open border, 0 far away
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
-# Density of folds in radians for each distance of the eyes.
+# Density of folds in radians per eye distance.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
-_FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
+_FLUSH_SHARE = 0.22  # factor of blushes without a painted mask, which must stay faint
 _PORE_DEPTH = 0.032
 _GRAIN_DEPTH = 0.006
-# Light goes so far in light skin, in distances of the eyes; in dark skin less.
+# Range of light in light skin, in eye distances; smallest factor of this range in dark skin.
 _SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
-_OILY, _OIL_ROUGHNESS = 0.14, 0.6  # the second lobe, and how rough it is beside the first
+_OILY, _OIL_ROUGHNESS = 0.14, 0.6  # weight of the oily coat; its roughness / the skin's
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 Member = tuple[str, Value]  # side of the face, value of the map
 
 
 class Bucket(NamedTuple):
-    """Target of a sum of maps: "flush", a texture set by number, or folds by name."""
+    """The effect that a sum of maps drives: "flush", a texture set by number, or folds by name."""
 
     kind: str  # "flush", "color", "normal" or "bump"
-    number: int = 0  # of the set: of "color" and "normal"
-    folds: str = ""  # of "bump", see animated_maps.FOLDS
+    number: int = 0  # of the texture set, for "color" and "normal"
+    folds: str = ""  # kind of folds for "bump", see animated_maps.FOLDS
 
 
 class Mask(NamedTuple):
-    """Where maps show: the texture of one map, a region of the painted masks, or an area."""
+    """The part of the skin that maps affect: the texture of one map, a region of the painted masks,
+    or an area."""
 
     kind: str  # "own", "atlas" or "area"
-    place: str = ""  # of "atlas" and "area"
-    map_index: int = -1  # of "own"
+    place: str = ""  # region for "atlas", area for "area"
+    map_index: int = -1  # for "own"
 
 
 class Skin:
-    """Builds one skin material and stores the data of its steps.
+    """Builds one skin material.
 
     Args:
         graph: nodes.Graph of the material.
@@ -71,7 +73,7 @@ class Skin:
         self.wrinkles: dict[int, Value] = {}
 
     def build(self) -> None:
-        """Fill the tree."""
+        """Fill the node tree of the material."""
         graph, look = self.graph, self.look
         graph.set(Subsurface_Weight=0.0, Ior=_IOR)
         if not look.simple:
@@ -87,8 +89,8 @@ class Skin:
             graph.set(Coat_Weight=_OILY, Coat_Ior=_IOR)
 
     def _subsurface(self, color: Value) -> None:
-        """Subsurface scattering: shorter in dark skin, and none beside an open border, where light
-        would leak."""
+        """Set subsurface scattering: shorter in dark skin, and none near an open border, because
+        light would leak there."""
         graph, look = self.graph, self.look
         light = graph.node("RGBToBW")
         graph.put(color, light.inputs[0])
@@ -100,7 +102,7 @@ class Skin:
         graph.set(Subsurface_Weight=weight, Subsurface_Radius=_RADIUS, Subsurface_Scale=far)
 
     def _areas(self) -> dict[str, Socket]:
-        """Area -> socket, and `left`; empty for a mesh that has no face."""
+        """The masks of the areas, and of "left", the left half; empty for a mesh without a face."""
         if not self.look.areas:
             return {}
         found = {}
@@ -112,7 +114,7 @@ class Skin:
     # --- animated maps -------------------------------------------------------------------
 
     def _read_maps(self) -> None:
-        """Add value nodes for the visible maps of this mesh, and their sums."""
+        """Add driven Value nodes for the visible maps of this mesh, and sum the maps by effect."""
         frame = None
         groups = {}
         for use in self.look.uses:
@@ -132,7 +134,7 @@ class Skin:
             self._file(bucket, amounts)
 
     def _targets(self, use: animated_maps.MapUse) -> list[tuple[Bucket, Mask]]:
-        """Targets of a map on this mesh: pairs of bucket and mask; none if it is invisible."""
+        """The effects of a map on this mesh, each with its mask; none if the map is invisible."""
         look = self.look
         own = look.image(f"map:{use.label}", data=True)
         if own is not None:
@@ -162,7 +164,8 @@ class Skin:
         return value.outputs[0]
 
     def _masked(self, bucket: Bucket, mask: Mask, members: Sequence[Member]) -> Socket:
-        """The sum of some maps' values, each side on its own half, times their mask."""
+        """The sum of the values of maps, times their mask. In an area, a map of one side affects
+        its own half only."""
         graph = self.graph
         if mask.kind == "own":
             use = self.look.uses[mask.map_index]
@@ -191,7 +194,7 @@ class Skin:
         column, row, channel, side = self.look.places[region]
         cache = self.__dict__.setdefault("_tiles", {})
         if (column, row) not in cache:
-            graph, rim = self.graph, 0.5 / image_loading.TILE  # no neighbour's tile at the edges
+            graph, rim = self.graph, 0.5 / image_loading.TILE  # keeps neighbouring tiles out
             inside = graph.vector("MAXIMUM", graph.uv(), (rim, rim, 0.0))
             inside = graph.vector("MINIMUM", inside, (1 - rim, 1 - rim, 0.0))
             small = graph.vector("SCALE", inside)
@@ -235,7 +238,7 @@ class Skin:
         return color
 
     def _tone(self) -> Value:
-        """Skin without a texture: blotches, and redder areas of a face."""
+        """The colour of skin without a texture: blotches, and redder areas of the face."""
         graph, unit = self.graph, self.look.unit
         blotches = graph.noise(self.points, 1.1 / unit, detail=6.0, roughness=0.6)
         color = graph.ramp(blotches, (0.32, _DARK), (0.68, _TONE))
@@ -246,13 +249,14 @@ class Skin:
         return color
 
     def _tint(self, color: Value, number: int, amount: Value) -> Value:
-        """Mix towards the colours of a set; sets of newer exports store differences around 0.5."""
+        """Mix towards the colours of a texture set, or add them if they are differences around
+        0.5."""
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
         other = picture.outputs["Color"]
         if not self.look.is_offset(f"color:{number}"):
             return graph.mix(amount, color, other)
-        # Differences were made between encoded values: add them to encoded ones.
+        # Differences are between gamma-encoded values, so they are added to encoded values.
         gamma = graph.node("Gamma")
         graph.put(color, gamma.inputs[0])
         gamma.inputs[1].default_value = 1 / 2.2
@@ -269,7 +273,7 @@ class Skin:
     # --- relief --------------------------------------------------------------------------
 
     def _ridges(self) -> dict[str, Value]:
-        """Kind of fold -> height between 0 in the creases and 1, once for all maps."""
+        """Kind of fold -> height, 0 in the creases to 1 on the ridges; built only once."""
         if self.folds is not None:
             return self.folds
         graph = self.graph
@@ -283,7 +287,7 @@ class Skin:
                 cells = graph.cells(self.points, 9.0 / self.look.unit)
                 self.folds[kind] = graph.math("MINIMUM", cells, 1.0)
                 continue
-            if kind == "rays":  # from the outer half of the eye, like a crow's foot
+            if kind == "rays":  # crow's feet, which radiate from the outer half of the eye
                 aside = graph.math("SUBTRACT", graph.math("ABSOLUTE", x), 0.45)
                 turn = graph.math("ARCTAN2", z, graph.math("MAXIMUM", aside, 0.001))
                 along = graph.math("MULTIPLY", turn, 0.5)
@@ -296,7 +300,7 @@ class Skin:
         return self.folds
 
     def _creases(self) -> Value | None:
-        """How deep in a crease a place is: creases are darker and redder."""
+        """Amount, 0 to 1, by which creases darken and redden the skin; None without folds."""
         graph = self.graph
         deep = []
         for kind, ridge in self._ridges().items():
@@ -305,14 +309,15 @@ class Skin:
         return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
     def _normal(self) -> Socket:
-        """Pores and folds as one height field: engines work each one out three times."""
+        """Pores and folds as one height field, because engines evaluate each height field three
+        times."""
         graph, look = self.graph, self.look
         normal = self._normal_map()
         pores = graph.cells(self.points, 75.0 / look.unit)
         grain = graph.noise(self.points, 34.0 / look.unit, detail=2.0, roughness=0.65)
-        deep = _PORE_DEPTH * (0.35 if normal else 1.0)  # a texture has pores of its own
+        deep = _PORE_DEPTH * (0.35 if normal else 1.0)  # a normal texture already has pores
         heights = [graph.math("MULTIPLY", graph.math("ADD", pores, grain), deep)]
-        # Seen from near, where pores of a texture are soft spots.
+        # Fine grain for close views, in which the pores of a texture are blurred.
         finest = graph.noise(self.points, 260.0 / look.unit, detail=1.0)
         heights.append(graph.math("MULTIPLY", finest, _GRAIN_DEPTH))
         for kind, ridge in self._ridges().items():
@@ -321,7 +326,8 @@ class Skin:
         return graph.bump(graph.total(heights), look.unit * 0.03, normal)
 
     def _normal_map(self) -> Socket | None:
-        """The normal of the textures, wrinkle sets mixed in by their masks; None without."""
+        """The normal of the textures with wrinkle sets mixed in by their amounts; None without
+        normal textures."""
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)
         if base is None and not self.wrinkles:
@@ -349,7 +355,7 @@ class Skin:
         picture = look.image("roughness", data=True)
         if picture is not None:
             color = graph.image(picture, label="Roughness").outputs["Color"]
-            # glTF's pictures of this name have it in their green, metalness in their blue.
+            # glTF textures named *_orm have the roughness in green and the metalness in blue.
             file = look.found.of(look.base, "roughness")
             is_packed = file is not None and file.stem.endswith("_orm")
             return graph.split_color(color)[1] if is_packed else color

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""New faces from some that go together: a preview that follows the sliders, and the file."""
+"""Mixes matching faces into a new one: a preview that follows the sliders, and the file."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a mix, read once, and the mesh of its preview."""
+"""Reads the files of a mix, shows the preview mesh, and writes the mixed face."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ...logic.character import plans
 from ..base import session
 from ..base.blender_types import Context, MeshObject
 
-PREVIEW = "risorius_mix_preview"  # on the object that shows the mix
-# Path -> when and how large, its Dna.
+PREVIEW = "risorius_mix_preview"  # custom property of the object that shows the mix
+# Path -> (time of change, size), Dna.
 _read: dict[str, tuple[tuple[float, int], native.Dna]] = session.table(
     "parents.read", ("unregister",)
 )
@@ -34,7 +34,7 @@ class MixError(FaceError, ValueError):
 
 
 def region_names() -> tuple[str, ...]:
-    """The regions that a face may have from another one."""
+    """The names of the regions of a face that can be mixed with shares of their own."""
     return tuple(native.part("mixing").REGIONS)
 
 
@@ -42,7 +42,7 @@ def read(path: str) -> native.Dna:
     """The Dna of a file, from memory if the file has not changed.
 
     Args:
-        path: of the file, absolute.
+        path: absolute path of the file.
     """
     stat = Path(path).stat()
     stamp = (stat.st_mtime, stat.st_size)
@@ -53,17 +53,17 @@ def read(path: str) -> native.Dna:
 
 
 def forget() -> None:
-    """Let go of the files."""
+    """Free the memory of all read files and of the preview data."""
     _read.clear()
     _seen.clear()
 
 
 def refused(first: str, other: str) -> str:
-    """Why a face cannot be mixed with another, in a sentence; empty: it can.
+    """The reason why two faces cannot be mixed, as a sentence; "" if they can.
 
     Args:
-        first: path of a file.
-        other: path of another one.
+        first: path of the first file.
+        other: path of the other file.
     """
     why = native.part("mixing").difference(read(first), read(other))
     if not why:
@@ -77,7 +77,8 @@ def refused(first: str, other: str) -> str:
 
 
 class _Seen:
-    """Data that do not change with sliders: masks and polygons of the finest level."""
+    """Preview data that do not depend on the shares: faces without hair, region masks, and the
+    meshes of the finest LOD."""
 
     def __init__(self, context: Context, paths: Sequence[str]) -> None:
         bald = native.part("mixing").without_hair
@@ -105,7 +106,7 @@ class _Seen:
         return out
 
     def points(self, shares: Sequence[float], regions: Regions) -> NDArray[np.float64]:
-        """float64[V, 3] of the mix, in Blender's space."""
+        """float64[V, 3]: vertices of the mix, in Blender's axes and units."""
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)
         rows = [
@@ -138,7 +139,7 @@ def show(
         context: Blender context.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: regions with other shares.
+        regions: region -> number of a parent -> share, for regions with other shares.
 
     Raises:
         ValueError: invalid shares.
@@ -186,21 +187,21 @@ def write(
     regions: Regions,
     progress: Callable[[float], None],
 ) -> dict[str, str]:
-    """Write the mix as a DNA file, with its textures beside it.
+    """Write the mix as a DNA file, and its textures to a folder next to this file.
 
     Args:
-        path: of the new file.
+        path: path of the new file.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: regions with other shares.
+        regions: region -> number of a parent -> share, for regions with other shares.
         progress: called with the finished share, 0 to 1.
 
     Returns:
         Textures taken unmixed from the leading parent -> reason, a key of mixing.textures.WHY.
 
     Raises:
-        MixError: the file is one of the parents.
-        OSError: it cannot be written; no file has changed.
+        MixError: the new file is one of the parents.
+        OSError: a file cannot be written; no file has changed.
         ValueError: invalid shares, a region that the first face lacks, or a picture of the user
             would be replaced.
     """

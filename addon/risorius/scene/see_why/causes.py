@@ -15,9 +15,9 @@ from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from . import displacement, present
 
-Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joints and shapes, of one or of many
-_LEAST = 1e-3  # millimetres that are no movement: float32 of a head that stands 1.7 m high
-_MOST_FIRING = 24  # correctives whose reach is computed, those of the largest values
+Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
+_LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
+_MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
 # Deforming armature -> its last result.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
 # Deforming armature -> firing correctives, and the inputs of that result.
@@ -26,17 +26,17 @@ _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("
 
 @dataclass(frozen=True)
 class Cause:
-    """A cause of motion.
+    """A control that moves a vertex.
 
     Attributes:
-        control: index in raw | corrective | network | pose.
-        name: in lists.
+        control: its index in raw | corrective | network | pose.
+        name: its name in lists.
         is_raw: whether it is a raw control, which has a slider.
         value: current value.
-        now: its current motion in millimetres.
-        full: motion in millimetres between its rest and its full value, with all others as now; 0
-            if it is no raw control.
-        label: of its slider, if any.
+        now: motion in millimetres that it currently causes.
+        full: motion in millimetres between its rest and its full value, with all others unchanged;
+            0 if it is no raw control.
+        label: label of its slider; "" for none.
     """
 
     control: int
@@ -53,7 +53,7 @@ class Found:
     """The causes of a vertex's motion.
 
     Attributes:
-        mesh, vertex: mesh and vertex index.
+        mesh, vertex: index of the mesh in the file, and of the vertex.
         moved: distance from neutral in millimetres.
         causes: causes, the strongest first.
     """
@@ -66,12 +66,12 @@ class Found:
 
 @dataclass(frozen=True)
 class Part:
-    """A corrective that a control takes part in.
+    """A corrective that has a given control as a factor.
 
     Attributes:
         control: index of the corrective.
-        name: in lists.
-        value: now.
+        name: its name in lists.
+        value: its current value.
         others: (name, value) of its other factors.
     """
 
@@ -82,7 +82,8 @@ class Part:
 
 
 def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
-    """The causes of a vertex's motion in the current pose, stored for `last`; None for a lost face.
+    """Find the causes of a vertex's motion in the current pose and store them for `last`. Returns
+    None if the face has no current pose, see present.of.
 
     Args:
         rig: deforming armature.
@@ -138,7 +139,7 @@ def last(rig: ArmatureObject) -> Found | None:
 
 
 def firing(now: present.Present) -> list[int]:
-    """Indices of firing correctives and poses, the largest values first.
+    """Indices of firing (not 0) correctives, network outputs and poses, largest values first.
 
     Args:
         now: the current face.
@@ -150,10 +151,10 @@ def firing(now: present.Present) -> list[int]:
 
 
 def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
-    """The current pose without each of some controls.
+    """For each of some controls, the current pose without the effect of this control.
 
     Args:
-        now: of the face.
+        now: the current face.
         controls: indices in raw | corrective | network | pose of active controls.
     """
     live = now.live
@@ -175,7 +176,7 @@ def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
 
 
 def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
-    """Each control with the channels that it alone drives."""
+    """Control -> the blend shape channels that it drives at the current LOD."""
     table = now.live.dna.blend_shape_channels
     count = int(table.lods[now.lod]) if now.lod < len(table.lods) else 0
     found: dict[int, list[int]] = {}
@@ -186,20 +187,20 @@ def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
 
 
 def without(now: present.Present, control: int) -> Poses:
-    """The current pose without a corrective: joints and shapes.
+    """The joint deltas and channel weights of the current pose without a corrective.
 
     Args:
-        now: of the face.
+        now: the current face.
         control: index of the corrective.
     """
     return _without(now, [control])[control]
 
 
 def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
-    """The firing correctives, sorted by their largest motion of a vertex.
+    """The firing correctives, sorted by the largest motion that each causes at any vertex.
 
-    If very many fire, only the largest values are examined. `now` is the motion of the vertex that
-    each moves most.
+    Only the correctives with the largest values are examined, at most _MOST_FIRING. `Cause.now` is
+    the largest motion in millimetres.
 
     Args:
         rig: deforming armature.
@@ -216,7 +217,7 @@ def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
 
 
 def is_known(rig: ArmatureObject) -> bool:
-    """Whether `strongest` has its answer already. Args: rig  deforming armature."""
+    """Whether `strongest` is computed for the current pose. Args: rig  deforming armature."""
     now, kept = present.of(rig), _fired.get(rig.session_uid)
     return now is None or (
         kept is not None and kept[0] == (id(now.live), now.raw.tobytes(), now.lod)
@@ -224,7 +225,7 @@ def is_known(rig: ArmatureObject) -> bool:
 
 
 def known(rig: ArmatureObject) -> list[Cause]:
-    """The last result of `strongest`, maybe of an earlier pose. Args: rig deforming armature."""
+    """The last result of `strongest`, perhaps for an earlier pose. Args: rig deforming armature."""
     return list(_fired.get(rig.session_uid, (None, []))[1])
 
 
@@ -247,7 +248,7 @@ def _strongest(rig: ArmatureObject, now: present.Present) -> list[Cause]:
 
 
 def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
-    """The correctives with a control as a factor, firing ones first.
+    """The correctives that have a control as a factor, firing ones first.
 
     Args:
         rig: deforming armature.
@@ -271,7 +272,7 @@ def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
 
 
 def sliders_of(rig: ArmatureObject, control: int) -> list[str]:
-    """The raw controls that a control hangs on, by their labels: itself, or all its factors.
+    """The labels of the raw controls that a control depends on: its own, or those of its factors.
 
     Args:
         rig: deforming armature.
@@ -291,7 +292,7 @@ def sliders_of(rig: ArmatureObject, control: int) -> list[str]:
 
 
 def control_of(rig: ArmatureObject, label: str) -> int:
-    """The index of a raw control by its label, -1 where the face has none of that name.
+    """The index of a raw control by its label; -1 if the face has no such control.
 
     Args:
         rig: deforming armature.

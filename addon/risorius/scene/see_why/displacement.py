@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion of the vertices of a face in poses, from its DNA alone.
+"""Computes the vertices of a face in a pose from its DNA alone.
 
-Shapes and weights are the file's own: the user's sculpts and painted weights are not included.
+The user's sculpts and painted weights are not included.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ Doubles = NDArray[np.float64]
 _skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = session.table(
     "displacement.skins", ("load",)
 )
-_MOST = 24  # meshes whose weights are kept
+_MOST = 24  # largest number of cached skins
 
 
 @dataclass(frozen=True)
 class Skin:
-    """A mesh as its DNA has it.
+    """The neutral vertices and the skin weights of a mesh in its DNA.
 
     Attributes:
         points: float64[V, 3] neutral vertices in Blender units.
-        starts: int64[V], of each vertex the first of its influences.
-        joints: int64[n] of the influences; weights: float64[n].
+        starts: int64[V], index of the first influence of each vertex.
+        joints, weights: int64[n] and float64[n], joint and weight of each influence.
         bound: bool[V], whether a vertex has an influence.
     """
 
@@ -43,7 +43,7 @@ class Skin:
 
 
 def skin_of(live: runtime.Runtime, mesh: int) -> Skin:
-    """The skin of a mesh, kept.
+    """The skin of a mesh, cached.
 
     Args:
         live: Runtime of the character.
@@ -70,14 +70,14 @@ def _skin(live: runtime.Runtime, mesh: int) -> Skin:
 
 
 def moves(live: runtime.Runtime, joints: NDArray[np.float32]) -> Doubles:
-    """By which matrix each joint takes its skin along.
+    """The skinning matrix of each joint: its posed matrix times the inverse of its rest matrix.
 
     Args:
         live: Runtime of the character.
         joints: float32[J, 9] deltas of a pose.
 
     Returns:
-        float64[J, 4, 4] in Blender's axes and units; of the neutral pose the identity.
+        float64[J, 4, 4] in Blender's axes and units; the identity for the neutral pose.
     """
     dna, space = live.dna, live.space
     deltas = np.asarray(joints, np.float64)
@@ -94,7 +94,8 @@ def vertices(
     joints: NDArray[np.float32],
     shapes: NDArray[np.float32],
 ) -> Doubles:
-    """The vertices of a mesh at a pose, float64[V, 3] in Blender units, head and neck straight.
+    """The vertices of a mesh in a pose, float64[V, 3] in Blender units, without rotations of the
+    neck and head bones.
 
     Args:
         live: Runtime of the character.
@@ -109,7 +110,7 @@ def vertices(
     if not len(skin.joints):
         return points
     matrices = moves(live, joints)[:, :3]
-    # The sum over the influences of a vertex of weight * matrix: one matrix a vertex.
+    # One matrix per vertex: the sum of weight * matrix over its influences.
     blended = np.zeros((len(points), 3, 4))
     weighted = matrices[skin.joints] * skin.weights[:, None, None]
     there = np.flatnonzero(skin.bound)
@@ -156,7 +157,7 @@ def at_vertex(
 def _moves_of(
     live: runtime.Runtime, joints: NDArray[np.float32], wanted: NDArray[np.int64]
 ) -> list[Doubles]:
-    """Of some joints by which matrices they take the skin along: float64[N, 4, 4] each."""
+    """float64[N, 4, 4] for each wanted joint: its skinning matrices in N poses."""
     dna, space, count = live.dna, live.space, len(joints)
     parents = np.asarray(dna.joint_parents)
     worlds: dict[int, Doubles] = {}
@@ -178,7 +179,7 @@ def _moves_of(
 
 
 def millimetres(rig: ArmatureObject) -> float:
-    """Millimetres of one Blender unit of a face. Args: rig  its deforming armature."""
+    """Millimetres per Blender unit of a face. Args: rig  its deforming armature."""
     return runtime.unit_of(rig) * 1000.0
 
 
@@ -188,12 +189,12 @@ def distances(
     one: tuple[NDArray[np.float32], NDArray[np.float32]],
     other: tuple[NDArray[np.float32], NDArray[np.float32]],
 ) -> Doubles:
-    """How far apart the vertices of a mesh are at two poses, float64[V] in Blender units.
+    """Distances between the vertices of a mesh in two poses, float64[V] in Blender units.
 
     Args:
         live: Runtime of the character.
         mesh: index of the mesh in the file.
-        one, other: joints and shapes of each, as of `vertices`.
+        one, other: (joints, shapes) of each pose, see `vertices`.
     """
     apart = vertices(live, mesh, *one) - vertices(live, mesh, *other)
     return np.linalg.norm(apart, axis=1)

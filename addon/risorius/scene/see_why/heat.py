@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Heat maps: motion of each vertex as a colour attribute of the face's meshes.
 
-Materials stay as they are: the solid view shows the attribute. A property of the deforming armature
-    stores the state, so that undo restores it. Files never contain it.
+Materials are unchanged, because the solid view shows the attribute. A property of the deforming
+armature stores the state, so that undo restores it. Saved files contain no heat map.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ from ..character import runtime
 from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
-_LEAST = 0.01  # millimetres at the hot end at least: noise shall not glow
+_LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
 # Deforming armature -> inputs of its colours.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
 # Deforming armature -> its map while a file is saved.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
-_PAUSE = 0.15  # seconds between two looks at whether the pose is another one
+_PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 
 
 @dataclass(frozen=True)
 class Heat:
-    """The title of a heat map.
+    """The contents of a heat map.
 
     Attributes:
-        kind: CONTROL: reach of a control from neutral; POSE: distance of the current pose from
-            neutral; CORRECTIVE, LAYER: current share of one.
-        what: label of the control, number of the corrective or of the layer's place.
-        most: millimetres at the hot end.
+        kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
+            neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
+        what: label of the control, index of the corrective, or index of the layer.
+        most: millimetres of the hottest colour.
     """
 
     kind: str
@@ -112,7 +112,7 @@ def _is_as_imported(item: MeshObject, count: int) -> bool:
 def _distances(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> dict[int, NDArray[np.float64]]:
-    """Mesh -> how far each of its vertices is moved, in Blender units."""
+    """Index of a mesh -> distance of each vertex between the two poses, in Blender units."""
     one, other = _pair(rig, now, kind, what, depsgraph)
     meshes = displacement.meshes_at(rig, now.lod)
     return {m: displacement.distances(now.live, m, one, other) for m in meshes}
@@ -121,7 +121,7 @@ def _distances(
 def _pair(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> tuple[causes.Poses, causes.Poses]:
-    """The two poses that are compared."""
+    """The two poses whose difference a heat map shows."""
     evaluate = now.live.rig.evaluate
     if kind == "CONTROL":
         if what not in now.live.labels:
@@ -143,12 +143,12 @@ def _poses(pose: native.Pose) -> causes.Poses:
 
 
 def _state(now: present.Present, kind: str) -> object:
-    """The inputs of the colours of a kind."""
+    """The values on which the colours of a heat map depend."""
     return (now.lod, None) if kind == "CONTROL" else (now.lod, now.raw.tobytes(), now.look)
 
 
 def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
-    """Give a mesh its colours. Args: shares  float64[V], 0 to 1."""
+    """Write heat as the active colours of a mesh. Args: shares  float64[V], 0 cold to 1 hot."""
     held = item.data.color_attributes
     layer: Attribute = held.get(parts.HEAT)
     if layer is not None and (layer.domain != "POINT" or len(layer.data) != len(shares)):
@@ -166,7 +166,7 @@ def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
 
 
 def _take_off(item: MeshObject) -> None:
-    """Take a mesh its colours, and give it back the active ones that it had."""
+    """Remove the heat of a mesh, and activate its earlier colour attributes again."""
     data = item.data
     held = data.color_attributes
     layer = held.get(parts.HEAT)
@@ -183,7 +183,7 @@ def _take_off(item: MeshObject) -> None:
 
 
 def hide(rig: ArmatureObject) -> bool:
-    """Take the heat map of a character away; views go back where no other face has one.
+    """Remove the heat map of a character; 3D views are restored if no other face has a map.
 
     Args:
         rig: its deforming armature.
@@ -201,7 +201,7 @@ def hide(rig: ArmatureObject) -> bool:
 
 
 def take_away() -> None:
-    """No heat map in a file that is saved; `give_back` brings them again."""
+    """Remove all heat maps before a file is saved; `give_back` restores them."""
     _held.clear()
     for rig in parts.rigs():
         heat = of(rig)
@@ -220,7 +220,7 @@ def give_back(depsgraph: Depsgraph) -> None:
 
 
 def end_all() -> None:
-    """Take all heat maps away: before the add-on goes, and after a file was loaded."""
+    """Remove all heat maps, before the add-on is disabled and after a file was loaded."""
     _held.clear()
     for rig in parts.rigs():
         if parts.HEAT in rig:
@@ -241,7 +241,7 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether it did.
+    """Update the colours of a character if its pose has changed. Returns: whether it has changed.
 
     Args:
         rig: its deforming armature, with a heat map.
@@ -258,17 +258,18 @@ def _show_again(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph)
     try:
         show(rig, kind, what, depsgraph)
     except (FaceError, ValueError, LookupError):
-        hide(rig)  # what it showed is gone: a layer, a corrective that no longer fires
+        hide(rig)  # the layer was removed, or the corrective has stopped firing
 
 
 def watch() -> None:
-    """Let the colours follow the pose."""
+    """Start the timer that updates the colours when a pose changes."""
     if not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=_PAUSE)
 
 
 def _look() -> float | None:
-    """Look whether a pose is another one; so often that the colours take a quarter of the time."""
+    """Called by the timer: update the colours of changed poses. The pause is at least three times
+    the duration of the update, so that updates take at most a quarter of the time."""
     begin = perf_counter()
     shown = [rig for rig in parts.rigs() if parts.HEAT in rig]
     if not shown:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""3D views that show colours during a heat map, and their earlier settings."""
+"""Switches 3D views to vertex colours during a heat map, and restores their settings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import bpy
 from ..base import session
 
 _SETTINGS = ("type", "color_type", "light")
-# Pointer of a view -> its settings of before. A view has no name and outlives undo.
+# Pointer of a view -> its settings before the heat map. Views have no names and outlive undo.
 _before: dict[int, dict[str, str]] = session.table("heat_views.before", ("unregister",))
 
 
@@ -37,18 +37,18 @@ def show() -> None:
 
 
 def give_back() -> None:
-    """Restore the settings of all 3D views; the user's changes since then stay."""
+    """Restore the settings of all 3D views, except views that the user has changed since."""
     for view in _views():
         before = _before.pop(view.as_pointer(), None)
         shading: Any = view.shading
         if before is None or (shading.type, shading.color_type) != ("SOLID", "VERTEX"):
             continue
-        # The kind of colours and of light belongs to the solid view: it is set while that is shown.
+        # Light and colour type belong to the solid view, so they are set before the view type.
         shading.light, shading.color_type = before["light"], before["color_type"]
         shading.type = before["type"]
     _before.clear()
 
 
 def are_shown() -> bool:
-    """Whether views show colours for us."""
+    """Whether 3D views are switched to the colours of a heat map."""
     return bool(_before)

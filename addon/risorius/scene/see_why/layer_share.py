@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The share of a layer: the controls with it and without it."""
+"""Computes the raw controls with and without a layer, to show the effect of the layer."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def raw_pair(
     Args:
         rig: deforming armature.
         live: Runtime of the character.
-        place: of the layer among the settings.
+        place: index of the layer in the settings of the character.
         depsgraph: graph for reading the controls.
 
     Raises:
@@ -48,7 +48,7 @@ def raw_pair(
     # Muting a solo layer would let others through, so use a layer that moves nothing.
     nothing = np.zeros(len(live.labels) + len(clip_units.BONES), np.float32)
     stack.layers[at] = replace(layer, mask=nothing)
-    stack.weights = ()  # so that the mixer takes its layers anew
+    stack.weights = ()  # so that the mixer reads its layers again
     try:
         without_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)
     finally:

@@ -16,7 +16,7 @@ from ..frame import inputs, look_masks
 from ..lod import lods
 
 Factors = dict[int, list[int]]
-# id of a Runtime -> itself, its ControlNames, the factors of its correctives
+# id of a Runtime -> (the Runtime, its ControlNames, the factors of its correctives)
 _known: dict[int, tuple[runtime.Runtime, native.ControlNames, Factors]] = session.table(
     "present.known", ("load",)
 )
@@ -28,9 +28,9 @@ class Present:
 
     Attributes:
         live: Runtime of the character.
-        raw: float32[R] raw controls, with bones and layers, without solo and mute.
-        lod: the shown level.
-        look: its Look.
+        raw: float32[R] raw controls, including bones and layers, before solo and mute.
+        lod: the shown LOD.
+        look: look_masks.Look, which applies solo and mute.
     """
 
     live: runtime.Runtime
@@ -44,7 +44,7 @@ class Present:
         return np.array(self.live.rests, np.float32)
 
     def pose(self) -> native.Pose:
-        """The shown pose."""
+        """The shown pose, with solo and mute."""
         pose = self.live.rig.evaluate(look_masks.raw_of(self.look, self.raw, self.live), self.lod)
         look_masks.apply(self.look, pose, self.live, self.lod)
         return pose
@@ -81,7 +81,7 @@ def _known_of(live: runtime.Runtime) -> tuple[runtime.Runtime, native.ControlNam
 
 
 def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
-    """The output controls of the poses of solvers, each with the controls that its value hangs on.
+    """Output control of an RBF pose -> the controls on which its value depends.
 
     Args:
         dna: the file.
@@ -103,12 +103,12 @@ def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
 
 
 def names_of(live: runtime.Runtime) -> native.ControlNames:
-    """The names of the vector raw | corrective | network | pose of a file, as explain has them."""
+    """The names of the controls raw | corrective | network | pose of a file."""
     return _known_of(live)[1]
 
 
 def factors_of(live: runtime.Runtime) -> Factors:
-    """Each corrective with its factors, each output of a solver's pose with the solver's inputs."""
+    """Corrective -> its factors; output control of an RBF pose -> the inputs of pose and solver."""
     return _known_of(live)[2]
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Assignments of the shape keys of a head, by names or by the user, and their pictures."""
+"""Assigns the shape keys of a head to controls, and draws pictures of the keys."""

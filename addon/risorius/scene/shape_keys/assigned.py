@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Assignments of shape keys of a head, by names or by the user.
+"""Assigns the shape keys of a head to controls or expressions, by their names or by the user.
 
 The mesh stores the user's assignments as text in the format of `risorius author --names`, so saving
 and loading copy this text.
@@ -18,9 +18,9 @@ from ...logic.character import slider_words
 from ..base import parts, saved, session
 from ..base.blender_types import MeshObject
 
-Said = str | list[str]  # as of risorius.author.input.said
+Said = str | list[str]  # the user's assignment of a key, see risorius.author.input.said
 CONTROL, EXPRESSION, OWN, NOTHING, MUTED = "CONTROL", "EXPRESSION", "OWN", "NOTHING", "MUTED"
-WORDS = "WORDS"  # who knew a name, where no vocabulary did
+WORDS = "WORDS"  # Row.by of a name that was recognised by its words and by no vocabulary
 _UNITS, _CONTROLS = "arkit", "metahuman"  # vocabularies
 
 
@@ -28,14 +28,14 @@ class Row(NamedTuple):
     """The assignment of a shape key.
 
     Attributes:
-        key: its name.
-        kind: CONTROL: standard ones; EXPRESSION; OWN: a control of its own; NOTHING: left out by
-            the user; MUTED: left out because it is muted.
+        key: name of the key.
+        kind: CONTROL: standard raw controls; EXPRESSION; OWN: a new control for this key; NOTHING:
+            left out by the user; MUTED: left out because the key is muted.
         controls: raw controls without prefix.
         expression: name of the expression, or "".
         by: title of the vocabulary that knows the name, or WORDS; "" for none.
         is_known: whether its name is known, regardless of the user's assignment.
-        is_said: whether the user assigned it.
+        is_said: whether the user assigned the key.
         holder: another key with the same assignment; "" for none.
     """
 
@@ -50,7 +50,7 @@ class Row(NamedTuple):
 
 
 class Names(NamedTuple):
-    """The shape keys of a head: a row for each by its name, in their order."""
+    """The shape keys of a head: name of the key -> Row, in the order of the keys."""
 
     rows: Mapping[str, Row]
 
@@ -73,7 +73,7 @@ def of(item: MeshObject) -> Names:
 
 
 def said_of(item: MeshObject) -> dict[str, Said]:
-    """The user's assignments of keys of a mesh, by key names. Args: item any mesh."""
+    """The user's assignments: name of the key -> assignment. Args: item any mesh."""
     return dict(_parsed(saved.text(item.data, parts.NAMES)))
 
 
@@ -82,7 +82,8 @@ def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
 
     Args:
         item: the head.
-        said: by the names of keys; None: the name decides again. Other keys stay.
+        said: name of the key -> assignment; None removes the assignment, so that the key's name
+            decides. The assignments of other keys are unchanged.
 
     Raises:
         GivenError: an unknown ARKit unit, or an invalid name of an expression; nothing is stored.
@@ -111,7 +112,7 @@ def own_control(key: str) -> str:
 
 @session.cached(("unregister",), 64)
 def _parsed(text: str) -> Mapping[str, Said]:
-    """The table of a text; empty if the text is invalid."""
+    """Parse stored assignments; empty if the text is invalid."""
     if not text:
         return {}
     try:
@@ -143,7 +144,7 @@ def _names(names: tuple[str, ...], muted: frozenset[str], text: str) -> Names:
 
 
 def _wanted(said: Said) -> tuple[str, ...]:
-    """The controls that the user gave a key. Args: said  as the table has it."""
+    """The controls of a user's assignment. Args: said  the assignment."""
     controls: tuple[str, ...] = native.part("author.input.said").meaning_of(said).controls
     return controls
 
@@ -172,10 +173,10 @@ class Choice(NamedTuple):
     """A possible assignment of a key.
 
     Attributes:
-        value: its text in the table.
-        label: for people, in English.
+        value: the text that is stored for it.
+        label: label in English.
         does: a sentence about its effect in English, or "".
-        kind: CONTROL, EXPRESSION, or UNIT of an ARKit unit.
+        kind: CONTROL, EXPRESSION, or UNIT for an ARKit unit.
     """
 
     value: str
@@ -189,7 +190,8 @@ UNIT = "UNIT"
 
 @session.cached(("unregister",), 1)
 def choices() -> tuple[Choice, ...]:
-    """All that a key can be: ARKit's units, which most people know, controls, expressions."""
+    """All possible assignments of a key: ARKit units first, because most people know them, then
+    controls and expressions."""
     vocabulary, words = native.part("controls.vocabulary"), tables.controls()
     units = [
         Choice(f"={unit}", slider_words.title(unit), "", UNIT)
@@ -210,7 +212,7 @@ def choices() -> tuple[Choice, ...]:
 
 @session.cached(("unregister",), 512)
 def unit_of(controls: tuple[str, ...]) -> str:
-    """The ARKit unit that these controls are, or "". Args: controls  without prefix."""
+    """The ARKit unit that drives exactly these controls, or "". Args: controls  without prefix."""
     prefix, meant = native.part("controls.vocabulary").PREFIX, set(controls)
     for unit, row in native.part("controls.arkit").mapping().items():
         if {name.removeprefix(prefix) for name in row} == meant:
@@ -220,10 +222,10 @@ def unit_of(controls: tuple[str, ...]) -> str:
 
 @session.cached(("unregister",), 1024)
 def weights_of(value: str) -> Mapping[str, float]:
-    """Raw controls of a standard face, with prefix, for the picture of a possible assignment.
+    """Raw control with prefix -> its value, for the picture of a possible assignment.
 
     Args:
-        value: of a Choice.
+        value: value of a Choice.
     """
     prefix = native.part("controls.vocabulary").PREFIX
     if value.startswith("@"):
@@ -235,5 +237,5 @@ def weights_of(value: str) -> Mapping[str, float]:
 
 
 def is_editable(item: bpy.types.Object) -> bool:
-    """Whether names can be stored on a mesh: a mesh that is linked from another file takes none."""
+    """Whether assignments can be stored on a mesh; False if it is linked from another file."""
     return item.data is not None and item.data.is_editable

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of shape keys on their head, and of possible assignments on the sample man.
+"""Draws pictures of shape keys on their head, and of possible assignments on the sample man.
 
-A thread draws both without a window (scene/expressions/portrait.py), and files cache them by the
-hash of their content. The moving part has the colour of a heat map.
+A thread draws them without a window (scene/expressions/portrait.py). They are cached as files,
+named by a hash of the drawn data. The moving part is orange.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from . import assigned
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-VERSION = 2  # of the look: pictures of another one are made anew
+VERSION = 2  # of the drawing style; pictures of another version are drawn again
 _SKIN = np.array([0.62, 0.60, 0.58])
-_CLAY = 0.82  # of the sample man's colours, which have no paint
+_CLAY = 0.82  # factor of the sample man's colours, which are plain clay
 _MOVED = np.array([0.95, 0.45, 0.10])
-_STRONG = 0.8  # of the colour of what moves furthest
-_FAINT = 0.15  # of it: what would have less has none
-_MOVES = 0.5  # of a key's furthest way: what moves less is not framed
-_NOTHING = 0.01  # of the furthest way of all keys
-_MARGIN = 1.25  # around what moves
-_LEAST = 0.3  # of the mesh: half the height of a picture at least
+_STRONG = 0.8  # amount of orange where a head moves furthest
+_FAINT = 0.15  # sqrt(motion / largest motion): vertices below it get no orange
+_MOVES = 0.5  # motion / largest motion of a key: vertices below it are not framed
+_NOTHING = 0.01  # largest motion of a key / largest motion of all keys: keys below it do not count
+_MARGIN = 1.25  # size of a picture / size of the moving part
+_LEAST = 0.3  # smallest height of a picture / extent of the mesh
 _SAMPLE = "man"
 
 
@@ -46,10 +46,10 @@ class Model:
 
     Attributes:
         points: float64[V, 3], the face looks along -y.
-        ways: float32[V, 3] displacement by key names.
+        ways: name of a key -> float32[V, 3] displacement.
         triangles: int64[F, 3].
         frame: centre of the pictures, and half their height.
-        paths: files of the pictures by key names.
+        paths: name of a key -> file of its picture.
     """
 
     points: Floats
@@ -78,10 +78,10 @@ _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo
 
 
 def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
-    """The paths of the pictures of a head's keys, existing or not; None before the first search.
+    """Name of a key -> path of its picture, which may not exist; None before the first `model_of`.
 
     Panels call this often, so it computes no hashes: edited keys keep their old pictures until
-        these are drawn again.
+    they are drawn again.
 
     Args:
         item: the head.
@@ -90,7 +90,7 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 
 
 def model_of(item: MeshObject) -> Model:
-    """The data for the pictures of a head. Args: item mesh with shape keys."""
+    """Read the data for the pictures of a head. Args: item mesh with shape keys."""
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)
 
@@ -143,7 +143,8 @@ def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
 
 
 def _to_front(rest: Floats, far: Floats) -> Floats:
-    """A rotation by quarters about z that turns the moving part towards -y.
+    """float64[3, 3]: a rotation about z, a multiple of 90 degrees, that turns the moving part
+    towards -y.
 
     A face moves at its front, so this works for every orientation of the head.
     """
@@ -158,7 +159,7 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
 
 
 def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
-    """The middle of a picture that shows all that moves, and half its height."""
+    """The centre and half the height of a picture that shows all moving vertices."""
     low, high = rest.min(axis=0), rest.max(axis=0)
     moved = rest[far > _MOVES]
     least = _LEAST * float((high - low)[[0, 2]].max()) / 2
@@ -176,7 +177,7 @@ def draw(model: Model, key: str) -> Floats:
         key: name of the key.
 
     Returns:
-        See portrait.draw.
+        The picture, see portrait.draw.
     """
     way = model.ways[key].astype(np.float64)
     length = np.linalg.norm(way, axis=1)
@@ -186,7 +187,7 @@ def draw(model: Model, key: str) -> Floats:
 
 
 def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) -> Floats:
-    """Colours of triangles, with moving parts in orange.
+    """The colours of triangles, with moving parts in orange.
 
     Args:
         colors: float64[F, 3].
@@ -208,7 +209,7 @@ def sample_path(value: str) -> Path:
 
 
 def without_picture(values: Sequence[str]) -> list[str]:
-    """The assignments without a picture, without duplicates.
+    """The assignments whose picture file is missing, one for each file.
 
     Args:
         values: values of assigned.Choice.
@@ -220,7 +221,7 @@ def without_picture(values: Sequence[str]) -> list[str]:
 
 
 def sample_sitter() -> portrait.Sitter | None:
-    """The sample man, in plain clay; None where he did not come with the add-on."""
+    """The sample man, in plain clay; None if the add-on came without him."""
     path = native.bundled_sample(_SAMPLE)
     if path is None:
         return None
@@ -253,7 +254,7 @@ def make(
         cancelled: returns whether to stop.
 
     Returns:
-        The number of pictures.
+        The number of drawn pictures.
 
     Raises:
         OSError: a file cannot be written.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unknown curves of the last import, and the user's assignments.
+"""Stores the unknown curves of the last import, and the user's assignments of them.
 
-The control armature stores them as JSON. The assignments become a mapping of the user.
+The control armature stores them as JSON. The assignments can be added to a mapping.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class Unknown:
     Attributes:
         mapping: mapping of the import: a name, the path of a file, or "" for none.
         settings: settings of the import by the operator's property names.
-        names: of the curves.
-        said: assignments as values of assigned.Choice; "" for curves to leave out.
+        names: names of the curves.
+        said: name of a curve -> value of an assigned.Choice; "" for curves to leave out.
     """
 
     mapping: str
@@ -55,7 +55,7 @@ def keep(controls: ArmatureObject, found: Unknown) -> None:
 
     Args:
         controls: the control armature.
-        found: the curves; without names the stored ones are removed.
+        found: the curves; if it has no names, the stored curves are removed.
     """
     before = of(controls)
     if not found.names:
@@ -72,8 +72,8 @@ def put(controls: ArmatureObject, name: str, value: str | None) -> None:
 
     Args:
         controls: the control armature.
-        name: of the curve.
-        value: of an assigned.Choice; "": leave it out; None: no assignment.
+        name: name of the curve.
+        value: value of an assigned.Choice; "" leaves the curve out; None removes the assignment.
     """
     found = of(controls)
     if found is None or name not in found.names:
@@ -85,7 +85,7 @@ def put(controls: ArmatureObject, name: str, value: str | None) -> None:
 
 
 def mapping_text(found: Unknown) -> str:
-    """The mapping of the import with the user's assignments.
+    """The text of the import's mapping with the user's assignments added.
 
     Args:
         found: unknown curves of a face.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a pose to bones and vertices: posed by Blender's modifiers, or finished natively."""
+"""Writes a pose to bones, which deform meshes by Blender's modifiers, or directly to vertices."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A pose's joints to the bones of the deforming armature, in bulk."""
+"""Writes the joints of a pose to the bones of the deforming armature in bulk."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ class Writer:
     """Data for writing the bones of one armature, valid until its bones change.
 
     Attributes:
-        count: of its bones.
+        count: number of bones of the armature.
         where: int64[n] positions of bones that the evaluator owns.
-        space: risorius.BoneSpace of these, in the same order.
-        turning: (name of the control bone, row in these, share of the turn, rest rotation).
+        space: risorius.BoneSpace of these bones, in the same order.
+        turning: for each joint of neck and head: (name of the control bone, row in `where`, share
+            of the rotation, rest rotation).
         buffers: channel -> float32 for all bones; None if the evaluator owns every bone.
-        driving: joint -> position of its bone, of joints whose rotation is stored in raw controls.
+        driving: joint -> position of its bone, for joints whose rotation is stored in raw controls.
     """
 
     count: int
@@ -55,7 +56,7 @@ def write(
         rig: the deforming armature, the original.
         live: its Runtime.
         deltas: float32[J, 9] of a Pose.
-        turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
+        turns: "neck" and "head" -> additional Quaternion in the armature's axes.
         depsgraph: graph for reading animated values of other bones; None if they have none.
         keyed: positions of bones of neck and head that also keep the user's values.
 
@@ -69,7 +70,7 @@ def write(
         for name, values in owned.items():
             bones.foreach_set(name, values.ravel())
         return _taken(rig, {n: v.ravel() for n, v in owned.items()})
-    # A bulk write that leaves out the animated values of the others would undo them.
+    # A bulk write sets all bones, so it has to repeat the animated values of the other bones.
     seen = (rig if depsgraph is None else rig.evaluated_get(depsgraph)).pose.bones
     source = seen if len(seen) == writer.count else bones
     buffers = writer.buffers or _buffers(writer.count)
@@ -90,7 +91,7 @@ def _buffers(count: int) -> dict[str, NDArray[np.float32]]:
 def pose_of(
     writer: Writer, deltas: NDArray[np.float32], turns: Mapping[str, Quaternion]
 ) -> dict[str, NDArray[np.float32]]:
-    """The channels of the bones that the evaluator owns.
+    """The values of the bones that the evaluator owns.
 
     Args:
         writer: see writer_of.
@@ -127,7 +128,7 @@ def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[n
 
 
 def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
-    """The Writer of an armature as it is now.
+    """The Writer of an armature, made again if the number of its bones has changed.
 
     Args:
         rig: deforming armature.

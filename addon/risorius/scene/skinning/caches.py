@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Caches of simulations, and caches baked when faces were one frame late.
+"""Finds caches of simulations, and caches that were baked when faces were one frame late.
 
-A cache does not store how it was made, but the form of the characters in a scene does: before form
-    2 every simulation saw the face of the frame before. So a character of an older file keeps its
-    form while such a cache exists, and is checked again when the file is opened.
+A cache does not store which version baked it, so the form number of the characters in its scene
+decides: before form 2 every simulation saw the face of the frame before. A character of an older
+file keeps its form number while such a cache exists, and is checked again when the file is opened.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ..base.blender_types import ArmatureObject
 SIMULATED = frozenset(
     ("CLOTH", "COLLISION", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID")
 )
-Key = tuple[int, str]  # of the object, and what of it has the cache
+Key = tuple[int, str]  # session uid of an object or scene, and the name of its modifier or part
 
-# Deforming armature -> caches that were always baked since load.
+# Deforming armature -> caches that were baked at load and have not been freed since.
 _late: dict[int, set[Key]] = session.table("caches.late", ("load",))
 
 
@@ -59,7 +59,7 @@ def _baked(scene: bpy.types.Scene) -> set[Key]:
 
 
 def any_simulates() -> bool:
-    """Whether this file has a simulation with a cache, including instances."""
+    """Whether this file has a simulation with a cache, on any object or in any scene."""
     if any(scene.rigidbody_world is not None for scene in bpy.data.scenes):
         return True
     for item in bpy.data.objects:
@@ -76,8 +76,8 @@ def _bakes(modifier: bpy.types.Modifier) -> bool:
 
 
 def have_nodes(rig: ArmatureObject) -> bool:
-    """Whether scenes of a face have geometry nodes that can be baked; they do not tell whether they
-    are."""
+    """Whether scenes of a face have geometry nodes that can be baked. Blender does not tell whether
+    they are baked."""
     items = (item for scene in rig.users_scene for item in scene.objects)
     return any(_bakes(m) for item in items for m in item.modifiers)
 
@@ -98,7 +98,7 @@ def note_old(rig: ArmatureObject) -> bool:
 
 
 def look() -> None:
-    """Forget noted caches that were freed. Costs nothing if none is late."""
+    """Forget noted caches that were freed. Costs nothing if no cache is noted."""
     if any(_late.values()):
         there = {key for scene in bpy.data.scenes for key in _baked(scene)}
         for keys in _late.values():
@@ -106,7 +106,7 @@ def look() -> None:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about late caches around a face; else empty."""
+    """The panel's sentence about late caches in the scenes of a face; empty if there are none."""
     count = len(_late.get(rig.session_uid, ()))
     if not count:
         return ""
@@ -118,5 +118,5 @@ def words(rig: ArmatureObject) -> str:
 
 
 def are_late(scene: bpy.types.Scene) -> bool:
-    """Whether a scene has such caches."""
+    """Whether a scene has a character with late caches."""
     return any(_late.get(rig.session_uid) for rig in parts.rigs() if scene in rig.users_scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a face can be in Direct mode: which of its meshes, and whether its bones are posed.
+"""Decides which meshes of a face can be in Direct mode, and whether its bones have to be posed.
 
 Direct mode writes finished positions to the live key of a mesh and disables its armature modifier.
 A Plan is made when the file changes and kept while frames play.
@@ -19,9 +19,9 @@ from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 from ..character import armatures, meshes, runtime
 from . import live_keys, skins
 
-_PLACES = ("location", "rotation", "scale", "delta")  # how data paths of an object's place begin
-_STRAIGHT = 1e-6  # of a matrix's elements, from which a mesh counts as moved against its rig
-_PLAIN = (True, False, False, False, "")  # see _settings
+_PLACES = ("location", "rotation", "scale", "delta")  # beginnings of data paths of a transform
+_STRAIGHT = 1e-6  # difference of a matrix element from which a mesh counts as moved from its rig
+_PLAIN = (True, False, False, False, "")  # settings of the armature modifier, see _settings
 _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
 
@@ -30,9 +30,10 @@ class Plan:
     """How a face is shown.
 
     Attributes:
-        direct: session uids of the mesh objects that get finished positions.
+        direct: session uids of the mesh objects in Direct mode, which get finished positions.
         posed: whether the bones of the deforming armature are posed.
-        why: why bones are posed, or why a mesh is not among `direct`; empty where all is direct.
+        why: why bones are posed, or why a mesh is not in `direct`; empty if all meshes are and no
+            bones are posed.
     """
 
     direct: frozenset[int] = frozenset()
@@ -40,7 +41,7 @@ class Plan:
     why: tuple[Sentence, ...] = ()
 
 
-ORDINARY = Plan()  # as in a file: every mesh is deformed by its armature modifier
+ORDINARY = Plan()  # the form of files: every mesh is deformed by its armature modifier
 
 
 @dataclass
@@ -50,7 +51,7 @@ class _Kept:
     Attributes:
         plan: Plan.
         signature: see _signature.
-        is_fresh: whether the file is unedited since.
+        is_fresh: False if an edit since then may have changed the plan.
     """
 
     plan: Plan
@@ -60,7 +61,7 @@ class _Kept:
 
 # Deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh object -> number of our last write to it: an update about this write is no edit.
+# Mesh object -> number of the add-on's last write to it; an update of this write is no edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
 # Scene and view layer -> the last write that an update of its graph reported.
@@ -70,7 +71,7 @@ _restored = session.value("conditions.restored", False, ("load",))
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
 # The user's objects -> their references, see _pointed.
 _pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
-# Deforming armature -> number of holders that keep its face in the form of files.
+# Deforming armature -> number of nested calls of hold_ordinary.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
 
@@ -90,13 +91,13 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
 
 
 def known(rig: ArmatureObject) -> Plan | None:
-    """The plan that a face was last shown by, None before. Args: rig  deforming armature."""
+    """The plan with which a face was last shown, or None. Args: rig  deforming armature."""
     kept = _kept.get(rig.session_uid)
     return kept.plan if kept is not None and rig.session_uid not in _ordinary else None
 
 
 def note_moved(rig: ArmatureObject) -> None:
-    """Note that something else moves joints; keys from a script cause no edit.
+    """Mark a plan as outdated, because keys or drivers move joints; a script's keys cause no edit.
 
     Args:
         rig: deforming armature.
@@ -121,22 +122,22 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 
 def note_written(item: MeshObject) -> None:
-    """A mesh is written to by us: the update that follows is no edit. Args: item  the mesh."""
+    """Note a write of the add-on, whose update is no edit. Args: item  the mesh object."""
     _writes.now += 1
     _written[item.session_uid] = _writes.now
 
 
 def forget_written() -> None:
-    """Forget our writes of a frame: Blender evaluates them without an update."""
+    """Forget the add-on's writes of a frame, because Blender evaluates them without an update."""
     _written.clear()
 
 
 def end_updates(depsgraph: Depsgraph) -> None:
-    """Called at the end of the handlers of an update: Blender evaluates their writes without
-    another update.
+    """Called at the end of the handlers of an update, because Blender evaluates their writes
+    without another update.
 
     Args:
-        depsgraph: graph of the update; graphs of other view layers report it later.
+        depsgraph: graph of the update; graphs of other view layers report the writes later.
     """
     _told[_key_of(depsgraph)] = _writes.now
 
@@ -148,11 +149,11 @@ def _key_of(depsgraph: Depsgraph) -> tuple[int, str]:
 
 @dataclass
 class _Edits:
-    """The datablocks of an edit.
+    """The datablocks that an update reports as edited.
 
     Attributes:
-        told: the last write that the graph reported before.
-        meshes: session uids of meshes of characters edited by others.
+        told: number of the last write that the graph reported before.
+        meshes: session uids of characters' mesh objects that were not edited by this add-on.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object outside all characters was edited.
     """
@@ -163,7 +164,7 @@ class _Edits:
     foreign: bool = False
 
     def add(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.ID) -> None:
-        """Args: update  of the datablock; item  the original of that."""
+        """Add an edited datablock. Args: update  its update; item  the original datablock."""
         if isinstance(item, bpy.types.Armature):
             self.rigs.add(item.session_uid)
         elif isinstance(item, bpy.types.Object):
@@ -188,12 +189,12 @@ class _Edits:
 
 
 def _may_read_anew(item: bpy.types.Object) -> bool:
-    """Whether an object of the user's points to other objects than when it was last looked at.
+    """Whether an object outside of characters may refer to other objects than at the last call.
 
-    A lamp that is dragged is edited at each step, and reads no face.
+    A dragged lamp is updated at each step and reads no face, so its update must not count.
     """
     if any(modifier.type == "NODES" for modifier in item.modifiers):
-        return True  # inputs of geometry nodes are objects, too
+        return True  # inputs of geometry nodes can be objects, which are not compared
     pointed = _pointed(item)
     if _pointing.get(item.session_uid) == pointed:
         return False
@@ -202,7 +203,8 @@ def _may_read_anew(item: bpy.types.Object) -> bool:
 
 
 def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
-    """References of an object: parent, constraints, modifiers and drivers."""
+    """The objects to which an object refers by parent, constraints and modifiers, and the number
+    of its drivers."""
     bones = item.pose.bones if item.pose is not None else ()
     holds = [*item.constraints, *(hold for bone in bones for hold in bone.constraints)]
     targets = [
@@ -231,10 +233,10 @@ def _has_other_drivers(item: bpy.types.ID) -> bool:
 
 
 def note_updates(depsgraph: Depsgraph) -> set[int]:
-    """Find the plans that an edit may have changed.
+    """Mark the plans that an edit may have changed as outdated.
 
     Args:
-        depsgraph: with the updates of the edit.
+        depsgraph: dependency graph with the updates of the edit.
 
     Returns:
         Session uids of meshes edited by anyone but this add-on.
@@ -252,9 +254,9 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
         kept.is_fresh = not (edits.foreign or armature or own)
         if own or armature:
-            last_written.inputs.pop(rig.session_uid, None)  # of other weights, or another rest form
+            last_written.inputs.pop(rig.session_uid, None)  # weights or rest may have changed
     look_quickly()
-    if _restored.now:  # undo made them anew; skins.doubt knows which may be others
+    if _restored.now:  # undo reloads all meshes; skins.doubt finds the ones that may differ
         _restored.now = False
         return set()
     return edits.meshes
@@ -266,8 +268,8 @@ def note_restored() -> None:
 
 
 def look_quickly() -> None:
-    """Compare the settings of each face that are quick to compare: modes, selection, modifiers and
-    keys."""
+    """Mark plans as outdated if settings that are quick to compare have changed: modes, selection,
+    modifiers and keys."""
     for rig in parts.rigs():
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
@@ -279,10 +281,10 @@ _TAGGED = ("OBJECT", "MESH", "KEY", "ARMATURE", "COLLECTION", "SCENE")
 
 
 def look_at_tagged(scene: bpy.types.Scene) -> None:
-    """Before a frame: check edits of a script since the last update of a scene.
+    """Called before a frame: find edits of a script since the last update of a scene.
 
-    Without an interface Blender reports them only with the frame, together with all animated
-    datablocks.
+    Without an interface Blender reports these edits only with the frame, together with all
+    animated datablocks.
 
     Args:
         scene: the original.
@@ -333,7 +335,7 @@ def _settings(own: bpy.types.ArmatureModifier) -> tuple[object, ...]:
 
 
 def look(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
-    """Work out the plan of a face from the file as it is now.
+    """Compute the plan of a face from its current state.
 
     Args:
         rig: deforming armature.
@@ -354,7 +356,7 @@ def look(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
 
 
 def _whole_face(rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence]:
-    """Why no mesh of a face can get finished positions."""
+    """Yield the reasons why no mesh of a face can be in Direct mode."""
     if rig.get(parts.SKINNING) == "LIVE":
         yield told("Live mode is chosen.")
     if rig.library or rig.override_library or rig.data.library:
@@ -401,7 +403,7 @@ def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
     wrong |= (segments != 1) | (scales != 0)
     rests = np.empty((count, 16), np.float32)
     bones.foreach_get("matrix_local", rests.ravel())
-    wrong |= ~np.isfinite(rests).all(axis=1)  # of joints too far away for float32
+    wrong |= ~np.isfinite(rests).all(axis=1)  # joints too far away for float32
     if wrong.any():
         return bones[int(np.argmax(wrong))].name
     modes = np.empty(len(rig.pose.bones), np.int32)
@@ -415,7 +417,7 @@ def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
 
 
 def _mesh(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence]:
-    """Why a mesh cannot get finished positions."""
+    """Yield the reasons why a mesh cannot be in Direct mode."""
     data = item.data
     if item.library or item.override_library or data.library or data.override_library:
         yield told("{mesh} is linked from another file.", mesh=item.name)
@@ -436,7 +438,7 @@ def _mesh(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> Itera
 
 
 def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
-    """A sentence if a mesh was moved against its rig."""
+    """Yield a reason if a mesh was moved relative to its rig."""
     place = np.array(item.matrix_parent_inverse @ item.matrix_basis)
     moved = np.abs(place - np.eye(4)).max() > _STRAIGHT
     moved = moved or item.parent != rig or item.parent_type != "OBJECT" or len(item.constraints)
@@ -460,8 +462,8 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
         rig: the deforming armature.
 
     Returns:
-        In Direct mode the modifier that we disabled, even if it now points elsewhere; otherwise the
-        first one of this rig.
+        In Direct mode the modifier that the add-on disabled, whatever it points to; otherwise the
+        first armature modifier of this rig.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None
@@ -475,7 +477,7 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
 
 
 def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
-    """Whether our armature modifier is the first that is enabled, and as it was built."""
+    """Yield the reasons if the armature modifier is not the first enabled one, or was changed."""
     own = armature_of(item, rig)
     if own is None or own.object != rig:
         yield told("{mesh} has no armature modifier of {rig}.", mesh=item.name, rig=rig.name)
@@ -500,7 +502,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
-    """Whether the channels of a mesh are keys: the face is in the mode Keys."""
+    """Whether a mesh with channels has no live key, as in the mode Keys."""
     number = runtime.mesh_number(live, item)
     moves = number is not None and live.morph(number).channel_indices.size > 0
     return moves and meshes.live_block(item) is None
@@ -509,7 +511,7 @@ def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
 def _keys(
     item: MeshObject, rig: ArmatureObject, live: runtime.Runtime, number: int
 ) -> Iterator[Sentence]:
-    """Whether the live key alone shapes a mesh."""
+    """Yield the reasons if other shape keys than an unchanged live key shape a mesh."""
     key, block = item.data.shape_keys, meshes.live_block(item)
     if key is None or block is None:
         if key is not None:
@@ -528,7 +530,7 @@ def _keys(
 
 
 def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
-    """Why bones have to be posed although no mesh needs them."""
+    """Yield the reasons why bones have to be posed although no mesh needs them."""
     controls = parts.controls_there(rig)
     if rig.select_get():
         yield told("{rig} is selected.", rig=rig.name)
@@ -546,7 +548,7 @@ def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _reads_bones(item: bpy.types.Object, rig: ArmatureObject) -> bool:
-    """Whether an object of the character reads bones by anything but its original modifier."""
+    """Whether an object of the character reads the rig by more than a mesh's armature modifier."""
     count = 0
     for modifier in item.modifiers:
         properties = modifier.bl_rna.properties
@@ -576,5 +578,5 @@ def _has_driver_on(owner: bpy.types.ID | None, rig: ArmatureObject) -> bool:
 
 
 def _drives_more(material: bpy.types.Material, rig: ArmatureObject) -> bool:
-    """Whether a material reads the rig itself, not only through its node tree's own drivers."""
+    """Whether a driver of a material or of its node tree reads the rig itself."""
     return _has_driver_on(material, rig) or _has_driver_on(material.node_tree, rig)

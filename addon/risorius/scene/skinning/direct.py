@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct mode: final positions in the live keys of the meshes, without posed bones.
+"""Direct mode: writes final vertex positions to the live keys of meshes, without posing bones.
 
 A mesh in Direct mode has the property FINISHED, which survives undo, duplication and automatic
 saves. Its live key has final positions, and its armature modifier is disabled.
@@ -28,8 +28,8 @@ class Shape:
     """The inputs of a shown face.
 
     Attributes:
-        joints: float32[J, 9] of a Pose.
-        weights: float32[C] of the channels.
+        joints: float32[J, 9] deltas of a Pose.
+        weights: float32[C] weights of the blend shape channels.
         turns: "neck" and "head" -> Quaternion in the armature's axes.
     """
 
@@ -45,7 +45,7 @@ class Frame:
     Attributes:
         live: the Runtime.
         shape: Shape.
-        bones: of the deforming armature.
+        bones: bones of the deforming armature.
         writer: writer of the bones that the evaluator owns.
     """
 
@@ -71,7 +71,8 @@ class Frame:
 
 @dataclass(frozen=True)
 class _Face:
-    """Attributes: face  compiled; skins  mesh object -> its Skin; bones, writer  see Frame."""
+    """Compiled data of a face. Attributes: face  all meshes; skins  session uid of a mesh object ->
+    its Skin, in the order of `face`; bones, writer  see Frame."""
 
     face: native.DirectFace
     skins: dict[int, skins.Skin]
@@ -81,7 +82,8 @@ class _Face:
 
 @dataclass(frozen=True)
 class Job:
-    """A face to write. Attributes: face; frame; items meshes by index."""
+    """A face to write. Attributes: face  compiled; frame  its inputs; items  index in `face` ->
+    mesh object; anew  write unchanged values too."""
 
     face: native.DirectFace
     frame: Frame
@@ -89,15 +91,15 @@ class Job:
     anew: bool
 
 
-# Deforming armature -> the plan that its meshes were last brought to.
+# Deforming armature -> the plan to whose modes its meshes were last switched.
 _settled: dict[int, conditions.Plan] = session.table("direct.settled", ("rewrite", "undo", "load"))
-# Deforming armature -> the last written Frame; compiled data of the face.
+# Deforming armature -> its last written Frame, and (second table) the compiled data of its face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
 
 def unsettle(rig: ArmatureObject) -> None:
-    """The modes of a face's meshes were changed. Args: rig  deforming armature."""
+    """Let `settle` check the modes of a face's meshes again. Args: rig  deforming armature."""
     _settled.pop(rig.session_uid, None)
 
 
@@ -109,7 +111,7 @@ def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
         plan: plan of the face.
 
     Returns:
-        Whether a mesh changed its mode, so that its last written values no longer apply.
+        Whether a mesh changed its mode, so that its last written values are outdated.
     """
     if _settled.get(rig.session_uid) is plan:
         return False
@@ -149,11 +151,11 @@ def take(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def give_back(item: MeshObject, rig: ArmatureObject) -> None:
-    """Bring a mesh out of Direct mode: its modifier deforms it again.
+    """Switch a mesh from Direct mode to its armature modifier; its live key is written afterwards.
 
     Args:
         item: the mesh object.
-        rig: deforming armature; the live key is written afterwards.
+        rig: deforming armature.
     """
     own = conditions.armature_of(item, rig)
     item.pop(parts.FINISHED, None)
@@ -165,7 +167,7 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
-    """float32[V, 3], the live key of a mesh in Live mode; None without keys.
+    """float32[V, 3]: the live key that a mesh has in Live mode, before skinning; None without keys.
 
     Args:
         item: the mesh object.
@@ -181,7 +183,8 @@ def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | No
 
 
 def _reset_edited(item: MeshObject, rig: ArmatureObject) -> None:
-    """Give the live key of a mesh in edit mode its rest form: leaving the mode stores it."""
+    """Give the live key of a mesh in edit mode its positions before skinning, because the mesh
+    stores them when the user leaves edit mode."""
     edit, block = bmesh.from_edit_mesh(item.data), meshes.live_block(item)
     layers: Any = edit.verts.layers.shape
     rest = rest_form(item, rig)
@@ -215,7 +218,7 @@ def prepare(
     items: Sequence[MeshObject],
     anew: bool,
 ) -> Job:
-    """Compile missing data of a face.
+    """Note the shown inputs of a face, and compile its data if bones or skins have changed.
 
     Args:
         rig: deforming armature; nothing is written to it.
@@ -231,7 +234,7 @@ def prepare(
     if kept is None or kept.bones is not bones or kept.writer is not writer:
         kept = None
     if kept is None or any(kept.skins.get(uid) is not skin for uid, skin in wanted.items()):
-        others = {} if kept is None else kept.skins  # of other levels of detail
+        others = {} if kept is None else kept.skins  # meshes of other LODs remain compiled
         kept = _faces[rig.session_uid] = _compile(frame, {**others, **wanted})
     order = {uid: number for number, uid in enumerate(kept.skins)}
     found = {order[item.session_uid]: item for item in items}
@@ -275,7 +278,7 @@ def write(jobs: Sequence[Job]) -> None:
 
 
 def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
-    """Mesh -> address and number of the points of its live key."""
+    """Index of a mesh -> memory address and number of the points of its live key."""
     found = {}
     for number, item in items.items():
         block = meshes.live_block(item)
@@ -286,7 +289,8 @@ def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
 
 
 def _turns(frame: Frame) -> NDArray[np.float32] | None:
-    """Rotations of the joints of neck and head, in the axes of their bones: float32[t, 4]."""
+    """float32[t, 4]: quaternions (w x y z) of the joints of neck and head, in the axes of their
+    bones; None without rotations."""
     turns, turning = frame.shape.turns, frame.writer.turning
     if not turns or not turning:
         return None

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sum of all channels in the live key of a mesh.
+"""Writes the sum of all blend shape channels to the live key of a mesh.
 
 Writing a key is an edit of its mesh, and an edit resets simulations: cloth would stay at its first
-    step. So before a frame the key of a mesh with a simulation is written without notifying
-    Blender, in the key and its copies in the graphs of all scenes. Graphs of renders and exporters
-    are notified afterwards.
+step. So before a frame the key of a mesh with a simulation is written without notifying Blender,
+in the key and its copies in the graphs of all scenes. Graphs of renders and exporters are notified
+afterwards.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def write(
     Args:
         item: the mesh object.
         live: the Runtime of its character.
-        weights: float32[C] of the channels.
-        force: write unchanged values too.
-        ahead: whether this happens before a frame.
+        weights: float32[C] weights of the channels.
+        force: True writes unchanged values too.
+        ahead: True if Blender has not evaluated the frame yet.
     """
     key = item.data.shape_keys
     block = meshes.live_block(item)
@@ -43,7 +43,7 @@ def write(
         return
     number = runtime.mesh_number(live, item)
     if number is None:
-        return  # the data in the .blend is another file's
+        return  # the mesh belongs to another DNA file
     morph = live.morph(number)
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
@@ -68,14 +68,14 @@ def write(
 
 
 def bears_simulation(item: bpy.types.Object) -> bool:
-    """Whether an edit of a mesh resets a simulation: its own, or one that collides with it."""
+    """Whether an edit of an object resets a simulation: its own, or one that it influences."""
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None
     return field or body or any(m.type in caches.SIMULATED for m in item.modifiers)
 
 
 def reach(depsgraph: Depsgraph) -> None:
-    """Write keys again whose silent writes did not reach a graph.
+    """Tag keys for an update if their silent writes did not reach a dependency graph.
 
     Args:
         depsgraph: the evaluated graph.
@@ -97,7 +97,7 @@ def reach(depsgraph: Depsgraph) -> None:
 def _write_unheard(
     key: bpy.types.Key, block: bpy.types.ShapeKey, points: NDArray[np.float32]
 ) -> None:
-    """Write points without an update: to the memory of the key, and to its copies in graphs."""
+    """Write points to a key and to its copies in graphs, without notifying Blender."""
     points = np.ascontiguousarray(points, np.float32)
     ctypes.memmove(block.points[0].as_pointer(), points.ctypes.data, points.nbytes)
     last_written.unheard.add(key.session_uid)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The form of a face in files, bones posed and modifiers enabled, while it is in Direct mode."""
+"""Switches faces from Direct mode to the form in files (bones posed, modifiers on) and back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _finished: dict[int, NDArray[np.float32]] = session.table("ordinary.finished", (
 
 
 def take_on(rigs: Iterable[ArmatureObject]) -> None:
-    """Give faces the form of files while a file is written. Nothing is evaluated.
+    """Give faces the form of files before a file is written, without an evaluation.
 
     Args:
         rigs: deforming armatures.
@@ -33,7 +33,7 @@ def take_on(rigs: Iterable[ArmatureObject]) -> None:
 
 
 def leave(rig: ArmatureObject) -> None:
-    """Bring a face out of Direct mode as it is seen; the next evaluation brings it back.
+    """Give a face the form of files in its visible pose; the next evaluation restores Direct mode.
 
     Args:
         rig: deforming armature.
@@ -57,7 +57,7 @@ def leave(rig: ArmatureObject) -> None:
 
 
 def is_unknown(rigs: Iterable[ArmatureObject]) -> bool:
-    """Whether the form of a face in files is not known, as between undo and the next update.
+    """Whether the form of files is unknown for a face, as between undo and the next update.
 
     Args:
         rigs: deforming armatures.
@@ -70,7 +70,7 @@ def _finished_meshes(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def take_off(rigs: Iterable[ArmatureObject]) -> None:
-    """After `take_on`: bring the faces back into Direct mode. Args: rigs  the same."""
+    """Switch faces back into Direct mode after `take_on`. Args: rigs  the same armatures."""
     for rig in rigs:
         for item in parts.meshes_of(rig):
             points = _finished.pop(item.session_uid, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bones and skin weights of a face as Blender has them, compiled for the native skinning."""
+"""Reads the bones and skin weights of a face from Blender, compiled for the native skinning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..base import parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
 
-_SAMPLES = 16  # vertices whose weights tell that undo left a mesh as it was
+_SAMPLES = 16  # vertices, about, whose weights are compared to see whether undo changed a mesh
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Bones:
     Attributes:
         names: bone -> its position among the pose bones.
         joints: joint -> position of its bone.
-        chain: risorius.JointChain of them.
+        chain: risorius.JointChain of the bones.
         location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
             the rows of its joints.
     """
@@ -46,7 +46,7 @@ class Skin:
         skin: risorius.Skin of its vertex groups.
         base: float32[V, 3], its basis key.
         mark: see _mark.
-        names: names of the Bones that it was compiled for.
+        names: Bones.names when the skin was compiled.
     """
 
     mesh: int
@@ -74,7 +74,7 @@ def doubt() -> None:
 
 
 def forget(uids: set[int]) -> None:
-    """Meshes were edited. Args: uids  of the mesh objects."""
+    """Forget the skins of edited meshes. Args: uids  session uids of the mesh objects."""
     _edited.update(uids)
     for uid in uids:
         _skins.pop(uid, None)
@@ -82,12 +82,12 @@ def forget(uids: set[int]) -> None:
 
 
 def forget_bones(uid: int) -> None:
-    """Bones of an armature were edited or posed. Args: uid  of the deforming armature."""
+    """Forget bones that were edited or posed. Args: uid  session uid of the deforming armature."""
     _bones.pop(uid, None)
 
 
 def bones_of(rig: ArmatureObject) -> Bones:
-    """The bones of an armature as they are now. Args: rig  deforming armature."""
+    """The current bones of an armature. Args: rig  deforming armature."""
     kept = _bones.get(rig.session_uid)
     if kept is None or len(kept.names) != len(rig.pose.bones):
         kept = _bones[rig.session_uid] = _read_bones(rig)
@@ -127,7 +127,7 @@ def _read_bones(rig: ArmatureObject) -> Bones:
     names = {bone.name: place for place, bone in enumerate(posed)}
     rest = np.empty((len(rests), 4, 4), np.float32)
     rests.foreach_get("matrix_local", rest.ravel())
-    rest = rest.transpose(0, 2, 1)  # Blender's columns lie one after the other
+    rest = rest.transpose(0, 2, 1)  # Blender stores matrices column by column
     order = [names[bone.name] for bone in rests]
     parents = np.full(len(posed), -1, np.int32)
     for place, bone in zip(order, rests, strict=True):
@@ -171,7 +171,8 @@ _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
 
 
 def _weights_of_file(item: MeshObject, bones: Bones, live: runtime.Runtime) -> _Weights:
-    """As _weights_of_groups, of a mesh that was built a moment ago."""
+    """The same result as _weights_of_groups, read from the DNA for a mesh whose weights are
+    unedited."""
     data = live.dna.meshes[item[parts.MESH]]
     place_of = np.full(len(live.rest), -1, np.int64)
     place_of[list(bones.joints)] = list(bones.joints.values())
@@ -187,8 +188,8 @@ def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
     """The weights of a mesh's vertex groups.
 
     Returns:
-        int64[V] weights of each vertex; int64[N] the place of each weight's bone, -1 for none;
-        float32[N] the weights.
+        int64[V] number of weights of each vertex; int64[N] position of each weight's bone, -1 for
+        none; float32[N] the weights.
     """
     vertices, groups_there = item.data.vertices, item.vertex_groups
     counts = np.fromiter((len(v.groups) for v in vertices), np.int64, len(vertices))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words and phonemes of voices beside the keys of an action, and corrections of both."""
+"""Stores the words and phonemes of a voice with its action; corrections update its keys."""

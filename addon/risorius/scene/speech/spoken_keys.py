@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of sounds of an action, and the mouth's keys that follow a correction of it.
+"""Stores the sounds of a voice with its action, and updates the mouth's keys after corrections.
 
-Only keys of a curve around frames that the correction changes are replaced: from the last key
-    before the first such frame to the first key after the last one. All other keys stay byte for
-    byte.
+In each curve only the keys between the last key before the changed frames and the first key after
+them are replaced. These two keys get new inner handles; all other keys are unchanged.
 """
 
 from __future__ import annotations
@@ -26,16 +25,16 @@ from ..animation import clip_actions, layer_mixing
 from ..base import compat, parts
 
 PROPERTY = "risorius_spoken"
-_NEAR = TOLERANCE  # what changes less has not changed
+_NEAR = TOLERANCE  # smaller changes of a control's value are ignored
 _REACH = 1.2  # seconds before and after a sound in which it can move the mouth
-_ROUND = 2.5  # seconds of sounds around that are looked at
-_BESIDE = 1e-3  # frames: nearer keys are one
+_ROUND = 2.5  # seconds: sounds up to this far from the computed samples are included
+_BESIDE = 1e-3  # frames: keys closer than this are at the same frame
 
 Floats = NDArray[np.float64]
 
 
 class Row(Protocol):
-    """A sound as RISORIUS_PG_sound has it."""
+    """The members of RISORIUS_PG_sound that this module uses."""
 
     begin: float
     name: str
@@ -43,7 +42,7 @@ class Row(Protocol):
 
 
 class Rows(Protocol):
-    """The list of sounds."""
+    """The methods of a Blender collection of sounds that this module uses."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, place: int) -> Row: ...
@@ -53,7 +52,7 @@ class Rows(Protocol):
 
 
 class Spoken(Protocol):
-    """The members of RISORIUS_PG_spoken, which uses this module."""
+    """The members of RISORIUS_PG_spoken."""
 
     sounds: Rows
     active: int
@@ -62,21 +61,21 @@ class Spoken(Protocol):
     end: float
     """Frame at which the sound file ends."""
     fps: float
-    """Frames a second of the scene, when the action was made."""
+    """Frames per second of the scene when the action was made."""
     rate: float
-    """Samples a second of the clip."""
+    """Samples per second of the clip."""
     samples: int
     whole: bool
     tolerance: float
     intensity: float
     openness: str
-    """As in the metadata of a correctable clip."""
+    """Value of this name in the metadata of a correctable clip."""
     built: str
-    """The sounds of which the keys were made, as JSON."""
+    """The sounds from which the keys were made, as JSON."""
     visemes: str
-    """The face's own visemes that it speaks by, as JSON: controls and weights by their names."""
+    """The face's own visemes, as JSON: viseme -> control -> weight."""
     mark: str
-    """Names the voice, whatever its action is called."""
+    """Unique id of the voice, independent of the name of its action."""
 
 
 def of(action: bpy.types.Action) -> Spoken:
@@ -102,7 +101,7 @@ def note(
     Args:
         action: action of the clip.
         clip: clip of a correctable voice.
-        timing: its place in time.
+        timing: maps the times of the clip to frames of the action.
         tolerance: tolerance of the action's keys; 0 if each sample has a key.
         intensity: intensity of the clip.
         visemes: visemes of the face, used for the clip.
@@ -122,17 +121,17 @@ def note(
     _fill(said, sounds)
     said.built = _packed(sounds_of(action))
     said.visemes = json.dumps({name: dict(one.weights) for name, one in visemes.items()})
-    said.mark = uuid.uuid4().hex  # names change, and copies of an action are the same voice
+    said.mark = uuid.uuid4().hex  # actions can be renamed; a copy of an action is the same voice
 
 
 def change(action: bpy.types.Action, sounds: Sequence[Sound]) -> int:
-    """Give an action another list of sounds, and its mouth the keys for it.
+    """Replace the list of sounds of an action, and update the mouth's keys.
 
     Returns:
-        How many curves have new keys.
+        The number of curves with new keys.
 
     Raises:
-        SpokenError: see rebuild; then the list stays as it was.
+        SpokenError: see rebuild; the list is then unchanged.
     """
     _check(action)
     _fill(of(action), sounds)
@@ -156,7 +155,7 @@ def _packed(sounds: Sequence[Sound]) -> str:
 
 
 def _built(action: bpy.types.Action) -> list[Sound]:
-    """The sounds of which the keys were made. Raises: SpokenError."""
+    """The sounds from which the keys were made. Raises SpokenError if they are lost."""
     try:
         found = [Sound(float(begin), str(name)) for begin, name in json.loads(of(action).built)]
     except (ValueError, TypeError):
@@ -172,9 +171,9 @@ def _built(action: bpy.types.Action) -> list[Sound]:
 
 
 def rebuild(action: bpy.types.Action) -> int:
-    """Replace the keys whose sounds have changed in the list.
+    """Update the mouth's keys around sounds that have changed in the list.
 
-    Locked curves stay as they are, and deleted curves stay deleted.
+    Locked curves are unchanged, and deleted curves stay deleted.
 
     Returns:
         The number of curves with new keys.
@@ -200,7 +199,7 @@ def rebuild(action: bpy.types.Action) -> int:
         _replace(curve, mouth, new, name, (float(ends[0]), float(ends[1])))
         count += 1
     said.built = _packed(new)
-    layer_mixing.note_edits([action])  # of a layer's nobody else tells
+    layer_mixing.note_edits([action])  # Blender does not report edits of a layer's action
     action.update_tag()
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
@@ -219,7 +218,8 @@ def trouble(action: bpy.types.Action) -> str:
 
 
 def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
-    """The curves of an action by their paths. Raises: SpokenError."""
+    """Check that the voice of an action can be corrected. Returns: data path -> curve. Raises
+    SpokenError with the reason if it cannot."""
     said = of(action)
     begins = [row.begin for row in said.sounds]
     if not begins:
@@ -248,7 +248,7 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
 
 
 class _Mouth:
-    """The mouth of a voice at any sample of its clip."""
+    """Computes the values of the mouth's controls at any sample of a voice's clip."""
 
     def __init__(self, action: bpy.types.Action) -> None:
         self.said = of(action)
@@ -261,22 +261,22 @@ class _Mouth:
         return list(self.curves([Sound(self.said.start, spoken.SILENCE)], 0, 2))
 
     def frames(self, samples: NDArray[Any]) -> Floats:
-        """Frames of the action for numbers of samples."""
+        """The frame of the action at each sample number."""
         return self.said.start + samples * (self.said.fps / self.said.rate)
 
     def sample(self, frame: float) -> float:
-        """The inverse of `frames`, within the clip."""
+        """The sample number, with fraction, at a frame of the action; clamped to the clip."""
         at = (frame - self.said.start) * self.said.rate / self.said.fps
         return min(max(at, 0.0), self.said.samples - 1.0)
 
     def window(self, begin: float, end: float) -> tuple[int, int]:
-        """The samples that a change between two frames can reach: first, and behind the last."""
+        """The samples that a change between two frames can affect: (first, last + 1)."""
         far = _REACH * self.said.fps
         first, last = int(self.sample(begin - far)), int(np.ceil(self.sample(end + far)))
         return first, last + 1
 
     def curves(self, sounds: Sequence[Sound], first: int, last: int) -> dict[str, Floats]:
-        """Control -> float64[last - first]."""
+        """Control -> float64[last - first], its values at the samples from first to last - 1."""
         said = self.said
         times = np.arange(first, last) / said.rate
         ends = [*(sound.begin for sound in sounds[1:]), said.end]
@@ -292,7 +292,7 @@ class _Mouth:
 
 
 def _visemes_of(said: Spoken) -> dict[str, native.Expression]:
-    """The face's own visemes; none of a voice of before, or where somebody wrote into it."""
+    """The face's own visemes by name; empty if the voice has none or their text is invalid."""
     make = native.part("expressions").Expression
     try:
         return {
@@ -310,7 +310,7 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Replace the keys from the last one before a span to the first one after it."""
+    """Replace the keys between the last key before a span of frames and the first key after it."""
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
@@ -343,7 +343,7 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Values of a control between two frames; at both ends the curve keeps its values."""
+    """Frames and values of a control in a span of frames; both end values are the curve's own."""
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))
@@ -364,7 +364,7 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Set the handle of an end key that points into the span; its other handle stays."""
+    """Set the handle of a key that points into the replaced span; its other handle is unchanged."""
     kept = key.handle_left[:], key.handle_right[:]
     if bent:
         key.handle_left_type = key.handle_right_type = "FREE"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sounds as markers of the scene: shown in every timeline, moved, and read again.
+"""Shows the sounds of a voice as scene markers, and reads them back after the user moved them.
 
-Markers of the scene, not of the action: timeline, dope sheet, graph editor and NLA all show them,
-also where the voice is a layer and not the active action. They represent the list of the action.
-The user's own markers are never changed.
+Scene markers are used instead of action markers, because timeline, dope sheet, graph editor and
+NLA all show them, even if the voice is a layer and not the active action. The user's own markers
+are never changed.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from ...logic.animation.spoken import Board, Mark, Placing
 from ..base import parts, saved
 from . import spoken_keys, voices
 
-# Property of a scene: markers of each voice, and the user's own markers of that time, as JSON.
-# Since Blender 5 markers store frame and name only.
+# Property of a scene, as JSON: the shown voice, its markers, and the user's own markers when they
+# were added. Markers cannot be tagged, because since Blender 5 they store frame and name only.
 _KEPT = "risorius_markers"
 
 
 def label(name: str) -> str:
-    """The animators' name of a phoneme's mouth: M B P, Oo."""
+    """The animators' name of the mouth shape of a phoneme, such as "M B P" or "Oo"."""
     found: str = native.part("speech.phones").label_of(name)
     return found
 
 
 def named(text: str) -> str | None:
-    """The phoneme that somebody means, or None."""
+    """The phoneme that a text names, or None."""
     found: str | None = native.part("speech.phones").phone_named(text)
     return found
 
@@ -44,17 +44,17 @@ def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
         placed, own = rows
         return str(kept.get("voice", "")), Board(placed, own, there)
     except (ValueError, TypeError, AttributeError):
-        return "", Board([], [], there)  # somebody wrote into it
+        return "", Board([], [], there)  # the property was edited by hand
 
 
 def are_shown(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
-    """Whether a voice has markers in a scene. Args: action  with the voice."""
+    """Whether the markers of a voice are shown in a scene. Args: action  with the voice."""
     voice = _board(scene)[0]
     return bool(voice) and voice == spoken_keys.of(action).mark
 
 
 def hide(scene: bpy.types.Scene) -> None:
-    """Take the markers of a voice out of a scene; the user's own stay."""
+    """Remove the markers of a voice from a scene; the user's own markers stay."""
     voice, board = _board(scene)
     if not voice:
         return
@@ -69,12 +69,12 @@ def hide(scene: bpy.types.Scene) -> None:
 
 
 def show(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> None:
-    """Add a marker for each sound of a voice, and remove markers of other voices.
+    """Add a marker for each sound of a voice, and remove the markers shown before.
 
     Args:
         scene: scene for the markers.
         action: action with a voice.
-        placing: its place in the scene.
+        placing: maps frames of the action to frames of the scene.
     """
     hide(scene)
     own = [(m.frame, m.name) for m in scene.timeline_markers]
@@ -89,11 +89,11 @@ def show(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> 
 
 
 def are_changed(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
-    """Whether somebody moved, renamed, copied or deleted markers of a voice that are shown.
+    """Whether the shown markers of a voice were moved, renamed, copied or deleted.
 
     Args:
-        scene: has the markers.
-        action: with a voice.
+        scene: scene with the markers.
+        action: action with a voice.
     """
     if not are_shown(scene, action):
         return False
@@ -103,15 +103,15 @@ def are_changed(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
 
 
 def take(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> list[str]:
-    """Update the list and the keys of the mouth from the markers of a voice.
+    """Update the list of sounds and the keys of the mouth from the markers of a voice.
 
     Args:
         scene: scene with the markers.
         action: action with a voice.
-        placing: its place in the scene.
+        placing: maps frames of the action to frames of the scene.
 
     Returns:
-        The names of markers moved past a neighbour; their sounds stay beside it.
+        The names of markers moved past a neighbour; their sounds stop next to the neighbour.
 
     Raises:
         SpokenError: no marker is left, or the name of a marker is no sound; nothing changes.
@@ -125,7 +125,7 @@ def take(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> 
 
 
 def follow(action: bpy.types.Action) -> None:
-    """Put markers that are shown where the list of a voice has its sounds now."""
+    """Move the shown markers of a voice to the current frames of its sounds."""
     for scene in bpy.data.scenes:
         if not are_shown(scene, action):
             continue

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words and sounds of a voice as properties of its action: saved, appended, copied and undone with
-it."""
+"""The words and sounds of a voice as properties of its action, so that they are saved, appended,
+copied and undone with the action."""
 
-# Blender takes properties where Python has annotations:
+# Blender properties are declared as annotations that are not types:
 # pyright: reportInvalidTypeForm=false
 
 import bpy
@@ -14,7 +14,7 @@ from . import spoken_keys, spoken_markers, voices
 
 
 def _row(sound: "RISORIUS_PG_sound") -> tuple[bpy.types.Action, int]:
-    """The action that a sound is of, and its place there."""
+    """The action of a sound, and the index of the sound in the action's list."""
     action = sound.id_data
     assert isinstance(action, bpy.types.Action)
     return action, next(i for i, row in enumerate(spoken_keys.of(action).sounds) if row == sound)
@@ -37,21 +37,21 @@ def _length(self: "RISORIUS_PG_sound") -> float:
 
 def _set_length(self: "RISORIUS_PG_sound", frames: float) -> None:
     action, place = _row(self)
-    if place + 1 < len(spoken_keys.of(action).sounds):  # the last one ends with the voice
+    if place + 1 < len(spoken_keys.of(action).sounds):  # the last sound ends with the voice
         _move(action, place + 1, self.begin + frames)
 
 
 def _move(action: bpy.types.Action, place: int, frame: float) -> None:
     said = spoken_keys.of(action)
     if place == 0 or spoken_keys.trouble(action):
-        return  # the first one begins with the voice
+        return  # the first sound begins with the voice
     new, _held = spoken.moved(spoken_keys.sounds_of(action), {place: frame}, said.end)
     spoken_keys.change(action, new)
     spoken_markers.follow(action)
 
 
 def _jump(self: "RISORIUS_PG_spoken", _context: bpy.types.Context) -> None:
-    """Show the frame at which the chosen sound begins."""
+    """Go to the frame at which the chosen sound begins."""
     context = current_context()
     rig = parts.active_rig(context)
     controls = parts.controls_of(rig) if rig is not None else None
@@ -115,7 +115,7 @@ CLASSES = (RISORIUS_PG_sound, RISORIUS_PG_spoken)
 
 
 def register() -> None:
-    """Add the list to actions; the classes are there."""
+    """Add the property to actions, after the registration of its classes."""
     setattr(
         bpy.types.Action,
         spoken_keys.PROPERTY,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The voices of a face, and their places in the scene."""
+"""Finds the voices that a face plays, and maps their frames to frames of the scene."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 
 
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
-    """The place of an action's frames in the scene.
+    """The mapping from frames of an action to frames of the scene.
 
-    For a layer with warped time or repeats, the first pass counts.
+    Repeats of a layer are ignored, and warped time is replaced by the line through its ends.
 
     Args:
         controls: the face's control armature.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A photographer's studio around a face."""
+"""Builds a photographer's studio around a face: camera, lights and a backdrop."""

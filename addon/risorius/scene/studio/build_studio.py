@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Camera, three lights and a backdrop around a face, in a collection of their own.
 
-They belong to the user afterwards: nothing of the face refers to them.
+The user may change or delete them, because nothing of the face refers to them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
 from ..character import runtime
 from ..character.meshes import basis_of
 
-_MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
+_MIDDLE = (0.115, 0.121, 0.130, 1.0)  # linear colour of the backdrop behind the head
 _EDGE = (0.010, 0.011, 0.014, 1.0)
 
 
@@ -26,13 +26,13 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
     """Build the studio of a face at its current place, scaled to its head.
 
     Args:
-        context: a Blender context, to whose scene it is added.
+        context: Blender context; the studio is added to its scene.
         rig: deforming armature of the face.
-        scene_camera: make its camera the camera of the scene; a scene without a camera always gets
-            it.
+        scene_camera: True makes the studio's camera the camera of the scene; a scene without a
+            camera always gets it.
 
     Returns:
-        The collection that holds all of it.
+        The collection with camera, lights and backdrop.
     """
     place, apart, low, high = _head(rig)
     plan = studio_plan.plan(apart, low, high)
@@ -51,8 +51,8 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
 
 
 def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
-    """The head's matrix in the world without scale, the distance of the eyes, and the bounding box
-    of the face."""
+    """The matrix in the world, without scale, of the point between the eyes; the distance between
+    the eyes; the low and high corner of the face's bounding box in this space."""
     meshes = parts.meshes_of(rig)
     world = np.array(rig.matrix_world, np.float64)
     eyes = _eyes(rig)
@@ -79,9 +79,10 @@ def _places(item: MeshObject) -> np.ndarray:
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:
-    """Height of the body's lower end in front, at its highest place below the face.
+    """The largest height at which the front of the body ends, compared in 8 strips below the face.
 
-    A hem may hang lower at the sides, and a picture down to there would show its gap in the middle.
+    A hem may hang lower at the sides, and a picture that reaches down to the lowest point would
+    show a gap in the middle.
 
     Args:
         places: float64[V, 3] of each mesh, in the head's axes.
@@ -99,7 +100,7 @@ def _hem(places: list[np.ndarray], apart: float) -> float:
 
 
 def _eyes(rig: ArmatureObject) -> np.ndarray:
-    """float64[2, 3] the eyes' joints at rest in the rig's space, or fewer rows."""
+    """float64[2, 3]: the eyes' joints at rest in the rig's space; no rows unless there are two."""
     live = runtime.of(rig)
     if live is None:
         return np.zeros((0, 3))
@@ -109,7 +110,7 @@ def _eyes(rig: ArmatureObject) -> np.ndarray:
 
 
 def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Where eyes would be in a head of this box, and how far apart."""
+    """Guess the point between the eyes and their distance from the corners of bounding boxes."""
     inside = corners @ axes
     low, high = inside.min(axis=0), inside.max(axis=0)
     tall = max(float(high[2] - low[2]), 1e-6)
@@ -141,7 +142,7 @@ def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
 
 
 def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
-    """The matrix of a camera or lamp that looks from a place at another."""
+    """The matrix of a camera or lamp that looks from a place to a target."""
     way = Vector(target) - Vector(place)
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
@@ -159,7 +160,7 @@ def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.O
 
 
 def _paper(name: str, glow: float) -> bpy.types.Material:
-    """Dark paper with a lighter middle, as by a light of its own; it falls off without an edge."""
+    """An emissive dark material with a lighter middle that falls off smoothly."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -176,7 +177,7 @@ def _paper(name: str, glow: float) -> bpy.types.Material:
 
 
 def _falloff(tree: NodeTree, glow: float) -> bpy.types.NodeSocket:
-    """Colour by the distance from the middle: exp(-(r / glow)^2) between the two."""
+    """The colour at distance r from the middle: exp(-(r / glow)^2) mixes from _EDGE to _MIDDLE."""
     nodes, links = tree.nodes, tree.links
     where = nodes.new("ShaderNodeTexCoord")
     length = nodes.new("ShaderNodeVectorMath")

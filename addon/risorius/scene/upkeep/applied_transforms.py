@@ -2,8 +2,8 @@
 """Undo Apply Transform, Set Origin and similar steps on parts of a face.
 
 Joints, meshes and controls must fit each other. These steps move an object's transform into its
-data: the rig, which follows the controls, would have its place twice, and a mesh would leave its
-joints. Blender gives no notice of them, so the state of each part is stored and compared.
+data: the rig, which follows the controls, would be transformed twice, and a mesh would leave its
+joints. Blender does not report these steps, so the state of each part is stored and compared.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from ...logic.base.sentences import Sentence, told
 from ..base import last_written, parts, session
 from ..base.blender_types import ArmatureObject, MeshObject
 
-_NEAR = 1e-5  # of the largest number: what multiplying in float32 leaves
-_FLAT = 1e-12  # a determinant below it: there is no way back
-_SAMPLES = 4  # vertices of a mesh that tell whether its data changed
+_NEAR = 1e-5  # relative rounding error of products in float32
+_FLAT = 1e-12  # smallest determinant of a matrix that can be inverted
+_SAMPLES = 4  # vertices of a mesh, about, that are compared to see whether its data changed
 _BY_HAND = ("EDIT", "SCULPT")  # modes in which the user moves points
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """The state of a part at the last look.
+    """The state of a part at the last check.
 
     Attributes:
         own: its matrix, without parent and constraints.
-        hung: its parent inverse.
+        hung: its parent inverse matrix.
         parent: session uid of its parent, 0 for none.
         points: float32[N, 3] ends of its bones or some of its vertices; empty while the user
             edits them.
@@ -48,7 +48,8 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Moved:
-    """A part, its places in the world before and after a step, and its state before it."""
+    """A part with its state before a step, and its world matrix before (`stood`) and after it
+    (`stands`)."""
 
     item: bpy.types.Object
     before: _Seen
@@ -63,7 +64,7 @@ _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:
-    """The sentence on the last step that was taken back. Args: rig  deforming armature."""
+    """The sentence about the last undone step of a face. Args: rig  deforming armature."""
     return _said.get(rig.session_uid)
 
 
@@ -116,7 +117,7 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
 
 
 def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
-    """The current state of a part; points are read only after a noted change."""
+    """The current state of a part; points are read only if the update reports a change."""
     if before is not None and item not in touched:
         return before
     parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
@@ -143,14 +144,15 @@ def _ends(armature: bpy.types.Armature) -> bytes:
 
 
 def _read(items: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32]:
-    """float32[N, 3]: a vector of each of many things."""
+    """float32[N, 3]: the vector property `name` of each item."""
     found = np.empty(3 * len(items), np.float32)
     items.foreach_get(name, found)
     return found.reshape(-1, 3)
 
 
 def _followed(rig: ArmatureObject) -> dict[bpy.types.Object, Matrix]:
-    """Where rig and controls stood when the rig last followed: frames make no update."""
+    """World matrices of rig and controls when the rig last followed the controls; stored states can
+    be older, because frame changes cause no update."""
     controls, kept = parts.controls_of(rig), last_written.places.get(rig.session_uid)
     if not isinstance(kept, bytes) or parts.BAKED in rig:
         return {}
@@ -206,7 +208,8 @@ def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object])
 
 
 def _clear_deltas(rig: ArmatureObject) -> bool:
-    """Make the deltas of a rig its own place: with them Blender itself applies wrongly."""
+    """Move the delta transforms of a rig into its transform, because Blender's Apply is wrong with
+    deltas. Returns whether there were any."""
     neutral = Vector(), Euler(), Quaternion(), Vector((1.0, 1.0, 1.0))
     names = ("location", "rotation_euler", "rotation_quaternion", "scale")
     if all(getattr(rig, f"delta_{n}") == v for n, v in zip(names, neutral, strict=True)):
@@ -225,7 +228,7 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """Restore the place of children of a part; Blender keeps it, but not under every bone."""
+    """Restore the place of a child of a part; Blender does so itself, but not under all bones."""
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
@@ -238,7 +241,8 @@ def _is_held(item: bpy.types.Object) -> bool:
 
 
 def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
-    """The matrix that moves a part's data back, or None if no such step happened."""
+    """The matrix that moves a part's data back, or None if no step has moved its transform into
+    them."""
     old, new = (
         np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
         for seen in (moved.before, now)
@@ -255,7 +259,7 @@ def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
     near = _NEAR * max(np.abs(old).max(), np.abs(new).max())
     if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
         return None
-    # On an object with a constraint, Set Origin moves it too far or not far enough.
+    # Set Origin moves an object with a constraint too far or not far enough.
     told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
     return Matrix.Translation(Vector(shift.tolist())) if told else None
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the bones of an armature were really edited.
+"""Detects whether the bones of an armature were really edited.
 
-Moving a slider in the sidebar tags the armature as if its bones had changed.
+The check is needed because a moved slider tags the armature as if its bones had changed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def is_edited(armature: bpy.types.Armature) -> bool:
     """Whether the bones of an armature changed since the last call; True at the first call.
 
     Args:
-        armature: of a deforming or a control armature, the original.
+        armature: the original data of a deforming or a control armature.
     """
     bones = armature.bones
     marks = [(bone.name, bone.get(parts.PART), bone.get(parts.JOINT)) for bone in bones]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A duplicated character gets materials, shape keys and drivers of its own."""
+"""Gives a duplicated character its own materials, shape keys and drivers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def separate_all() -> list[str]:
 
 
 def separate(rig: ArmatureObject) -> list[str]:
-    """Make the shared data of a character its own.
+    """Give a character its own copies of shared data, and let drivers read its own properties.
 
     Args:
         rig: its deforming armature.
@@ -69,7 +69,7 @@ def _own_mesh(item: MeshObject) -> list[str]:
     if len(users) < 2 or users[0] == item or item.library or item.data.library:
         return []
     if parts.FINISHED in item:
-        ordinary.leave(item[parts.RIG])  # the other object is nobody's to bring back
+        ordinary.leave(item[parts.RIG])  # the other object may belong to no character
     item.data = item.data.copy()
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
 
@@ -124,7 +124,7 @@ def _own_materials(
         )
         if not foreign or not curves:
             continue
-        # The name stays the key while copies are made: a datablock cannot be hashed safely.
+        # Materials are found by name, because a datablock cannot be hashed safely.
         if material.name not in copied:
             copied[material.name] = material.copy() if material.users > 1 else material
         own = copied[material.name]

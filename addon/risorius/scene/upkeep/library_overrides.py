@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linked characters: an override that can be animated.
+"""Makes overrides of linked characters that can be animated.
 
 Blender refuses bulk writes to linked data and to overrides that are not editable, and to the
-shape keys of every override. So the override is made fully editable, and shapes are either real
-keys, which drivers move without any write, or meshes of this file.
+shape keys of every override. So the override is made fully editable, and its meshes either have
+real keys, which drivers move without any write, or are copied into this file.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def make_override(
     """Override a linked character so that it can be animated here.
 
     Args:
-        context: scene and view layer for it, and the active object that instances it.
+        context: Blender context; its active object may be the instance that is replaced.
         rig: the linked deforming armature.
         local_meshes: True: copy the meshes into this file; False: drive their real keys.
 
@@ -74,7 +74,7 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
     """Make an override that Blender made by itself fully editable.
 
     Args:
-        context: its view layer is updated.
+        context: Blender context; its view layer is updated.
         rig: deforming armature of the override.
         local_meshes: True: copy the meshes into this file; False: drive their real keys.
 
@@ -99,7 +99,7 @@ def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
 
     Args:
         rig: the override's deforming armature.
-        local_meshes: for all meshes, not only for those with a live key.
+        local_meshes: True copies all meshes, False only meshes with a live key.
 
     Returns:
         Sentences for a report.
@@ -123,7 +123,8 @@ def is_locked(item: MeshObject) -> bool:
 
 
 def unlock_shapes(rig: ArmatureObject) -> bool:
-    """Copy all meshes whose shapes are locked into this file, before their mode is switched."""
+    """Copy all meshes whose shapes belong to another file into this file, so that their mode can be
+    switched. Returns whether there were any."""
     owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
     for item in locked:
@@ -158,7 +159,7 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
         if material.name not in owned:
             owned[material.name] = _local_copy(material)
         item.data.materials[index] = owned[material.name]
-    # 5.2 calls overrides that are saved without their hierarchy an error when the file is opened.
+    # Blender 5.2 reports overrides without their hierarchy as errors when a file is opened.
     for old in dict.fromkeys(left):
         if old is not None and old.override_library is not None and old.users == 0:
             bpy.data.batch_remove([old])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Update characters of older files to the current form, one step for each number.
+"""Updates characters of older files to the current form, one step for each form number.
 
-Linked characters cannot be written, so readers understand every form. A character of a newer form
-stays as it is and plays with the features that this version knows.
+Linked characters cannot be written, so code that reads characters must understand every form. A
+character of a newer form is unchanged and plays with the features that this version knows.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..character import armatures, values
 from ..frame import joint_turns
 from ..skinning import caches
 
-# Session uids of characters that something was said of.
+# Session uids of characters for which a sentence was returned that is not repeated.
 _said: set[int] = session.keep("migrations.said", set, ("load",))
 
 
@@ -42,12 +42,12 @@ def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     for step in _STEPS[found:]:
         done = step(rig, controls)
         if done is None:
-            break  # and is asked for again later
+            break  # the step is tried again later
         changed += done
         reached += 1
     if reached > found:
         if form.VERSION in controls:
-            del controls[form.VERSION]  # it may be no number
+            del controls[form.VERSION]  # the stored value may not be a number
         # For an override of an older library the number is lost when the file is saved, so it is
         # updated again.
         controls[form.VERSION] = reached
@@ -91,7 +91,7 @@ def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
-    """Simulations see the face of their own frame; older bakes are marked as late."""
+    """Let simulations see the face of their own frame; None while older bakes exist."""
     if caches.note_old(rig):
         return None
     if caches.have_nodes(rig):
@@ -100,7 +100,7 @@ def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
 
 
 def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """Head turns drive neck poses; sliders of the rotations that were set go on leading."""
+    """Let head rotations drive neck poses, unless the user has set the sliders of the rotations."""
     if not joint_turns.are_set_by_hand(rig, controls):
         return []
     controls.risorius_neck_poses = False
@@ -108,7 +108,7 @@ def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_4(rig: ArmatureObject, _controls: ArmatureObject) -> list[str]:
-    """Materials read animated maps from a mesh: in Direct mode the bones rest."""
+    """Let materials read animated maps from a mesh, because Direct mode does not pose bones."""
     if not rig.override_library:
         if armatures.joints_are_shown(rig):
             rig[parts.JOINTS_SHOWN] = True

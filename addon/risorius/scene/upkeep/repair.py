@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Repair of renamed and deleted parts if this is safe, otherwise a sentence.
+"""Repairs renamed and deleted parts of a character, or describes the ones that cannot be repaired.
 
 Objects, meshes, materials, collections, actions and joints' bones may have any name. Actions, pose
 assets and scripts depend on the names of control bones and sliders, so these are restored.
@@ -21,7 +21,7 @@ def heal(rig: ArmatureObject) -> list[str]:
     """Restore the names of control bones and sliders of a character.
 
     Args:
-        rig: its deforming armature, of this file.
+        rig: its deforming armature, which is not linked.
 
     Returns:
         Sentences about repairs.
@@ -51,7 +51,7 @@ def heal_all() -> list[ArmatureObject]:
 
 
 def _bone_names(controls: ArmatureObject) -> list[str]:
-    """Rename control bones back; their curves follow, as at any rename."""
+    """Restore the names of renamed control bones; Blender updates the paths of their curves."""
     bones = controls.data.bones
     if controls.data.library is not None or controls.mode == "EDIT":
         return []
@@ -65,11 +65,11 @@ def _bone_names(controls: ArmatureObject) -> list[str]:
 
 
 def _sliders(rig: ArmatureObject) -> list[str]:
-    """Create missing sliders again, and sliders of another type as floats."""
+    """Create missing sliders again, and convert sliders of another type to floats."""
     face, live = parts.face_bone(rig), runtime.of(rig)
     if face is None or live is None:
         return []
-    there = dict(face.items())  # one by one they take four times as long
+    there = dict(face.items())  # reading properties one by one takes four times as long
     wrong = [i for i, label in enumerate(live.labels) if not isinstance(there.get(label), float)]
     if not wrong:
         return []
@@ -88,7 +88,7 @@ def _sliders(rig: ArmatureObject) -> list[str]:
 
 
 def missing(item: bpy.types.Object | None) -> list[str]:
-    """The lost parts of an object's character.
+    """Describe the lost parts of an object's character.
 
     Args:
         item: any object, or None.
@@ -133,7 +133,7 @@ def missing(item: bpy.types.Object | None) -> list[str]:
 
 
 def _rig_of_ruin(item: bpy.types.Object | None) -> ArmatureObject | None:
-    """The deforming armature, also of a character that has lost its controls."""
+    """The deforming armature of an object's character, also if its controls are lost; or None."""
     if item is None:
         return None
     if item.type == "ARMATURE" and parts.CONTROLS in item:
@@ -193,6 +193,6 @@ def _is_dead(rig: ArmatureObject) -> bool:
     used = bpy.data.user_map(subset=held)
     owners = {u.as_pointer(): u for users in used.values() for u in users}
     strangers = [u for p, u in owners.items() if p not in ours]
-    # Scenes: not by a collection, which was looked at above.
+    # Scenes do not count, because parts in collections were excluded above.
     lesser = (bpy.types.Material, bpy.types.Key, bpy.types.Scene)
     return all(isinstance(u, lesser) for u in strangers)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences, the list of a face's contents, and the timing overlay."""
+"""The preferences, the contents of a face, the self-test and the timing overlay."""
 
 from . import operators, preferences
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's Online Manual of our buttons: a page of the documentation's site for each operator."""
+"""Links the add-on's operators to their pages in the documentation, for Blender's Online Manual."""
 
 import bpy
 
@@ -9,7 +9,7 @@ _FOLDER = "reference/blender/"
 
 
 def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """As `bpy.utils.register_manual_map` takes it: the site, and (pattern, page) of ours."""
+    """The site's address and (pattern, page) pairs for `bpy.utils.register_manual_map`."""
     rows = []
     for name in sorted(dir(bpy.ops.risorius)):  # pyright: ignore  made by registration
         page = f"{_FOLDER}risorius.{name}.html"
@@ -19,7 +19,7 @@ def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
 
 
 def register() -> None:
-    """Let Blender ask us, where this package was made with the address of a site."""
+    """Register the pages, if the package was built with the address of a site."""
     if native.website():
         bpy.utils.register_manual_map(pages)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a face's contents, and the self-test."""
+"""Operators that list a face's contents and run the self-test."""
 
 import bpy
 import numpy as np
@@ -15,10 +15,10 @@ from ..common import FaceOperator, face_rig, usable
 
 
 def describe(rig: ArmatureObject) -> list[str]:
-    """The contents of a face, a line for each mesh, with shapes that move nothing.
+    """The contents of a face as text: counts, a line for each mesh, and shapes without effect.
 
     Args:
-        rig: its deforming armature.
+        rig: deforming armature of the face.
 
     Returns:
         Lines of text.
@@ -82,7 +82,7 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
 
 
 def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
-    """The checks of the wheel, their environment, and the report as text.
+    """Run the self-test of the wheel. Returns (name, passed, details) of each check, and a report.
 
     Raises:
         UnusableError: the native module is missing or of another version.

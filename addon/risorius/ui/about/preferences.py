@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """The preferences of the add-on, with a self-test."""
 
@@ -18,10 +18,10 @@ from ..speech.install import draw_preferences
 
 
 def self_test() -> tuple[bool, str]:
-    """One line on whether the native module works: it evaluates a rig of two numbers.
+    """Test the native module with a rig of one joint.
 
     Returns:
-        Whether it does, and the sentence.
+        Whether the module works, and a sentence about the result.
     """
     trouble = native.problem()
     if trouble:
@@ -81,7 +81,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
 
 class RISORIUS_Idle(AddonPreferences):
-    """The preferences of a copy that is idle because another copy is in use."""
+    """The preferences of a copy of the add-on that does nothing because another copy is active."""
 
     bl_idname = native.ADDON
 
@@ -90,10 +90,10 @@ class RISORIUS_Idle(AddonPreferences):
 
 
 def twice(other: str) -> str:
-    """The sentence about another copy in use.
+    """The sentence for the preferences if another copy of the add-on is active.
 
     Args:
-        other: its module, bl_ext.REPOSITORY.risorius.
+        other: module name of the other copy, bl_ext.REPOSITORY.risorius.
     """
     return words.say(
         "Another copy of Risorius is in use, of the repository {name}; this one does nothing. "

@@ -16,7 +16,7 @@ _handles: list[object] = session.keep("timing_overlay.handles", list, ("unregist
 
 
 def show_property() -> object:
-    """The switch, on the window manager: no part of the file."""
+    """The property that switches the overlay; it belongs to the window manager and is not saved."""
     return bpy.props.BoolProperty(
         name="Show Timing",
         translation_context=words.CONTEXT,
@@ -39,7 +39,7 @@ def _switched(manager: bpy.types.WindowManager, context: bpy.types.Context) -> N
 
 
 def stop() -> None:
-    """Take the overlay away."""
+    """Remove the overlay."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animation that comes in from files and from other rigs."""
+"""Import of animation from files, moving meshes and other rigs."""
 
 from . import mesh_operators, operators, panel, rest_operators
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Control curves from a mesh that moves: shape keys, an Alembic cache, another rig."""
+"""Solves control curves from a moving mesh: shape keys, an Alembic cache or another rig."""
 
 import bpy
 import numpy as np
@@ -117,7 +117,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         return words.say("Solving was cancelled; nothing was changed.")
 
     def finish(self, context: Context) -> Result:
-        """Put the curves onto the face. It may have gone while the thread worked."""
+        """Place the solved curves on the face, unless the face was deleted or is not active."""
         task = self._task
         try:
             solved = task.result

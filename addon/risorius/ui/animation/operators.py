@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bring animation in from files and from other rigs."""
+"""Operators that import animation from files and from other rigs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -227,7 +227,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _read(
         self, context: Context, live: runtime.Runtime
     ) -> tuple["native.Clip", list[str], str]:
-        """The file as a clip of raw controls, lines on its curves, and the mapping used or ""."""
+        """Read the file as a clip of raw controls; also report lines and the mapping's name."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
@@ -251,14 +251,14 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         return clip, lines_of(report), report.mapping
 
     def _keep_unknown(self, controls: ArmatureObject, mapping: str, names: Sequence[str]) -> None:
-        """Offer curves that the mapping does not know to be named."""
+        """Store the curves that the mapping does not know, so that the user can map them."""
         settings = {key: getattr(self, key) for key in self.properties.keys()}  # noqa: SIM118
         plain = {k: v for k, v in settings.items() if isinstance(v, (str, int, float))}
         found = unknown_curves.Unknown(mapping, {**plain, "filepath": self.filepath}, list(names))
         unknown_curves.keep(controls, found)
 
     def _note_unknown(self, context: Context, error: Exception) -> None:
-        """Note all curves of a file that no mapping knows."""
+        """Store the names of all curves of a file for which no mapping was found."""
         names = getattr(error, "unknown", ())
         if names:
             self._keep_unknown(face_controls(context), "", names)
@@ -266,9 +266,10 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _ranged(
         self, context: Context, clip: "native.Clip", notes: list[str], mapping: str
     ) -> "native.Clip":
-        """Stretched as the user chose; notes get a line on it.
+        """Stretch the clip by the chosen capture range, and add a line about it to the notes.
 
-        A table of raw controls is no capture: it may have been stretched before.
+        A table of raw controls is never stretched by the face's range, because it may have been
+        stretched before.
         """
         module, ranges = native.part("ranges"), None
         is_raw = mapping == "controls"
@@ -283,7 +284,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         return ranges.apply(clip)
 
     def _adjusted(self, clip: "native.Clip") -> "native.Clip":
-        """Calibrated, smoothed and multiplied."""
+        """The clip after calibration to the neutral pose, smoothing and the gains."""
         process = native.part("importing.process")
         if self.use_neutral:
             last = max(self.neutral_first, self.neutral_last)
@@ -323,24 +324,24 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
 
 
 def _is_sound(path: str) -> bool:
-    """Whether a file is one that Speak from Audio takes, by its name or its first bytes."""
+    """Whether Speak from Audio accepts a file, by its extension or its first bytes."""
     if Path(path).suffix.lower() in SOUNDS:
         return True
     try:
         with Path(path).open("rb") as file:
             head = file.read(12)
     except OSError:
-        return False  # said by who reads it
+        return False  # the importer reports the error
     return head[:4] == b"RIFF" and head[8:] == b"WAVE"
 
 
 def _sliders(clip: "native.Clip") -> list[str]:
-    """The names of a clip's curves that are no angles."""
+    """The names of a clip's curves that are not angles of the head or the eyes."""
     return [n for n in clip.names if n.partition(".")[0] not in ("head", "eyeL", "eyeR")]
 
 
 def _gains(text: str) -> dict[str, float]:
-    """`jawOpen=1.2 mouth*=0.8` as a table. Raises: FaceError."""
+    """Parse `jawOpen=1.2 mouth*=0.8` as name -> factor. Raises: FaceError."""
     table = {}
     for word in text.replace(",", " ").split():
         name, _, value = word.rpartition("=")
@@ -354,7 +355,7 @@ def _gains(text: str) -> dict[str, float]:
 
 
 def lines_of(report: "native.Report") -> list[str]:
-    """The sentences of a report of risorius.importing, one in each line."""
+    """The sentences of an import report, without its list of absent controls."""
     lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
     lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]

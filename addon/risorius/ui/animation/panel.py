@@ -27,7 +27,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         column.operator("risorius.learn_range", icon="DRIVER_DISTANCE")
         row = column.row(align=True)
         row.operator("risorius.speak", icon="SPEAKER")
-        if speech_task.lacks_recogniser():  # a click on Speak says it in words
+        if speech_task.lacks_recogniser():  # a click on Speak shows the reason
             row.operator("risorius.install_speech", text="", icon="ERROR")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
         data = face_controls(context).animation_data

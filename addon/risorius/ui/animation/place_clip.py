@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Putting a clip onto the active face, and its report."""
+"""Places a clip on the active face as an action, strip or layer, and stores its report."""
 
 from collections.abc import Sequence
 
@@ -29,12 +29,12 @@ RANGES = (
     ("FIT", "Fit", "Fit the scene to the animation"),
     ("KEEP", "Keep", "Keep the range of the scene"),
 )
-_REPORT = "risorius_report"  # on an action: words on what became of the file
+_REPORT = "risorius_report"  # property of an action: the report of its import
 _SHOWN = 6
 
 
 class PlacesClip(FaceOperator):
-    """Properties of all operators that end with a clip on the active face."""
+    """Properties and methods of all operators that place a clip on the active face."""
 
     target: bpy.props.EnumProperty(
         name="As", description="How the animation is played", items=TARGETS
@@ -60,7 +60,7 @@ class PlacesClip(FaceOperator):
     )
 
     def start_with(self, scene: bpy.types.Scene) -> None:
-        """Begin where the scene begins, unless it was said where."""
+        """Set the start frame to the start of the scene, unless a caller has set it."""
         if not self.properties.is_property_set("start"):
             self.start = float(scene.frame_start)
 
@@ -74,19 +74,19 @@ class PlacesClip(FaceOperator):
         whole: bool = False,
         tolerance: float = 0.0,
     ) -> bpy.types.Action:
-        """Put a clip onto the active face and report on it.
+        """Place a clip on the active face and store the report.
 
         Args:
-            context: has the face and the scene.
-            clip: risorius.Clip.
-            name: of the action.
-            notes: lines for the report.
-            with_eyes: whether to turn the eye bones too.
-            whole: whether keys lie on whole frames only.
-            tolerance: see clip_actions.make_action; 0: all keys.
+            context: context with the face and the scene.
+            clip: the clip.
+            name: name of the action.
+            notes: first lines of the report.
+            with_eyes: True: the eye bones rotate too.
+            whole: True: keys are on whole frames only.
+            tolerance: see clip_actions.make_action; 0 keeps all keys.
 
         Returns:
-            Its action.
+            The new action.
 
         Raises:
             ClipError: the NLA is being edited, or no curve of the clip fits this face.
@@ -111,7 +111,7 @@ class PlacesClip(FaceOperator):
             clip_actions.add_strip(rig, made.action)
         else:
             layers.add_action(face_controls(context), made.action, **self.layer_settings(context))
-        if self.target != "LAYER":  # a layer lies above the pose, and leaves what it does not move
+        if self.target != "LAYER":  # a layer leaves controls that it does not animate unchanged
             notes += self._others(rig)
         clip_actions.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
@@ -119,7 +119,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Set controls to rest that the animation does not move, or report that they stay."""
+        """Set controls to rest that the animation leaves unchanged, or report their number."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:
@@ -131,7 +131,7 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Properties of the layer that a clip becomes. Args: context  has the frame rate."""
+        """Settings of the layer that the clip becomes. Args: context  has the frame rate."""
         return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:
@@ -148,12 +148,12 @@ class PlacesClip(FaceOperator):
         self.report({"INFO"}, say(made.summary()))
 
     def draw_place(self, layout: UILayout) -> None:
-        """The properties of this class."""
+        """Draw the properties of this class in a dialog."""
         for name in ("target", "start", "scene_range", "use_rest"):
             layout.prop(self, name)
 
 
 def report_of(action: bpy.types.Action | None) -> list[str]:
-    """The lines of the report of an imported action."""
+    """The lines of the import report of an action; empty without a report."""
     text = saved.text(action, _REPORT) if action is not None else ""
     return text.split("\n") if text else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that sets controls to rest that an imported animation does not move."""
+"""The operator that sets all controls to rest that no animation moves."""
 
 from collections.abc import Collection
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions: its landmarks, a rig on it, a face that takes its form."""
+"""Interface for heads without expressions: landmarks, Make Rig from Head, Conform Face to Head."""
 
 from . import landmark_operators, operators, panel
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Landmarks of a head: found, placed by hand, kept as a file, taken away."""
+"""Operators that find, place, show, save, load and remove the landmarks of a head."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from ..common import explain, proposed_file, system_path, usable
 
 
 class OfHead(OperatorBase):
-    """What operators on a head without expressions share."""
+    """Base of the operators on a head without expressions."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether a head is selected; says why not."""
+        """Whether a head is selected; sets the poll message if not."""
         if not usable(cls):
             return False
         if heads.head_of(context) is None:
@@ -47,12 +47,12 @@ class OfHead(OperatorBase):
 
 
 def head_there(context: Context) -> MeshObject:
-    """The head, after poll has said that there is one. Args: context  any."""
+    """The selected head; call it only after `poll` returned True."""
     return cast(MeshObject, heads.head_of(context))
 
 
 def listed(missing: list[str]) -> str:
-    """Landmarks by the words that sentences have for them. Args: missing  their names."""
+    """Names of landmarks as a list in words for a sentence, in the user's language."""
     return names.listed([words.say(finding.words()[name]) for name in missing])
 
 
@@ -101,13 +101,13 @@ class RISORIUS_OT_find_landmarks(RunsBeside, OfHead, Operator):
 def show_found(
     operator: Operator, context: Context, head: MeshObject, found: finding.Finding
 ) -> None:
-    """Show landmarks on a head, and report what is missing by name.
+    """Show landmarks on a head, and report missing landmarks by name.
 
     Args:
-        operator: reports through it.
+        operator: the operator that reports.
         context: has the scene.
         head: the mesh object.
-        found: of finding.find.
+        found: the landmarks of the head.
     """
     points.show(context, head, found.places)
     hide_lines(context)
@@ -123,10 +123,10 @@ def show_found(
 
 
 def hide_lines(context: Context) -> None:
-    """Let the 3D views of the window draw no lines from landmarks to the origin of their head.
+    """Hide relationship lines, from landmarks to the origin of their head, in the 3D viewports.
 
     Args:
-        context: without a window nothing happens.
+        context: has the window; without a window nothing happens.
     """
     screen = context.window.screen if context.window is not None else None
     for area in screen.areas if screen is not None else ():
@@ -166,7 +166,7 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
-        """Blender calls this with each event of the window."""
+        """Place the landmark at a left click, and stop at Esc or a right click."""
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
@@ -202,7 +202,7 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
 
 
 def _under(context: Context, event: bpy.types.Event, head: MeshObject) -> Vector | None:
-    """Where the head is under the pointer, in its own coordinates; None: nowhere."""
+    """The point of the head under the pointer, in the coordinates of its object, or None."""
     for area in context.screen.areas if context.screen else ():
         if area.type != "VIEW_3D":
             continue
@@ -223,11 +223,11 @@ def _under(context: Context, event: bpy.types.Event, head: MeshObject) -> Vector
 
 
 class _OfLandmarks(OfHead):
-    """What operators on landmarks that are there share."""
+    """Base of the operators that need existing landmarks."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the head has landmarks; says why not."""
+        """Whether the head has landmarks; sets the poll message if not."""
         if not super().poll(context):
             return False
         if not points.of(head_there(context)):
@@ -245,7 +245,7 @@ class RISORIUS_OT_clear_landmarks(_OfLandmarks, Operator):
     def execute(self, context: Context) -> Result:
         head = head_there(context)
         points.remove(head)
-        if context.active_object is None:  # a landmark was
+        if context.active_object is None:  # the active object was a landmark
             context.view_layer.objects.active = head
         return {"FINISHED"}
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""A head without expressions becomes a face, and a face takes the form of a head."""
+"""The operators Make Rig from Head and Conform Face to Head."""
 
 from __future__ import annotations
 
@@ -73,15 +73,15 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self.begin(context, task)
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
-        """The work."""
+        """The task that makes the face."""
         raise NotImplementedError
 
     def _show(self, context: Context) -> Result:
-        """Import what was written."""
+        """Import the face from the file that the task wrote."""
         raise NotImplementedError
 
     def finish(self, context: Context) -> Result:
-        """Show the face that was made."""
+        """Import the face, or report the error of the task."""
         task = self._task
         try:
             if task.result is None:
@@ -92,7 +92,8 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self._show(context)
 
     def _said(self, error: Exception) -> str:
-        """The sentence of an error. Errors of the package name the head or the template."""
+        """The message of an error. File errors get the name of the file; errors of the package
+        already name the head or the template."""
         if isinstance(error, OSError):
             return explain(error.filename or self.filepath, error)
         return words.of_error(error)
@@ -235,12 +236,12 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
 
 def _source(rig: ArmatureObject) -> str:
-    """The file that a face came from, which may be gone; "": none."""
+    """The path of the file that a face was imported from, which may not exist; "" if unknown."""
     return bpy.path.abspath(saved.text(rig, parts.SOURCE))
 
 
 def draw_from_head(self: Menu, _context: Context) -> None:
-    """Entry of the menu Object."""
+    """Draw the entry Make Rig from Head in the Object menu."""
     self.layout.operator(RISORIUS_OT_make_rig_from_head.bl_idname)
 
 

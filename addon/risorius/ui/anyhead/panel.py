@@ -11,8 +11,8 @@ from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FacePanel
 
-_LEAST = 200  # polygons; a cube is no head
-_MOST = 5  # missing landmarks with their buttons; the next follow when these are placed
+_LEAST = 200  # polygons: smaller meshes are not heads
+_MOST = 5  # missing landmarks that are listed with buttons at the same time
 
 
 class RISORIUS_PT_head(FacePanel, Panel):
@@ -50,7 +50,7 @@ class RISORIUS_PT_head(FacePanel, Panel):
 
 
 def _draw_points(layout: UILayout, there: Mapping[str, points.Point]) -> None:
-    """How many there are, and each that is missing with its two buttons."""
+    """Draw the number of landmarks, and the first missing landmarks with buttons to place them."""
     counts = {state: 0 for state in (points.FOUND, points.MOVED, points.PLACED)}
     for point in there.values():
         counts[point.state] += 1

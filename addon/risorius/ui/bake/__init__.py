@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces baked to plain actions, and back to live."""
+"""Baking faces to plain actions, and the return to live evaluation."""
 
 from . import operators, panel
 

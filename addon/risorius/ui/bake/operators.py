@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bake faces to plain actions and bring them back to live."""
+"""Operators that bake faces to plain actions and remove them again."""
 
 import time
 import traceback
@@ -17,7 +17,7 @@ from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, shown_progress
 from .selection import FacesOperator, FrameRange, selected_rigs
 
-_SLICE = 0.05  # seconds of baking between two looks at the keyboard
+_SLICE = 0.05  # seconds of baking between two events
 
 
 class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
@@ -78,7 +78,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         layout.prop(self, "every")
 
     def execute(self, context: Context) -> Result:
-        # Adjusting the last operation calls this again, on the same operator: without a dialog.
+        # The redo panel runs the same operator object again; it must wait for the result.
         interactive, self._interactive = self._interactive, False
         start, end = self.frames(context)
         options = bake_face.BakeOptions(
@@ -101,7 +101,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         return self._run(context, job)
 
     def _run(self, context: Context, job: Generator[float, None, list[str]]) -> Result:
-        """Bake without looking up: from scripts and headless."""
+        """Bake and wait for the end, in scripts and in background mode."""
         with shown_progress(context):
             while not self._step(context, job, seconds=1.0):
                 if bpy.app.background:
@@ -127,7 +127,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         return self._result
 
     def cancel(self, context: Context) -> None:
-        """Blender ends it: its window was closed, or another file is being opened."""
+        """Stop baking; Blender calls this when the window closes or another file is opened."""
         self._job.close()
         self._end(context)
 
@@ -139,7 +139,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     def _step(
         self, context: Context, job: Generator[float, None, list[str]], seconds: float
     ) -> bool:
-        """Bake for a while. Returns whether it is over."""
+        """Bake for a number of seconds. Returns whether baking has ended."""
         end = time.monotonic() + seconds
         self._result: Result = {"FINISHED"}
         try:
@@ -154,7 +154,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
             self.report({"ERROR"}, words.of_error(error))
             self._result = {"CANCELLED"}
             return True
-        except Exception as error:  # noqa: BLE001  an operator that raises would stay for ever
+        except Exception as error:  # noqa: BLE001  a modal operator that raises would never end
             traceback.print_exc()
             self.report(
                 {"ERROR"},

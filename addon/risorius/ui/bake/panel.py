@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Bake and Export, and the sentence of the panel Face about a late face."""
+"""The panel Bake and Export, and warnings about late faces in the panel Face."""
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
@@ -23,7 +23,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         if text:
             words.write(column, text, "ACTION")
             column.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
-        # Each opens a dialog with the settings of the last time.
+        # The buttons open dialogs with the settings of the last use.
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("risorius.bake", icon="ACTION")
         column.operator("risorius.export_animation", icon="EXPORT")
@@ -33,7 +33,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
-    """The sentence of the panel on a late face.
+    """Draw warnings about a face that is evaluated a frame late or that something hinders.
 
     Args:
         layout: layout of the panel.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Which faces and which frames a bake or an export works on."""
+"""The faces and frames for a bake or an export."""
 
 import bpy
 
@@ -22,10 +22,10 @@ RANGES = (
 
 
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
-    """The characters of the selected objects, or the active one, without linked ones.
+    """The characters of the selected objects, or the active character if none is selected.
 
     Args:
-        context: scene and selection.
+        context: context with the scene and the selection.
         every: True: all characters of the scene.
     """
     items = context.scene.objects if every else context.selected_objects
@@ -47,10 +47,10 @@ class FacesOperator(FaceOperator):
     )
 
     def faces(self, context: Context) -> list[ArmatureObject]:
-        """The characters to work on.
+        """The characters that the operator works on.
 
         Raises:
-            BakeError: there are none.
+            BakeError: no face is selected.
         """
         found = selected_rigs(context, self.every)
         if not found:
@@ -68,7 +68,7 @@ class FacesOperator(FaceOperator):
 
 
 class FrameRange(OperatorBase):
-    """The frames, and the level of detail, that an operator works on."""
+    """Properties for the range of frames and the level of detail of an operator."""
 
     range: bpy.props.EnumProperty(name="Range", items=RANGES)
     start: bpy.props.FloatProperty(name="Start", default=1)
@@ -85,7 +85,7 @@ class FrameRange(OperatorBase):
     )
 
     def frames(self, context: Context) -> tuple[float, float]:
-        """(start, end) that were chosen."""
+        """The chosen first and last frame."""
         scene = context.scene
         if self.range == "CUSTOM":
             return self.start, self.end
@@ -94,11 +94,11 @@ class FrameRange(OperatorBase):
         return scene.frame_start, scene.frame_end
 
     def draw_lod(self, layout: UILayout) -> None:
-        """The level, and that the lowest number is none."""
+        """Draw the level of detail; -1 stands for the viewport's level."""
         words.prop_or(layout, self, "lod", -1, "-1: as in the viewport")
 
     def draw_range(self, layout: UILayout) -> None:
-        """The rows of a dialog."""
+        """Draw the frame range in a dialog."""
         layout.prop(self, "range")
         if self.range == "CUSTOM":
             layout.prop(self, "start")

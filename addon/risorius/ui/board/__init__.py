@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face board: added, removed, led by, selected, brought to rest."""
+"""The face board: operators that add, remove, select and reset it, and its panel."""
 
 from . import operators, panel
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators on the face board."""
+"""Operators of the face board."""
 
 from collections.abc import Collection
 
@@ -46,8 +46,10 @@ def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
 
 
 class _Leading(FaceOperator):
-    """Base of operators that may switch between sliders and board; they need a face without an
-    active tweak."""
+    """Base of operators that may switch between sliders and board.
+
+    They need a face without an active tweak.
+    """
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -60,7 +62,7 @@ class _Leading(FaceOperator):
 
 
 class _OwnArmature(_Leading):
-    """Base of operators that make or remove bones of the controls."""
+    """Base of operators that add or remove bones of the control armature."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -76,7 +78,7 @@ class _OwnArmature(_Leading):
 
 
 class _OnBoard(HandOperator):
-    """Base of operators that need a leading face board."""
+    """Base of operators that need a face that its board moves."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -105,7 +107,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
     def description(
         cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
     ) -> str:
-        """The tooltip. Args: context  of the button, properties  as it gives them."""
+        """The tooltip. Args: context  context of the button; properties  the button's settings."""
         tips = {kind: tip for kind, _name, tip in KINDS}
         text = tips.get(getattr(properties, "kind", ""), "")
         return bpy.app.translations.pgettext_tip(text) or text
@@ -135,7 +137,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
-        """Put the other kind of board in the place of one, in its pose and with its keys."""
+        """Replace the existing board by the other kind, and convert pose and keys."""
         done = board_keys.exchange(context, rig, kind)
         lost = board_keys.lost(done.loss)
         if lost is not None:
@@ -143,7 +145,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return len(board.handles_in(rig))
 
     def _lead(self, rig: ArmatureObject) -> None:
-        """Let a new board lead, unless sliders have keys."""
+        """Let a new board move the face, unless the sliders have keys."""
         if board_keys.animates_sliders(rig):
             self.report(
                 {"INFO"},
@@ -156,7 +158,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
 
 def _take_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a new board beside the head, in pose mode."""
+    """Enter pose mode and show the new board beside the head, if the controls are visible."""
     controls = parts.controls_there(rig)
     if not controls.visible_get() or controls.hide_select:
         return
@@ -205,8 +207,7 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
 
 
 def _needs_board(cls: type[Operator], context: Context, missing: str) -> bool:
-    """Whether the face has a board; otherwise the tooltip of the operator says that it is
-    missing."""
+    """Whether the face has a board; if not, `missing` becomes the reason in the tooltip."""
     if _has_board(context):
         return True
     cls.poll_message_set(missing)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Face Board in Options, and the choice between sliders and board in the panel
-Controls."""
+"""The panel Face Board in Options, and the buttons Sliders and Board in the panel Controls."""
 
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import board, runtime
@@ -14,12 +13,12 @@ def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime)
     """Draw the choice between sliders and board, if the face has a board.
 
     Args:
-        layout: of the panel.
+        layout: layout of the panel.
         controls: control armature of the face.
-        live: its Runtime.
+        live: Runtime of the face.
 
     Returns:
-        Whether the board leads.
+        Whether the board moves the face; False without a board.
     """
     if not board.is_there(controls, live):
         return False
@@ -34,7 +33,7 @@ def draw_kinds(layout: UILayout, kind: str | None) -> None:
     """Buttons that add a board or replace it by the other kind.
 
     Args:
-        layout: of the panel or menu.
+        layout: layout of the panel or menu.
         kind: kind of the existing board, or None.
     """
     if kind is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drag the Face: choices, operators, drawing in the 3D view."""
+"""Dragging the skin in the 3D view: tool, operators, settings and drawing."""
 
 from . import handle_operators, operators, panel, properties, tool
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing over the 3D views during a drag: points, pins, moving skin, names.
+"""Draws points, pins, moving skin and slider names over the 3D views during a drag.
 
-The handlers exist only while they are needed; `stop` removes them.
+The draw handlers exist only while an operator uses them; `stop` removes them.
 """
 
 from dataclasses import dataclass, field
@@ -22,29 +22,30 @@ from ..blender_types import Context
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Colour = tuple[float, float, float, float]
-Mark = tuple[Float, Colour, float]  # a place in the world, its colour, its radius in pixels
+Mark = tuple[Float, Colour, float]  # place in world space, colour, radius in pixels
 
-HELD: Colour = (1.0, 0.55, 0.1, 1.0)  # the point that is dragged
-OFFERED: Colour = (1.0, 1.0, 1.0, 0.9)  # the one that a press would take
+HELD: Colour = (1.0, 0.55, 0.1, 1.0)  # the dragged point
+OFFERED: Colour = (1.0, 1.0, 1.0, 0.9)  # the point that a press would drag
 HANDLE: Colour = (1.0, 0.8, 0.3, 0.75)
-SELECTED: Colour = (1.0, 0.4, 0.0, 1.0)  # of handles, as Blender's own selection
+SELECTED: Colour = (1.0, 0.4, 0.0, 1.0)  # selected handles, in the orange of Blender's selection
 PIN: Colour = (0.2, 0.75, 1.0, 1.0)
 _HOT = np.array((1.0, 0.45, 0.05))
-_SHOWN = 0.04  # of the farthest move: what moves less is not coloured
-_MOST = 0.55  # opacity of what moves farthest
-_LIFT = 0.002  # of the distance to the viewer that colours lie above the skin
+_SHOWN = 0.04  # share of the largest motion; vertices that move less are not coloured
+_MOST = 0.55  # opacity of the vertex that moves farthest
+_LIFT = 0.002  # colours are drawn above the skin by this share of the distance to the viewer
 
 
 @dataclass
 class Shown:
-    """The current drawing.
+    """The marks, text and coloured mesh that are drawn.
 
     Attributes:
-        points: places in the world with a colour and a radius in pixels at an interface of 1.
+        points: places in world space, each with a colour and a radius in pixels at interface scale
+            1.
         lines: lines of text beside the first point.
-        places: float64[V, 3] vertices of the coloured mesh, or None.
-        far: float64[V] motion of each vertex.
-        triangles: int32[T, 3] of that mesh.
+        places: float64[V, 3], vertices of the coloured mesh, or None.
+        far: float64[V], distance that each vertex moves.
+        triangles: int32[T, 3], triangles of the coloured mesh.
     """
 
     points: list[Mark] = field(default_factory=list)
@@ -60,7 +61,7 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Draw from now on. Args: user  the operator that asks; `end` with the same name."""
+    """Start drawing for an operator. Args: user  name of the operator, also for `end`."""
     _users.add(user)
     if not _handles:
         view = bpy.types.SpaceView3D
@@ -69,7 +70,7 @@ def start(user: str) -> None:
 
 
 def show(context: Context, shown: Shown) -> None:
-    """Draw points, lines and colours. Args: context with the views to redraw; shown the drawing."""
+    """Set the drawing. Args: context  context with the views to redraw; shown  the new drawing."""
     _shown.now = shown
     tag(context)
 
@@ -83,7 +84,7 @@ def tag(context: Context) -> None:
 
 
 def end(context: Context, user: str) -> None:
-    """Stop drawing for an operator. Args: context with the views to redraw; user see `start`."""
+    """Stop drawing for an operator. Args: context  context with the views; user  as in `start`."""
     _users.discard(user)
     if not _users:
         stop()
@@ -91,31 +92,33 @@ def end(context: Context, user: str) -> None:
 
 
 def stop() -> None:
-    """Take the drawing away."""
+    """Remove the draw handlers."""
     _users.clear()
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
 def is_drawing() -> bool:
-    """Whether there are handlers."""
+    """Whether draw handlers exist."""
     return bool(_handles)
 
 
 def colours_of(far: Float) -> Float32:
-    """float32[V, 4]: the vertex that moves farthest is the most opaque. Args: far float64[V]
-    motion."""
+    """The colours of vertices, float32[V, 4]; the one that moves farthest is the most opaque.
+
+    Args: far  float64[V], distance that each vertex moves.
+    """
     most = float(far.max(initial=0.0))
     share = np.clip(far / most, 0.0, 1.0) if most > 0 else np.zeros(len(far))
     colours = np.empty((len(far), 4), np.float32)
     colours[:, :3] = _HOT
-    colours[:, 1] += 0.4 * (1.0 - share)  # yellow where it is little
+    colours[:, 1] += 0.4 * (1.0 - share)  # yellow for small motion
     colours[:, 3] = _MOST * np.sqrt(share)
     return colours
 
 
 def _view() -> bpy.types.RegionView3D | None:
-    """The view of the region that is drawn."""
+    """The 3D view of the region that is drawn, or None."""
     return cast("bpy.types.RegionView3D | None", cast(Context, bpy.context).region_data)
 
 
@@ -143,11 +146,11 @@ def draw_points(context: Context, marks: list[Mark]) -> Vector | None:
     """Draw points over the current region.
 
     Args:
-        context: of a drawing handler.
+        context: context of the draw handler.
         marks: the points.
 
     Returns:
-        Place of the first visible point in the region.
+        Pixel of the first visible point, or None.
     """
     region, data = context.region, _view()
     if region is None or data is None:
@@ -173,8 +176,10 @@ def _draw_marks() -> None:
 
 
 def _write(lines: list[str], at: Vector, scale: float) -> None:
-    """Draw lines beside a place on a dark background, so that outlines of bones do not disturb
-    them."""
+    """Draw lines of text beside a place.
+
+    The background is dark, so that outlines of bones do not disturb the text.
+    """
     blf.size(0, round(12 * scale))
     wide = max(blf.dimensions(0, text)[0] for text in lines)
     left, top = at.x + 16 * scale, at.y + 24 * scale

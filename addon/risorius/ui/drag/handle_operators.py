@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Points of the skin that are kept: pins, and handles that are selected, hidden and keyed."""
+"""Operators of points on the skin: pins, and handles that are selected, hidden and keyed."""
 
 import bpy
 
@@ -17,7 +17,7 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """Base of operators on one point, given by number or by the cursor."""
+    """Base of operators on one point, which is the vertex of the properties or under the cursor."""
 
     mesh: bpy.props.IntProperty(
         name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
@@ -27,7 +27,7 @@ class _PointOperator(FaceOperator):
     )
 
     def fits(self, hit: picking.Hit) -> bool:
-        """Whether a point under the cursor is one for this operator."""
+        """Whether the operator accepts the point under the cursor."""
         raise NotImplementedError
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -51,7 +51,7 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same click selects a handle, and Blender turns our order of keys round.
+        # The same click selects a handle, and Blender may reverse the order of our key bindings.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:
@@ -87,7 +87,7 @@ class RISORIUS_OT_clear_pins(FaceOperator, Operator):
 
 
 class RISORIUS_OT_select_handle(_PointOperator, Operator):
-    """Select a handle: selected ones are dragged together, keyed and hidden"""
+    """Select this handle. Selected handles are dragged, keyed and hidden together"""
 
     bl_idname = "risorius.select_handle"
     bl_label = "Select Handle"

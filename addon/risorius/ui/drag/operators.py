@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Drag the face itself: one drag, from the press to the release."""
+"""The operator that drags a point of the skin, from the press to the release."""
 
 import bpy
 import numpy as np
@@ -93,7 +93,7 @@ class RISORIUS_OT_drag(Operator):
             hit = pointing.pick(context, where, event) if where else None
             if where is None or hit is None:
                 if event.type == "LEFTMOUSE":
-                    return {"PASS_THROUGH"}  # beside the face a click is what it always is
+                    return {"PASS_THROUGH"}  # a click beside the face keeps its usual meaning
                 self.report({"WARNING"}, say("Point at the skin of a face."))
                 return {"CANCELLED"}
             choices = properties.choices_of(context)
@@ -112,7 +112,7 @@ class RISORIUS_OT_drag(Operator):
             return {"CANCELLED"}
         pointing.activate(context, hit.rig)
         self._where, self._mouse = where, where.mouse(event)
-        self._grip = pixel - self._mouse  # the vertex lies a little beside the cursor
+        self._grip = pixel - self._mouse  # the vertex may be some pixels from the cursor
         self._target, self._triangles = hit.place, _triangles(hit.rig, hit.point[0])
         drawing.start(self.bl_idname)
         context.window_manager.modal_handler_add(self)
@@ -124,7 +124,7 @@ class RISORIUS_OT_drag(Operator):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         try:
             return self._react(context, event)
-        except FaceError as error:  # the face was given back what it was
+        except FaceError as error:  # the pose before the drag is already restored
             self.report({"WARNING"}, of_error(error))
             self._end(context)
             return {"CANCELLED"}
@@ -139,7 +139,7 @@ class RISORIUS_OT_drag(Operator):
             return {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             return self._finish(context)
-        if event.type == "MOUSEMOVE":  # what Blender skipped comes as INBETWEEN_MOUSEMOVE
+        if event.type == "MOUSEMOVE":  # skipped moves are of type INBETWEEN_MOUSEMOVE
             self._mouse = self._where.mouse(event)
         elif event.value == "PRESS" and event.type == "X":
             self.symmetric = not self.symmetric
@@ -163,7 +163,7 @@ class RISORIUS_OT_drag(Operator):
             self._held.restore(context)
             self._end(context)
             self._click(context)
-            return {"CANCELLED"}  # a click is no edit of the pose
+            return {"CANCELLED"}  # a click does not change the pose
         along = self._along()
         self._held.finish(context, self._target, along)
         self.offset, self.view = (self._target - start).tolist(), along.tolist()
@@ -171,11 +171,11 @@ class RISORIUS_OT_drag(Operator):
         return {"FINISHED"}
 
     def _click(self, context: Context) -> None:
-        """A press without motion selects a handle, or the object that Blender finds there."""
+        """Select the handle at a press without motion, or else the object under the cursor."""
         point = {"mesh": self.mesh, "vertex": self.vertex if self._is_handle else -1}
         if self._is_handle or _selected(context, self._held.rig):
             bpy.ops.risorius.select_handle("EXEC_DEFAULT", True, **point)  # pyright: ignore  ours
-        if not self._is_handle and context.mode == "POSE":  # bones may lie before the skin
+        if not self._is_handle and context.mode == "POSE":  # bones may be in front of the skin
             bpy.ops.view3d.select("INVOKE_DEFAULT", True, deselect_all=True)
 
     def _end(self, context: Context) -> None:
@@ -220,7 +220,7 @@ class RISORIUS_OT_drag(Operator):
 
 
 def can_drag(cls: type[Operator]) -> bool:
-    """Poll: whether a face exists; otherwise set the reason. Args: cls the operator."""
+    """Poll: whether the file has a face; otherwise set the reason. Args: cls  the operator."""
     if not usable(cls):
         return False
     if not parts.rigs():
@@ -230,7 +230,7 @@ def can_drag(cls: type[Operator]) -> bool:
 
 
 def _selected(context: Context, rig: ArmatureObject) -> tuple[stroke.Point, ...]:
-    """The selected handles of a face at the level of detail that is seen."""
+    """The selected handles of a face at the level of detail that is visible."""
     live = runtime.of(rig)
     if live is None or parts.controls_of(rig) is None:
         return ()
@@ -238,7 +238,7 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[stroke.Point, ...]
 
 
 def _triangles(rig: ArmatureObject, mesh: int) -> NDArray[np.int32] | None:
-    """int32[T, 3] of a mesh, if it has the topology of the DNA file."""
+    """The triangles of a mesh, int32[T, 3], or None if its topology differs from the DNA file."""
     item = next((i for i in parts.meshes_of(rig) if i[parts.MESH] == mesh), None)
     live = runtime.of(rig)
     if item is None or live is None or len(item.data.vertices) != pointing.counts_of(live)[mesh]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a drag, behind the arrow beside its button."""
+"""The button that activates the drag tool, and its options."""
 
 from ...scene.base import parts
 from ...scene.character import runtime
@@ -11,7 +11,7 @@ from . import pointing, properties, tool
 
 
 def draw_button(layout: UILayout, context: Context) -> None:
-    """The button that begins to drag, with its choices. Args: layout, context  of a panel."""
+    """Draw the button of the drag tool and its options. Args: layout, context  of the panel."""
     row = layout.row(align=True)
     row.operator("risorius.drag_tool", icon="VIEW_PAN", depress=tool.is_active(context))
     row.popover(panel="RISORIUS_PT_drag", text="", icon="DOWNARROW_HLT")

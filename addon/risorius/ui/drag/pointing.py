@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The point that a press at the cursor takes, and the drawn handles and pins."""
+"""Finds the point that a press at the cursor drags, and the handles and pins to draw."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from ...scene.drag.skin import Skin
 from ..blender_types import Context
 from . import drawing, properties, view
 
-_NEAR = 9  # pixels, at an interface of 1, within which a press takes a handle
+_NEAR = 9  # distance from a handle in pixels, at interface scale 1, within which a press drags it
 
 
 def counts_of(live: runtime.Runtime) -> list[int]:
-    """The vertices of each mesh of a face's DNA. Args: live  its Runtime."""
+    """The number of vertices of each mesh in a face's DNA. Args: live  Runtime of the face."""
     return [len(mesh.positions) for mesh in live.dna.meshes]
 
 
 def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.Hit | None:
-    """The point that a press takes: the nearest handle, or the skin under the cursor.
+    """Find the point that a press would drag: the nearest handle, or the skin under the cursor.
 
     Args:
-        context: has the visible scene.
+        context: context with the visible scene.
         where: the view under the cursor.
-        event: has the cursor.
+        event: event with the place of the cursor.
 
     Raises:
         FaceError: the face is linked, or has lost its DNA.
@@ -49,7 +49,7 @@ def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.
 
 
 def pins_of(context: Context, rig: ArmatureObject, live: runtime.Runtime) -> list[drawing.Mark]:
-    """The pins of a face as they are drawn. Args: context, rig, live  the face that is seen."""
+    """The pins of a face as marks. Args: context, rig, live  of the face."""
     if parts.controls_of(rig) is None:
         return []
     points = kept_points.of(rig, kept_points.PINS, counts_of(live))
@@ -58,7 +58,10 @@ def pins_of(context: Context, rig: ArmatureObject, live: runtime.Runtime) -> lis
 
 
 def marks_of(context: Context, rig: ArmatureObject) -> list[drawing.Mark]:
-    """Handles and pins of a face as they are drawn. Args: context, rig  the face that is seen."""
+    """The handles and pins of a face as marks.
+
+    Args: context, rig  context and armature of the face.
+    """
     live = runtime.of(rig)
     if live is None or parts.controls_of(rig) is None or parts.BAKED in rig:
         return []
@@ -72,16 +75,16 @@ def marks_of(context: Context, rig: ArmatureObject) -> list[drawing.Mark]:
 
 
 def skin_of(context: Context, rig: ArmatureObject) -> Skin:
-    """The skin of a face at the level that is seen. Args: context, rig  of the face."""
+    """The skin of a face at the visible level of detail. Args: context, rig  of the face."""
     return Skin.of(context, rig, runtime.there(rig))
 
 
 def activate(context: Context, rig: ArmatureObject) -> None:
-    """Make a face the active one, so that panels, pins and repeats mean it.
+    """Make a face the active one, so that panels and repeated operators act on it.
 
     Args:
-        context: has the view layer.
-        rig: the character.
+        context: context with the view layer.
+        rig: deforming armature of the face.
     """
     if parts.active_rig(context) != rig:
         context.view_layer.objects.active = parts.controls_there(rig)

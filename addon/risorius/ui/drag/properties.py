@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""How a face is dragged: choices of the window, no part of the file."""
+"""Settings of the drag tool; they belong to the window manager and are not saved."""
 
 from typing import cast
 
@@ -32,7 +32,7 @@ METHODS = (
 
 
 def symmetric_property() -> object:
-    """Of the choices and of each drag, as the two below."""
+    """The property Symmetric, for the settings and for each drag operator."""
     return bpy.props.BoolProperty(
         name="Symmetric",
         description="Mirror the drag on the other side of the face",
@@ -78,7 +78,7 @@ class RISORIUS_PG_drag(bpy.types.PropertyGroup):
 
 
 def choices_of(context: Context) -> RISORIUS_PG_drag:
-    """The choices of this window manager."""
+    """The drag settings of the window manager."""
     return cast(RISORIUS_PG_drag, context.window_manager.risorius_drag)  # type: ignore[attr-defined]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool of the 3D view's toolbar: while it is active, each press on the skin is a drag.
+"""The drag tool of the 3D view's toolbar: while it is active, a press on the skin starts a drag.
 
-All other actions of Blender stay the same. While the tool is active, handles and pins of the active
-face are drawn, and the point under the pointer.
+All other keys of Blender stay the same. While the tool is active, handles and pins of the active
+face are drawn, and the point under the cursor.
 """
 
 from typing import cast
@@ -21,7 +21,7 @@ from .operators import can_drag
 
 IDNAME = "risorius.drag"
 _MODES = ("OBJECT", "POSE")
-_USUAL = "builtin.select_box"  # what is taken up again where nobody knows what was before
+_USUAL = "builtin.select_box"  # activated if the earlier tool is unknown
 _KEYS = (
     ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
     ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
@@ -42,9 +42,9 @@ _KEYS = (
     ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
 )
 
-# Workspace and mode -> the tool that this one took the place of.
+# "workspace and mode" -> the tool that was active before this one.
 _before: dict[str, str] = session.table("tool.before", ("unregister",))
-# Session uid of a face, its point at the pointer.
+# Session uid of a face, and its (mesh, vertex) under the cursor; at most one entry.
 _pointed: list[tuple[int, tuple[int, int]]] = session.keep("tool.pointed", list, ("load",))
 _handles: list[object] = session.keep("tool.handles", list, ("unregister",))
 
@@ -120,7 +120,7 @@ class RISORIUS_OT_drag_hover(Operator):
         try:
             hit = pointing.pick(context, where, event) if where else None
         except FaceError:
-            hit = None  # a press says why
+            hit = None  # the press reports the reason
         found = [(hit.rig.session_uid, hit.point)] if hit is not None else []
         if found or _pointed:
             _pointed[:] = found
@@ -129,19 +129,19 @@ class RISORIUS_OT_drag_hover(Operator):
 
 
 def is_active(context: Context) -> bool:
-    """Whether the tool is in the hand. Args: context  has the workspace and the mode."""
+    """Whether the drag tool is active. Args: context  context with the workspace and the mode."""
     return context.mode in _MODES and _active(context) == IDNAME
 
 
 def _active(context: Context) -> str:
-    """The name of the active tool of 3D views in the current mode; empty for none."""
+    """The name of the active tool of 3D views in the current mode; "" if there is none."""
     tools = context.workspace.tools
     tool = tools.from_space_view3d_mode(context.mode, create=False)  # pyright: ignore  the stub's
     return tool.idname if tool is not None else ""
 
 
 def _draw() -> None:
-    """Draw over each 3D view while the tool is active and nothing is dragged."""
+    """Draw points over each 3D view while the tool is active and no drag runs."""
     context = cast(Context, bpy.context)
     space = context.space_data
     if drawing.is_drawing() or not is_active(context):
@@ -162,16 +162,16 @@ def _draw() -> None:
 
 
 def register() -> None:
-    """Put the tool into the toolbars of both modes."""
+    """Add the tool to the toolbars of object mode and pose mode."""
     for cls in (DragInObjectMode, DragInPoseMode):
-        bpy.utils.register_tool(cls, separator=True)  # at the end: "after" miscounts in 4.3 and 4.5
+        bpy.utils.register_tool(cls, separator=True)  # "after" fails in 4.3 and 4.5
     if not _handles:
         draw_over = bpy.types.SpaceView3D.draw_handler_add
         _handles.append(draw_over(_draw, (), "WINDOW", "POST_PIXEL"))
 
 
 def unregister() -> None:
-    """Remove the tool and stop drawing."""
+    """Remove the tool from the toolbars and stop drawing."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
     for cls in (DragInPoseMode, DragInObjectMode):

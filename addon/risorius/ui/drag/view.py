@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D view under the cursor: rays through it, targets on the screen; every kind of view."""
+"""The 3D view under the cursor, which converts between pixels and places in the world."""
 
 from dataclasses import dataclass
 
@@ -16,49 +16,49 @@ Float = NDArray[np.float64]
 
 @dataclass
 class View:
-    """A region of a 3D view; of a quad view one of four. Lives within one operator."""
+    """A region of a 3D view or of a quad view; valid within one operator."""
 
     area: bpy.types.Area
     region: bpy.types.Region
     data: bpy.types.RegionView3D
 
     def mouse(self, event: bpy.types.Event) -> Vector:
-        """Where the cursor is: pixels from the region's lower left corner."""
+        """The place of the cursor: pixels from the region's lower left corner."""
         return Vector((event.mouse_x - self.region.x, event.mouse_y - self.region.y))
 
     def ray(self, at: Vector) -> tuple[Vector, Vector]:
-        """Origin and direction, of length 1, of the ray through a pixel. Args: at  the pixel."""
+        """Origin and unit direction of the ray through a pixel. Args: at  the pixel."""
         pixel = (at.x, at.y)
         direction = view3d_utils.region_2d_to_vector_3d(self.region, self.data, pixel)
         return view3d_utils.region_2d_to_origin_3d(self.region, self.data, pixel), direction
 
     def pixel(self, place: Float) -> Vector | None:
-        """The pixel of a place in the world, or None behind the viewer. Args: place float64[3]"""
+        """The pixel of a place, or None behind the viewer. Args: place  float64[3] in the world."""
         return view3d_utils.location_3d_to_region_2d(self.region, self.data, Vector(place.tolist()))
 
     def target(self, at: Vector, depth: Float) -> Float:
-        """The place of the world under a pixel: float64[3].
+        """The place in world space under a pixel, float64[3].
 
         Args:
             at: the pixel.
-            depth: float64[3] a place that is as far away.
+            depth: float64[3], a place with the wanted distance from the viewer.
         """
         near = Vector(depth.tolist())
         return np.array(view3d_utils.region_2d_to_location_3d(self.region, self.data, at, near))
 
 
 def under(context: Context, event: bpy.types.Event) -> View | None:
-    """The view that the cursor is in; None over panels, headers, other editors.
+    """The view under the cursor; None over panels, headers and other editors.
 
     Args:
-        context: has the screen.
-        event: has the cursor.
+        context: context with the screen.
+        event: event with the place of the cursor.
     """
     for area in context.screen.areas if context.screen is not None else ():
         if area.type != "VIEW_3D":
             continue
         held = [r for r in area.regions if _is_in(r, event)]
-        # Sidebars lie over the view.
+        # Sidebars overlap the view.
         if held and all(r.type == "WINDOW" for r in held):
             data = held[0].data
             if isinstance(data, bpy.types.RegionView3D):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animation that leaves Blender: through its own exporters, as a clip or as a table."""
+"""Export of animation with Blender's exporters, as a clip or as a table, and of faces."""
 
 from . import game_face, operators, web
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own exporters: the settings that each is called with."""
+"""Calls Blender's exporters with suitable settings for each format."""
 
 import os
 from contextlib import nullcontext
@@ -31,11 +31,11 @@ _OPERATORS = {
 }
 
 
-Settings = dict[str, object]  # of one of Blender's exporters
+Settings = dict[str, object]  # settings of one of Blender's exporters
 
 
 class ExportOperator(Protocol):
-    """Properties of the operator that exporter settings depend on."""
+    """The properties of the export operator that the settings depend on."""
 
     format: str
     step: float
@@ -50,14 +50,14 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
         "use_active_scene": True,
         "export_animations": True,
         "export_animation_mode": "ACTIVE_ACTIONS",
-        # Otherwise a single armature gets every action of the file with bones of these names.
+        # If True, every action of the file with matching bone names would be exported.
         "export_anim_single_armature": False,
         "export_nla_strips_merged_animation_name": stage.objects[0].name,
         "export_frame_range": True,
         "export_frame_step": whole_step(operator),
         "export_force_sampling": True,
         "export_optimize_animation_size": False,
-        # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+        # If True, Blender 4.5 exports wrong bones for two armatures.
         "export_optimize_disable_viewport": False,
         "export_skins": True,
         "export_all_influences": operator.influences == 0,
@@ -71,8 +71,8 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
 
 def _fbx(operator: ExportOperator, _stage: bpy.types.Scene) -> Settings:
     return {
-        "object_types": {"ARMATURE", "MESH", "EMPTY"},  # an empty is a LOD group
-        "use_custom_props": operator.lod_groups,  # which say that it is one
+        "object_types": {"ARMATURE", "MESH", "EMPTY"},  # an empty represents a LOD group
+        "use_custom_props": operator.lod_groups,  # these properties mark an empty as a LOD group
         "add_leaf_bones": False,
         "use_armature_deform_only": False,
         "bake_anim": True,
@@ -85,7 +85,7 @@ def _fbx(operator: ExportOperator, _stage: bpy.types.Scene) -> Settings:
         "apply_scale_options": operator.fbx_units,
         "path_mode": "COPY",
         "embed_textures": True,
-        # With a modifier applied Blender drops the shape keys.
+        # Blender drops the shape keys if modifiers are applied.
         "use_mesh_modifiers": False,
         "mesh_smooth_type": "FACE",
     }
@@ -117,17 +117,17 @@ def _alembic(_operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     }
 
 
-# Settings of Blender's exporter of each format; settings unknown to a version are left out.
+# Functions that return the exporter's settings for a format; unknown settings are left out.
 _SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
 
 
 def whole_step(operator: ExportOperator) -> int:
-    """Exporters step by whole frames."""
+    """The step in whole frames, at least 1, because exporters accept no fractions."""
     return max(1, round(operator.step))
 
 
 def missing(kind: str) -> str:
-    """Why this Blender cannot write a format, in one sentence; empty when it can."""
+    """The reason why this Blender cannot write a format, in one sentence; "" if it can."""
     if kind not in _OPERATORS:
         return ""
     group, name = _OPERATORS[kind]
@@ -141,12 +141,12 @@ def missing(kind: str) -> str:
 
 
 def export(operator: ExportOperator, override: Override, path: Path) -> None:
-    """Let Blender's own exporter of a format write a file.
+    """Write a file with Blender's exporter for the format.
 
     Args:
-        operator: with the format and settings of the user.
-        override: the context for the exporter, from export_animation.copies.
-        path: of the file, in a folder for this export only.
+        operator: export operator with the format and settings of the user.
+        override: context for the exporter, from export_animation.copies.
+        path: file to write, in a folder that is used for this export only.
 
     Raises:
         FaceError: the exporter reports an error, wrote nothing, or wrote a part of the file.
@@ -159,8 +159,8 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
     with named, bpy.context.temp_override(**override), quiet():
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
-        except RuntimeError as error:  # what Blender's exporter says of the file or the scene
-            said = str(error).replace(f"{path.parent}{os.sep}", "")  # hidden, and gone by then
+        except RuntimeError as error:  # an error message of Blender's exporter
+            said = str(error).replace(f"{path.parent}{os.sep}", "")  # a temporary folder
             raise FaceError(said.strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
         raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))

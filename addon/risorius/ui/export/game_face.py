@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Export of a face with morph targets that other programs drive by name."""
+"""Exports a face as glTF or VRM, with morph targets that other programs drive by name."""
 
 from pathlib import Path
 
@@ -92,7 +92,7 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
 
     @property
     def filename_ext(self) -> str:
-        """Blender puts it behind the name of the file."""
+        """The extension that Blender appends to the file's name."""
         return ".glb" if self.vrm == "NONE" else ".vrm"
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:

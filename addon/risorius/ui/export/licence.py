@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The licence of a VRM, as a form in which nothing is said before somebody says it."""
+"""The form for the licence of a VRM; all of its fields are unset at first."""
 
 from collections.abc import Iterator
 
@@ -20,7 +20,7 @@ def _allowed(name: str) -> object:
 
 
 class LicenceForm:
-    """The fields of a VRM's licence, for the operator that writes one."""
+    """The fields of a VRM's licence, as properties of the export operator."""
 
     vrm: bpy.props.EnumProperty(
         name="VRM",
@@ -70,12 +70,12 @@ class LicenceForm:
     )  # fmt: skip
 
     def draw_licence(self, layout: bpy.types.UILayout) -> None:
-        """Draw the fields that the chosen version asks for. Args: layout: of the dialog."""
+        """Draw the fields of the chosen VRM version. Args: layout  layout of the dialog."""
         for name, _ in self._fields():
             layout.prop(self, name)
 
     def licence(self) -> dict[str, str | bool | list[str]]:
-        """Field as VRM spells it -> what was said; fields that nobody filled are left out."""
+        """VRM's name of a field -> value; fields that the user left unset are missing."""
         out: dict[str, str | bool | list[str]] = {}
         for name, field in self._fields():
             value = getattr(self, name)

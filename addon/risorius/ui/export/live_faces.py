@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live faces in Blender's own exports, which step through no frame as the face does."""
+"""Warns if Blender's own exporters would write live faces at rest."""
 
 from collections.abc import Mapping
 
@@ -12,10 +12,10 @@ from ..words import say
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """Warn about live faces in Blender's own glTF export; the exporter calls this before writing.
+    """Warn about live faces in Blender's glTF export; the exporter calls this before writing.
 
     Args:
-        settings: settings of the exporter; its log and the choice of objects are used.
+        settings: settings of the exporter, with its log and the choice of objects.
     """
     warning = getattr(settings.get("log"), "warning", None)
     found = live_faces(bool(settings.get("gltf_active_scene")), bool(settings.get("gltf_selected")))
@@ -32,11 +32,11 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def live_faces(active_scene: bool, selected: bool) -> list[str]:
-    """The names of unbaked faces, which an export would show at rest.
+    """The names of faces that are not baked, which an export would write at rest.
 
     Args:
-        active_scene: only the scene of the context is exported.
-        selected: only selected objects of it.
+        active_scene: True: only the scene of the context is exported.
+        selected: True: only the selected objects are exported.
     """
     here = current_context()
     scenes = [here.scene] if active_scene else bpy.data.scenes

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Export of a face's animation through Blender's own exporters, and of its controls."""
+"""Exports the animation of faces with Blender's exporters, or of their controls."""
 
 from collections.abc import Generator
 from pathlib import Path
@@ -114,11 +114,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         return ExportHelper.invoke(self, context, event)
 
     def check(self, context: Context) -> bool:
-        """Give the file the ending of its format while the dialog is open."""
+        """Set the extension of the format while the dialog is open."""
         if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
             return False
         path = Path(self.filepath)
-        # A dot may be part of a name: shot.v02.
+        # The name may contain a dot, such as shot.v02.
         stem = path.stem if path.suffix.lower() in _KNOWN else path.name
         changed = str(path.with_name(stem + _ENDINGS[self.format])) if stem else self.filepath
         if Path(self.filepath).name in ("", ".") or changed == self.filepath:
@@ -192,7 +192,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             with export_animation.copies(context, characters, options) as (override, loans):
                 if self.bake_materials:
                     run(context, plain_materials.flatten(override, loans, self.texture_size))
-                # Blender's exporters write over an old file from its first byte on.
+                # Blender's exporters overwrite an existing file from its start, so a failure would
+                # damage it.
                 with native.part("files.fileio").staging(path) as made:
                     export(self, override, made)
                     if self.bake_materials and self.format == "ALEMBIC":
@@ -202,11 +203,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
 
 
 def run(context: Context, job: Generator[float, None, _T]) -> _T:
-    """Run a generator to its end, with progress.
+    """Run a generator to its end and show its progress.
 
     Args:
-        context: with the window for the progress.
-        job: yields the finished share, 0 to 1.
+        context: context with the window for the progress.
+        job: generator that yields the finished share, 0 to 1.
 
     Returns:
         The return value of the generator.
@@ -225,7 +226,7 @@ def _write_csv(clip: "native.Clip", path: Path) -> None:
 
 
 def _one_sentence(path: str, error: Exception) -> str:
-    """The sentence of an error; of an exporter's traceback only the last line."""
+    """The sentence of an error; for a traceback of an exporter, its last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
     text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions: on the sliders, in a grid of pictures, as pose assets, in menus."""
+"""Expressions: the grid of pictures, the library, pose assets and menus."""
 
 from . import library_operators, menus, operators, panel, properties, shelf
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators on the library of expressions: save, change, star, take along, and their pictures."""
+"""Operators that save, change, export and import the user's expressions and draw their pictures."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,11 +24,11 @@ from ..words import of_error, say
 from . import previews
 from .properties import choices, region_items
 
-_AT_ONCE = 3  # pictures after which the sidebar is drawn again
+_AT_ONCE = 3  # number of new pictures after which the sidebar is redrawn
 
 
 def redraw(context: Context) -> None:
-    """Show new pictures by redrawing the sidebars of all windows."""
+    """Redraw the sidebars of all windows, so that they show new pictures."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions if area.type == "VIEW_3D" else ():
@@ -86,7 +86,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
     @staticmethod
     def _give_pictures(context: Context) -> None:
-        """Pose assets of this face show the new pictures too."""
+        """Set the new pictures as previews of this face's pose assets."""
         rig = face_rig(context)
         for action in bpy.data.actions:
             expression = library.of_action(action)
@@ -95,7 +95,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
     def shown(self, share: int) -> str:
         done = round(share * self._count / 100)
-        if done >= self._redrawn + _AT_ONCE:  # drawing costs the time that pictures need
+        if done >= self._redrawn + _AT_ONCE:  # redrawing takes time from the drawing of pictures
             self._redrawn = done
             redraw(current_context())
         return say(
@@ -116,7 +116,7 @@ class _LibraryOperator(FaceOperator):
         try:
             self.work(context)
         except library.TakenError:
-            raise  # an operator that can be told to replace asks
+            raise  # operators with a Replace option ask the user
         except native.user_errors() as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
@@ -124,7 +124,7 @@ class _LibraryOperator(FaceOperator):
         return {"FINISHED"}
 
     def work(self, context: Context) -> None:
-        """Do the work. Raises: errors that a user can repair."""
+        """Do the operator's work. Raises: errors that a user can mend."""
         raise NotImplementedError
 
 
@@ -135,8 +135,10 @@ def _put(
     shared: bool,
     over: Path | None = None,
 ) -> None:
-    """Store the user's expression as a pose asset of this file, and in the library in a new file or
-    instead of a file."""
+    """Make a pose asset of the expression in this file, with a picture.
+
+    If `shared`, the library stores it too, in a new file or in place of the file `over`.
+    """
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
     if sitter is not None:
@@ -203,12 +205,12 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
 
 
 class _OfOne(_LibraryOperator):
-    """On one expression; empty: the one that was clicked last."""
+    """Base of operators on the named expression, or on the last clicked one without a name."""
 
     expression: bpy.props.StringProperty(name="Expression", options={"SKIP_SAVE"})
 
     def item(self, context: Context) -> library.Item:
-        """The expression. Raises: LibraryError: there is none of the name."""
+        """The expression. Raises: LibraryError: no expression has this name."""
         items, _ = library.all_items(library.folder(context))
         return library.find(items, self.expression or choices(context).active)
 
@@ -315,7 +317,7 @@ class _OfFolder(_LibraryOperator, OperatorBase):
     _in_dialog = False
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        if self.asked:  # by execute(), which has the folder by now
+        if self.asked:  # set by execute(), which has already read the folder
             self.replace = True
             return context.window_manager.invoke_confirm(
                 self,
@@ -340,7 +342,7 @@ class _OfFolder(_LibraryOperator, OperatorBase):
             ours = bpy.ops.risorius  # pyright: ignore  made by registration
             again = getattr(ours, self.bl_idname.partition(".")[2])
             again("INVOKE_DEFAULT", directory=self.directory, asked=of_error(error))
-            return {"CANCELLED"}  # the question does the work
+            return {"CANCELLED"}  # the confirmed dialog runs the operator again
 
     def chosen(self) -> Path:
         return Path(system_path(self.directory))

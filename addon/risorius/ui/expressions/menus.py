@@ -12,16 +12,16 @@ def _expressions_of(group: str) -> list[tuple[str, str]]:
 
 
 def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
-    """A menu with one entry per expression of a group.
+    """Make a menu class with one entry per expression of a group.
 
     Args:
         group: group of the listed expressions, such as "emotion" or "viseme".
-        title: of the menu.
-        operator: bl_idname of the operator of an entry: it sets the expression, or adds it as a
+        title: title of the menu.
+        operator: bl_idname of the entries' operator, which sets the expression or adds it as a
             layer.
 
     Returns:
-        The class, to be registered.
+        The menu class, to be registered.
     """
 
     def draw(self: Menu, _context: Context) -> None:

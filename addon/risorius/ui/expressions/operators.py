@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bring an expression onto the sliders: at once, or by dragging."""
+"""Operators that apply an expression to the sliders, at once or by dragging."""
 
 from collections.abc import Collection
 from typing import Any, cast
@@ -20,12 +20,12 @@ from ..hand.base import HandOperator
 from ..words import of_error, say
 from .properties import choices, region_items
 
-_REACH = 300.0  # pixels of a drag for a strength of 1
+_REACH = 300.0  # length of a drag in pixels for a strength of 1
 _MOST = 1.0
 
 
 class Mixes(HandOperator):
-    """The properties of blending an expression."""
+    """Properties of operators that blend an expression."""
 
     expression: bpy.props.StringProperty(name="Expression")
     strength: bpy.props.FloatProperty(
@@ -50,7 +50,7 @@ class Mixes(HandOperator):
         )
 
     def item(self, context: Context) -> library.Item:
-        """The expression. Raises: LibraryError: there is none of the name."""
+        """The expression. Raises: LibraryError: no expression has this name."""
         items, _ = library.all_items(library.folder(context))
         return library.find(items, self.expression)
 
@@ -82,31 +82,31 @@ class Mixes(HandOperator):
 
 
 class Applies(Mixes):
-    """Sets an expression at once."""
+    """Base of operators that set an expression at once."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        """A click.
+        """Set the expression at a click; Ctrl flips it, Shift adds it.
 
         Args:
-            context: of the operator.
-            event: has the held keys.
+            context: context of the operator.
+            event: event with the held modifier keys.
         """
-        # Ctrl flips in Blender's pose library too.
+        # Ctrl flips poses in Blender's pose library, too.
         self.flip, self.additive = self.flip != event.ctrl, self.additive != event.shift
         return self.execute(context)
 
 
 class Blends(Mixes):
-    """Blends an expression in by the mouse; one undo step, and Esc leaves no trace."""
+    """Blends an expression by moving the mouse; one undo step, and Esc restores the pose."""
 
     bl_options = {"REGISTER", "UNDO", "GRAB_CURSOR", "BLOCKING"}
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        """Begin to drag.
+        """Begin the blend.
 
         Args:
-            context: of the operator.
-            event: has the place of the mouse.
+            context: context of the operator.
+            event: event with the place of the mouse.
         """
         rig = face_rig(context)
         try:
@@ -122,17 +122,17 @@ class Blends(Mixes):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
-        """Follow the mouse and the keys.
+        """Change strength and options by mouse and keys until the user accepts or cancels.
 
         Args:
-            context: of the operator.
+            context: context of the operator.
             event: the current event.
         """
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
-            # Accept on a press after a click, or on the release after a drag.
+            # Accepted by a press after a click, or by the release after a drag.
             context.workspace.status_text_set(None)
             return self.execute(context)
         if event.type == "MOUSEMOVE":
@@ -149,7 +149,7 @@ class Blends(Mixes):
         return {"RUNNING_MODAL"}
 
     def _follow(self, context: Context) -> None:
-        """Show the blend, or with Tab the pose before."""
+        """Show the blend, or the pose before it while Tab has switched the blend off."""
         rig = face_rig(context)
         sides.restore(rig, self._held)
         if self._shown:
@@ -171,13 +171,13 @@ class Blends(Mixes):
         context.workspace.status_text_set(None)
 
     def execute(self, context: Context) -> Result:
-        if hasattr(self, "_before"):  # what the drag has shown is no start
+        if hasattr(self, "_before"):  # execute blends from the pose before the drag
             sides.restore(face_rig(context), self._held)
             del self._before
         return super().execute(context)
 
 
-# Blender loses a registered class that another one is derived from: the shelf's have bases too.
+# Blender loses a registered class if another registered class derives from it, so both have bases.
 class RISORIUS_OT_expression(Applies, Operator):
     """Move the sliders to an expression. Ctrl: swap left and right, Shift: add to the pose"""
 
@@ -204,7 +204,7 @@ class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):
             self.report({"WARNING"}, note)
         self.report({"INFO"}, say("{count} pose assets", count=len(made)))
         if not bpy.app.background:
-            cast(Any, bpy.ops).risorius.render_thumbnails("INVOKE_DEFAULT")  # gives them pictures
+            cast(Any, bpy.ops).risorius.render_thumbnails("INVOKE_DEFAULT")  # draws their pictures
         return {"FINISHED"}
 
 

@@ -16,8 +16,8 @@ from . import previews
 from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
-_ICON = 20.0  # pixels of an icon, and of the picture for each unit of its size
-# Looks of characters whose pictures were started automatically.
+_ICON = 20.0  # pixels of an icon, and of a picture per unit of its size
+# Characters, by their look, whose pictures were started automatically in this session.
 _asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 
@@ -71,13 +71,13 @@ def _draw_tools(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _chosen(items: list[library.Item], chosen: RISORIUS_PG_expressions) -> list[library.Item]:
-    """The shown expressions: of the category, with the words of the search."""
+    """The expressions to show: those of the category that match the search."""
     sought, group = chosen.search.lower().split(), chosen.category
     starred = library.favourites() if group == STARRED else set()
     found = []
     for item in items:
         expression = item.expression
-        # Search the name too, such as PP of M B P.
+        # Search the short name too, such as PP for M B P.
         named = f"{expression.name} {expression.label} {words.say(expression.label)}"
         text = f"{named} {expression.description}".lower()
         fits = group in (ALL, expression.group) or expression.name in starred
@@ -93,7 +93,7 @@ def _draw_grid(
     items: list[library.Item],
     icons: list[int],
 ) -> None:
-    """A picture for each expression, with the button that sets it and the one that blends it in."""
+    """Draw for each expression a picture and buttons that set it or blend it."""
     region, scale = context.region, context.preferences.system.ui_scale or 1.0
     width = region.width / scale if region is not None and region.width > 1 else 280.0
     columns = max(1, int((width - 36.0) / (chosen.size * _ICON + 6.0)))
@@ -152,7 +152,7 @@ def _draw_own(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _ask_once(look: str) -> None:
-    """Begin to draw the pictures of a character that has none, as soon as this is drawn."""
+    """Start to draw the pictures of a character once per session, after the panel is drawn."""
     if look in _asked or bpy.app.background:
         return
     _asked.add(look)
@@ -160,7 +160,7 @@ def _ask_once(look: str) -> None:
 
 
 def _begin() -> None:
-    """Blender calls this outside of drawing."""
+    """Start the operator that draws pictures; a timer calls this, because panels must not."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.render_thumbnails.poll():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of expressions as icons of Blender, loaded when they are first drawn."""
+"""Pictures of expressions as icons of Blender, loaded when they are first drawn."""
 
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,12 @@ from ...scene.character import runtime
 from ...scene.expressions import poses, thumbnails
 from ...scene.expressions.library import Item
 
-# "icons": Blender's preview collection.
+# Key "icons" -> Blender's preview collection.
 _held: dict[str, Any] = session.table("previews.held", ("unregister",))
 
 
 def icon_of(path: Path) -> int:
-    """The number of the icon that shows a picture, or 0 while there is no such file."""
+    """The number of the icon for a picture, or 0 if the file does not exist."""
     icons = _held.setdefault("icons", bpy.utils.previews.new()) if not _held else _held["icons"]
     key = str(path)
     if key not in icons:
@@ -29,10 +29,10 @@ def icon_of(path: Path) -> int:
 
 
 def load(path: Path) -> int:
-    """icon_of that reads the picture at once, for search lists.
+    """Like icon_of, but Blender reads the picture at once, as search lists need it.
 
     Args:
-        path: of the picture.
+        path: path of the picture.
     """
     icon = icon_of(path)
     if icon:
@@ -41,17 +41,17 @@ def load(path: Path) -> int:
 
 
 def forget() -> None:
-    """Drop all icons, at the end and before pictures are drawn again."""
+    """Remove all icons, when the add-on ends and before pictures are drawn again."""
     if _held:
         bpy.utils.previews.remove(_held.pop("icons"))
 
 
 def jobs_of(rig: ArmatureObject, items: list[Item]) -> list[thumbnails.Job]:
-    """The pictures of expressions on a character, as many as expressions.
+    """The pictures to draw for expressions on a character, in the same order.
 
     Args:
-        rig: the character.
-        items: expressions of the grid.
+        rig: deforming armature of the character.
+        items: the expressions.
     """
     live, look = runtime.there(rig), thumbnails.look_of(rig)
     weights = [poses.weights_for(live, item.expression) for item in items]

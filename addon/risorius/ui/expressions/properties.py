@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Settings of the grid of expressions and of a click, stored with the window."""
+"""Settings of the grid of expressions and of a click; they belong to the window manager."""
 
 from typing import cast
 
@@ -13,15 +13,15 @@ from ..blender_types import Context, Item
 from ..words import say
 
 ALL, STARRED = "ALL", "STARRED"
-# Blender keeps no names of items that a function gives.
+# Strings of dynamic enum items; Blender keeps no references to them.
 _known: dict[str, list[Item]] = session.table("expressions.properties.known", ("unregister",))
 
 
 def region_items(_self: object, _context: object) -> list[tuple[str, str, str, int]]:
-    """The regions of a face, for a choice of some.
+    """The regions of a face as items of an enum with several choices.
 
     Args:
-        _self, _context: Blender's.
+        _self, _context: passed by Blender, not used.
     """
     titles = native.regions().titles.items()
     items = [(name, say(title), "", 1 << place) for place, (name, title) in enumerate(titles)]
@@ -29,10 +29,10 @@ def region_items(_self: object, _context: object) -> list[tuple[str, str, str, i
 
 
 def remember_categories(groups: list[str]) -> None:
-    """Offer the existing categories.
+    """Set the categories that the panel offers.
 
     Args:
-        groups: of expressions, in their order.
+        groups: groups of the existing expressions, in their order.
     """
     named = {"emotion": say("Emotions"), "face": say("Faces"), "viseme": say("Visemes")}
     items = [(ALL, say("All"), say("All expressions"))]
@@ -49,7 +49,7 @@ def _categories(_self: object, _context: object) -> list[Item]:
 
 
 class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
-    """The user's settings."""
+    """The settings of the grid of expressions."""
 
     search: bpy.props.StringProperty(
         name="Search",
@@ -103,10 +103,10 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_expressions:
-    """The user's settings.
+    """The settings of the window manager.
 
     Args:
-        context: Blender context.
+        context: context of Blender.
     """
     return cast(RISORIUS_PG_expressions, context.window_manager.risorius_expressions)  # type: ignore[attr-defined]
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Expressions on Blender's asset shelf, with our operators where a shelf takes any.
+"""An asset shelf with expressions, for versions of Blender whose shelves accept operators.
 
-Blender's own pose shelf applies the same assets, in pose mode and to the bones that are selected;
-this shelf moves the sliders with any selection, also in object mode.
+Blender's own pose shelf applies the same assets only in pose mode and to the selected bones; this
+shelf moves the sliders with any selection, also in object mode.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ from ..blender_types import Context, Operator, OperatorBase
 from ..common import active_controls
 from .operators import Applies, Blends
 
-_LIBRARIES = (  # numbers are Blender's: it sets them
+_LIBRARIES = (  # Blender passes these numbers
     ("LOCAL", "This File", "", 1),
     ("ALL", "All", "", 2),
     ("ESSENTIALS", "Essentials", "", 3),
@@ -26,7 +26,7 @@ _LIBRARIES = (  # numbers are Blender's: it sets them
 
 
 class _OfAsset(OperatorBase):
-    """The properties by which a shelf tells an operator which asset it means."""
+    """Properties with which an asset shelf passes an asset to an operator."""
 
     asset_library_type: bpy.props.EnumProperty(
         name="Library", items=_LIBRARIES, options={"HIDDEN", "SKIP_SAVE"}
@@ -39,7 +39,7 @@ class _OfAsset(OperatorBase):
     )
 
     def item(self, context: Context) -> library.Item:
-        """The expression of the asset. Raises: LibraryError: it is none."""
+        """The expression of the asset. Raises: LibraryError: the asset has no expression."""
         name = self.relative_asset_identifier.replace("\\", "/").rpartition("/")[2]
         asset: Any = getattr(context, "asset", None)
         text = asset.metadata.get(library.MARK) if asset is not None else None
@@ -80,7 +80,7 @@ class RISORIUS_AST_expressions(bpy.types.AssetShelf):
     def poll(cls, context: bpy.types.Context) -> bool:
         given: Any = context
         if getattr(given, "mode", "") != "OBJECT" or not hasattr(given, "object"):
-            return False  # while a file opens there is less
+            return False  # the context is incomplete while a file opens
         return active_controls(given) is not None
 
     @classmethod
@@ -90,7 +90,7 @@ class RISORIUS_AST_expressions(bpy.types.AssetShelf):
 
 
 def takes_operators() -> bool:
-    """Whether the shelves of this Blender accept own operators: since 4.3."""
+    """Whether asset shelves of this Blender accept the add-on's operators: since 4.3."""
     return "bl_activate_operator" in bpy.types.AssetShelf.bl_rna.properties
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An existing face: controls, level of detail, shapes, body, overdrive."""
+"""Panels and operators of an existing face: controls, level of detail, shapes, body, overdrive."""
 
 from . import (
     body_operators,

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The line at the top of the tab: the name of the face, or the active mode with a button that ends
-it.
+"""The first line of the tab: the name of the face, or the active mode with a button that ends it.
 
-It is one line in every mode, so that the panels below stay in place.
+It is always one line high, so that the panels below stay in place.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,8 +19,8 @@ from .. import words
 from ..blender_types import Context, Icon, UILayout
 from ..common import as_seen
 
-_NAMED = 2  # controls that stand alone, by their names
-_TEXT = 0.72  # of the line; what is left has the button
+_NAMED = 2  # most solo controls that are listed by name
+_TEXT = 0.72  # share of the line for the text; the rest is for the button
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,11 @@ class Mode:
     """A mode of a face in which edits have another effect.
 
     Attributes:
-        text: its name, in the user's language.
+        text: name of the mode, in the user's language.
         icon: icon before the text.
         operator: operator that ends the mode.
         settings: properties of the operator.
-        alert: True: warn, because the view or the keys of the face are not as usual.
+        alert: True: draw as a warning, because the view or the keys of the face are not as usual.
     """
 
     text: str
@@ -44,11 +43,11 @@ class Mode:
 
 
 def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> list[Mode]:
-    """The modes that are on; modes that change most edits come first.
+    """The active modes; modes that change most edits come first.
 
     Args:
-        context: has the current frame.
-        rig, controls: the armatures of the face.
+        context: context with the current frame.
+        rig, controls: deforming and control armature of the face.
     """
     return [*_of_keys(context, rig, controls), *_of_looks(context, rig, controls)]
 
@@ -74,7 +73,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
 
 
 def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """Modes that change the view of the face or link sliders."""
+    """Modes that change the view of the face, or link sliders."""
     look = look_masks.of(rig)
     if look.solo:
         swapped = as_seen(context)
@@ -93,12 +92,12 @@ def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -
 
 
 def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Draw the line.
+    """Draw the name of the face, or its first mode with the button Done.
 
     Args:
-        layout: of the panel.
-        context: of the panel.
-        rig, controls: the armatures of the face.
+        layout: layout of the panel.
+        context: context of the panel.
+        rig, controls: deforming and control armature of the face.
     """
     found = modes(context, rig, controls)
     if not found:

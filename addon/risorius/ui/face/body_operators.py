@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that hang a face on a body's armature, and take it off."""
+"""Operators that attach a face to a body's armature and detach it."""
 
 from typing import TypeGuard
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Trying one blend shape by hand: a search, a slider, a way back."""
+"""Tests one blend shape by hand: a search, a weight and a button that ends the test."""
 
 from typing import cast
 
@@ -15,12 +15,12 @@ from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
 from ..words import CONTEXT, NAMES, say
 
-# Blender reads the strings later: they must stay alive.
+# Blender reads the strings of enum items later, so they must stay alive.
 _items: list[Item] = session.keep("channel_preview.items", list, ("unregister",))
 
 
 def _test(context: Context, rig: ArmatureObject, channel: int, value: float | None) -> None:
-    """Set the override of a face, or end it where the value is None, and show it."""
+    """Set the channel's override of a face, or end it if `value` is None, and update the face."""
     if value is None:
         channel_preview.clear(rig)
     else:
@@ -104,7 +104,7 @@ def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
 
 
 def weight_property() -> object:
-    """The slider property: it shows and sets the override of the active face and stores nothing."""
+    """The slider that shows and sets the override of the active face; it stores nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
         translation_context=CONTEXT,

@@ -31,7 +31,7 @@ _ICONS: dict[str, Icon] = {
     "ear": "SPEAKER",
     "other": "DOT",
 }
-_TITLE = 0.5  # of the width, for the names of sliders
+_TITLE = 0.5  # share of the width for the names of sliders
 
 
 class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
@@ -70,7 +70,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
             words.write(layout, nothing, "INFO")
 
 
-# Panels are redrawn with every played frame, so their content is sorted once.
+# Panels are redrawn with every played frame, so the grouping is cached.
 @session.cached(("unregister",), 8)
 def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     groups = slider_words.group_controls(shown, native.regions())
@@ -120,7 +120,7 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
 
 
 class _Part(NamedTuple):
-    """The lines of a region, see `draw_sliders`."""
+    """The sliders of a region and their context; see `draw_sliders` for the fields."""
 
     context: Context
     face: bpy.types.PoseBone
@@ -142,19 +142,19 @@ def draw_sliders(
     followers: Mapping[str, str],
     given: Mapping[str, float],
 ) -> None:
-    """Draw one line for each control; both sides share it, and a long name stands above.
+    """Draw one line for each control; left and right share a line, and a long name is above it.
 
-    Of two linked sides the leading one is drawn. Values from the board are drawn as bars, because
-    their sliders have no effect.
+    Of two linked sides only the leading slider is drawn. Values from the face board are drawn as
+    read-only bars, because their sliders have no effect.
 
     Args:
-        context: of the panel.
-        layout: of the panel.
+        context: context of the panel.
+        layout: layout of the panel.
         face: the bone with the sliders.
-        region: their region.
-        names: the sliders.
+        region: region of the sliders.
+        names: names of the sliders.
         followers: following slider -> leading slider.
-        given: values from the face board by slider names.
+        given: slider -> value from the face board.
     """
     part = _Part(context, face, region, names, followers, given)
     first, more = part.lines()
@@ -162,7 +162,7 @@ def draw_sliders(
 
 
 def _draw_parted(layout: UILayout, part: _Part, rests: Mapping[str, float]) -> None:
-    """Draw the most used sliders, and the others under More with the number of moved ones."""
+    """Draw the most used sliders; the others are under More, with the number of moved ones."""
     first, more = part.lines()
     _draw_lines(layout, part, first)
     if not more:
@@ -204,8 +204,10 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 
 
 def _draw_sides(column: UILayout, linked: bool) -> None:
-    """Draw headings of the columns, because a slider is too narrow for a letter before its
-    number."""
+    """Draw headings of the columns Left and Right.
+
+    A slider is too narrow for a letter before its number.
+    """
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")
     row = row.row(align=True)

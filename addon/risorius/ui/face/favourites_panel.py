@@ -32,7 +32,7 @@ class RISORIUS_PT_favourites(FaceOnlyPanel, Panel):
 
 
 def draw_button_menu(self: Menu, context: Context) -> None:
-    """Entries of a slider's context menu. Args: self the menu, context of it."""
+    """Add entries to a slider's context menu. Args: self  the menu, context  of the menu."""
     name = control_under_mouse(context) if active_controls(context) is not None else ""
     if not name:
         return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The operator that lets renders show strands of hair instead of cards."""
+"""The operator that makes renders show hair as strands instead of cards."""
 
 import bpy
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that choose the level of detail, in the viewport and in renders."""
+"""Operators that choose the level of detail in the viewport and in renders."""
 
 import bpy
 
@@ -54,7 +54,7 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
         else:
             lods.show(rig, self.lod, lods.render_level(rig))
         for item in parts.meshes_of(rig):
-            conditions.note_written(item)  # what is shown now is evaluated, and not edited
+            conditions.note_written(item)  # evaluated vertices are no edit
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
@@ -77,7 +77,7 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
 
 
 def _size(rig: ArmatureObject) -> float:
-    """The longest side of the largest mesh, in Blender units."""
+    """The longest side of all meshes of the face, in Blender units."""
     return max((max(m.dimensions[:]) for m in parts.meshes_of(rig)), default=0.25)
 
 

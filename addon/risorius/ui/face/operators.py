@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators on an existing face: reset, keys, level of detail, shapes, overdrive."""
+"""Operators on an existing face: reset, keys, shape mode, joints, overdrive, separation."""
 
 from collections.abc import Collection
 

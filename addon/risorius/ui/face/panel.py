@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panels Face and Options of the sidebar tab `Face`."""
+"""The panels Face and Options of the sidebar tab Risorius."""
 
 from ... import native
 from ...logic.character import plans
@@ -18,7 +18,7 @@ from ..drag import panel as drag_panel
 from ..upkeep.panel import draw_trouble
 from . import banner
 
-_MOST_REASONS = 3  # why a face is not in Direct mode; more would fill the panel
+_MOST_REASONS = 3  # most reasons why a face is not in Direct mode that the panel lists
 
 
 class RISORIUS_PT_character(FacePanel, Panel):
@@ -43,7 +43,7 @@ class RISORIUS_PT_character(FacePanel, Panel):
         if draw_trouble(layout, context):
             return
         rig = parts.active_rig(context)
-        # Offer this first: the selected mesh is no face yet.
+        # This is the first button, because the selected mesh is not a face yet.
         if parts.rig_of(context.object) is None and shape_key_head.head_of(context) is not None:
             layout.operator("risorius.make_rig", icon="SHAPEKEY_DATA")
         if rig is None:
@@ -52,7 +52,7 @@ class RISORIUS_PT_character(FacePanel, Panel):
         live = runtime.of(rig)
         controls = parts.controls_of(rig)
         if live is None or controls is None:
-            return  # said above
+            return  # draw_trouble has shown the reason
         banner.draw(layout, context, rig, controls)
         row = layout.row(align=True)
         row.operator("risorius.reset", text="Reset", icon="LOOP_BACK").region = ""
@@ -65,8 +65,10 @@ class RISORIUS_PT_character(FacePanel, Panel):
 
 
 def _draw_start(layout: UILayout) -> None:
-    """Draw the first steps. Buttons of later steps are grey, and their tooltips name the missing
-    step."""
+    """Draw the first steps.
+
+    Buttons of later steps are grey, and their tooltips name the missing step.
+    """
     if any(parts.rigs()):
         words.write(layout, "No face is selected: click on one.", "INFO")
     _draw_step(layout, words.say("1. Get a face"))
@@ -109,7 +111,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
         ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
         ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
-        # Use a line of its own, because eight levels leave no room for words.
+        # A line of its own, because eight levels leave no room for a label.
         column.label(text=text, text_ctxt=words.CONTEXT)
         row = column.row(align=True)
         row.active = not auto

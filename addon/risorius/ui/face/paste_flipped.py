@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Blender's Paste Pose Flipped on the controls of a face.
+"""Makes Blender's Paste Pose Flipped swap the sliders of a face too.
 
-Blender swaps bones by L and R in their names. Sliders are properties of one bone, which it pastes
-unchanged. So a second step swaps the sliders: an operator replaces Blender's on the same keys, and
-a call of Blender's own from a menu is repeated with it.
+Blender swaps bones by L and R in their names. Sliders are properties of one bone, which Blender
+pastes unchanged. So our operator replaces Blender's on the same keys and swaps the sliders too. If
+Blender's operator is called from a menu, it is undone and ours runs.
 """
 
 from collections.abc import Collection
@@ -24,15 +24,15 @@ from ..common import active_controls, face_controls, face_rig
 from ..hand.base import HandOperator
 from ..words import say
 
-_MARK = 0.3215  # no hand sets a slider to it
+_MARK = 0.3215  # a marker value that no user sets
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
-# Last: which operator was; selected: how it had pasted.
+# last: Blender's last operator that was checked; selected: its setting Selected Only.
 _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
 def _posed_controls(context: Context) -> ArmatureObject | None:
-    """The controls of the active face, if they are in pose mode."""
+    """The control armature of the active face, if it is in pose mode."""
     controls = active_controls(context)
     return controls if controls is not None and context.pose_object == controls else None
 
@@ -65,7 +65,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if led:
             board.mark(rig, _MARK)
         tools = context.scene.tool_settings
-        # Blender would key the sliders as it pastes them, before they are turned over.
+        # Blender would key the sliders when it pastes them, before they are swapped.
         auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
         try:
             bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
@@ -89,7 +89,7 @@ def _is_mark(value: float) -> bool:
 
 
 def _draw(self: Menu, context: Context) -> None:
-    """Entry of the menu Pose beside Blender's own."""
+    """Add our entries to the menu Pose."""
     if _posed_controls(context) is not None:
         self.layout.separator()
         self.layout.operator("risorius.copy_pose", icon="COPYDOWN")
@@ -99,7 +99,7 @@ def _draw(self: Menu, context: Context) -> None:
 
 
 def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
-    """Whether Blender's own operator has just pasted a pose flipped; said once for each time."""
+    """Whether Blender's operator has just pasted a pose flipped; True only once per call."""
     last = manager.operators[-1] if len(manager.operators) else None
     kind = last.bl_idname if last is not None else ""
     state = (last.as_pointer() if last is not None else 0, kind)
@@ -120,7 +120,7 @@ def _updated(_scene: bpy.types.Scene, _depsgraph: object) -> None:
 
 
 def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
-    """A window in which the controls of a face are posed: handlers run without an active one."""
+    """The window whose active object is a face's controls in pose mode, or None."""
     for window in manager.windows:
         active = window.view_layer.objects.active
         rig = parts.rig_of(active)
@@ -132,7 +132,7 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
 
 
 def _once_more() -> None:
-    """Undo Blender's step and run ours, so that one undo takes back both."""
+    """Undo Blender's paste and run our operator, so that one undo reverts all."""
     context = current_context()
     window = _posing_window(context.window_manager)
     if window is None:
@@ -140,18 +140,18 @@ def _once_more() -> None:
     with context.temp_override(window=window):
         ours = bpy.ops.risorius.paste_pose_flipped  # pyright: ignore[reportAttributeAccessIssue]
         if not ours.poll():
-            return  # what Blender did stays
+            return  # Blender's paste stays
         if bpy.ops.ed.undo.poll():  # pyright: ignore[reportCallIssue]
             bpy.ops.ed.undo()
         ours("EXEC_DEFAULT", True, selected=bool(_seen.get("selected")))
 
 
 def register() -> None:
-    """Add the menu entry, the keys, and the listener for Blender's own command."""
+    """Add the menu entries, the keys, and the handler that notices Blender's operator."""
     bpy.types.VIEW3D_MT_pose.append(_draw)
     bpy.app.handlers.depsgraph_update_post.append(_updated)
     config = current_context().window_manager.keyconfigs.addon
-    if config is not None:  # there is none without a window
+    if config is not None:  # there is no key configuration without a window
         keymap = config.keymaps.new("Pose", space_type="EMPTY")
         for ctrl in (True, False):
             item = keymap.keymap_items.new(
@@ -160,13 +160,13 @@ def register() -> None:
                 "PRESS",
                 shift=True,
                 ctrl=ctrl,
-                oskey=not ctrl,  # on a Mac
+                oskey=not ctrl,  # the Command key of a Mac
             )
             _keys.append((keymap, item))
 
 
 def unregister() -> None:
-    """Take them away."""
+    """Remove the menu entries, the keys and the handlers."""
     for keymap, item in _keys:
         keymap.keymap_items.remove(item)
     _keys.clear()

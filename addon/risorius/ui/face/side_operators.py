@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators on the two sides of a face, and poses that are copied and pasted."""
+"""Operators that mirror, copy and link the sides of a face, and copy and paste poses."""
 
 from collections.abc import Collection
 
@@ -17,7 +17,7 @@ from ..common import FaceOperator, face_controls, face_rig
 from ..hand.base import HandOperator
 from ..words import say
 
-# The sliders that were copied last, of any face.
+# Slider -> value of the pose that was copied last, from any face.
 _copied: dict[str, float] = session.table("side_operators.copied", ("unregister",))
 
 
@@ -143,10 +143,10 @@ class RISORIUS_OT_paste_pose(HandOperator, Operator):
     def description(
         cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
     ) -> str:
-        """The tooltip. Args: context  of the button, properties  as it gives them."""
+        """The tooltip. Args: context  context of the button; properties  the button's settings."""
         text = "Paste the copied sliders"
         if getattr(properties, "flipped", False):
-            text = "Paste the copied sliders with left and right swapped"
+            text = "Paste the copied sliders, swapped left for right"
         return bpy.app.translations.pgettext_tip(text) or text
 
     def move(self, context: Context) -> Collection[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between faces and DNA files: import, sample faces, replace, reload, export, rigs, studios."""
+"""Import, replacement and export of DNA files, sample faces, rigs and studios."""
 
 from . import framing_operators, import_operators, operators, rig_operators, studio_operators
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Framing a face in 3D views, after an import and on request."""
+"""Frames a face in 3D views, after an import and on request."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -16,21 +16,21 @@ from ...scene.character import board_bones
 from ...scene.lod import lods
 from ..blender_types import Context
 
-_FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
-_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
-_ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # regions that lie over a view
-_SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a profile
+_FRONT = Vector((0.0, -1.0, 0.0))  # direction in which an imported face looks
+_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer
+_ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # types of regions that overlap a view
+_SIDE = 0.77  # cosine of 40 degrees: views from farther aside are turned
 
 
 def frame(context: Context, rig: ArmatureObject) -> None:
-    """Frame a face in the 3D views of the user's window; views from the side turn to the front.
+    """Frame a face in the 3D views of the user's window, and turn views from the side to the front.
 
-    Views through a camera stay, and so do views that show the face well. A solid view with
-    Blender's default material colours switches to texture colours, which show iris, lips and brows.
-    Undo does not restore views.
+    Views through a camera do not change, nor views that already show the face well. A solid view
+    with Blender's default material colours switches to texture colours, which show iris, lips and
+    brows. Undo does not restore views.
 
     Args:
-        context: a Blender context; without a window nothing happens.
+        context: context of Blender; without a window nothing happens.
         rig: deforming armature of the face.
     """
     screen = context.window.screen if context.window is not None else None
@@ -45,17 +45,17 @@ def frame(context: Context, rig: ArmatureObject) -> None:
 
 
 def show_whole(context: Context, rig: ArmatureObject) -> int:
-    """Frame a face in the 3D view of the context, or in all views of the window.
+    """Frame the head in the 3D view of the context, or in all views of the window.
 
-    Each keeps its direction; outlines of bones and the face board do not count. A view through a
+    Each view keeps its direction. Control bones and the face board are ignored. A view through a
     camera leaves the camera, as with Blender's Frame Selected.
 
     Args:
-        context: a Blender context.
+        context: context of Blender.
         rig: deforming armature of the face.
 
     Returns:
-        The number of views that show it; views locked to an object or the 3D cursor are left out.
+        The number of framed views; views locked to an object or the 3D cursor are skipped.
     """
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
@@ -81,14 +81,14 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
 
 
 def show_with_board(context: Context, rig: ArmatureObject) -> None:
-    """Frame head and face board side by side in a 3D view, from the front.
+    """Frame the head and its face board side by side in a 3D view, from the front.
 
-    It uses the view of the context, which leaves its camera, or the largest view without a camera.
-    Areas under sidebar, toolbar and headers stay free. A view locked to an object or the 3D cursor
-    stays.
+    The view is the one of the context, which leaves its camera, or else the largest one without a
+    camera. Head and board are not covered by sidebar, toolbar and headers. A view locked to an
+    object or the 3D cursor does not change.
 
     Args:
-        context: a Blender context; without a window nothing happens.
+        context: context of Blender; without a window nothing happens.
         rig: deforming armature of the face, with a board.
     """
     area = _largest_or_own(context)
@@ -103,7 +103,7 @@ def show_with_board(context: Context, rig: ArmatureObject) -> None:
     turn = (controls.matrix_world.to_quaternion() @ _FRONT).to_track_quat("Z", "Y")
     corners = np.concatenate([_corners(rig), board_bones.corners(controls)])
     points = corners @ np.array(turn.to_matrix(), np.float64)
-    depth = float(points[-1, 2])  # of the board: there the view turns
+    depth = float(points[-1, 2])  # depth of the board, which is the view's pivot
     size, perspective = (region.width, region.height), view.view_perspective == "PERSP"
     free = _free_part(area, region)
     right, up, far = view_fit.fit(points - (0.0, 0.0, depth), space.lens, size, free, perspective)
@@ -124,9 +124,9 @@ def _largest_or_own(context: Context) -> bpy.types.Area | None:
 
 
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
-    """The part of a region that no other of its area covers, in pixels from its own corner.
+    """The part of a region that no other region of its area covers, in pixels from its corner.
 
-    Sidebar, toolbar and headers cover it where the preferences let regions overlap.
+    Sidebar, toolbar and headers cover a part if the preferences let regions overlap.
     """
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:
@@ -177,20 +177,20 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
         if view_fit.is_well_in_view(middle, radius, far, held, view.view_distance):
             continue
         view.view_location, view.view_distance = middle, far
-        # Straight views (front, side, top) are chosen with a key and keep their direction.
+        # Views along an axis (front, side, top) are chosen with a key and keep their direction.
         seen_from = view.view_rotation @ Vector((0.0, 0.0, 1.0))
         if perspective and seen_from.dot(turn @ _FRONT) < _SIDE:
             view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")
 
 
 def _corners(rig: ArmatureObject) -> NDArray[np.float64]:
-    """float64[N, 3] in the world: the corners of the bounding box of the head."""
+    """The corners of the head's bounding boxes in world space, float64[N, 3]."""
     boxes = [(item.matrix_world, item.bound_box) for item in lods.heads(rig)]
     return np.array([matrix @ Vector(c) for matrix, box in boxes for c in box], np.float64)
 
 
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
-    """Centre and radius of the head, or of all meshes of the finest existing level."""
+    """Centre and radius of a ball around the corners of the head, in world space."""
     corners = _corners(rig)
     low, high = corners.min(axis=0), corners.max(axis=0)
     return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators on the view: frame the face, hide its outlines."""
+"""Operators that frame the face and hide or move the outlines of its control bones."""
 
 import bpy
 
@@ -88,10 +88,10 @@ class RISORIUS_OT_move_outlines(FaceOperator, Operator):
 
 
 def register() -> None:
-    """Let the key of Frame Selected show the face where its outlines are selected."""
+    """Bind the key of Frame Selected to our operator, which acts if only outlines are selected."""
     config = current_context().window_manager.keyconfigs.addon
     if config is None:
-        return  # in the background
+        return  # in background mode
     keymap = config.keymaps.new("3D View", space_type="VIEW_3D")
     item = keymap.keymap_items.new(RISORIUS_OT_frame_face.bl_idname, "NUMPAD_PERIOD", "PRESS")
     item.properties.instead = True  # pyright: ignore  each operator has its own
@@ -99,7 +99,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the key back."""
+    """Remove the key."""
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

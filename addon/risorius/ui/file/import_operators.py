@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bring faces in: from a file, and the sample."""
+"""Operators that import faces from DNA files and add sample faces."""
 
 from pathlib import Path
 
@@ -36,17 +36,17 @@ def import_character(
     options: build.BuildOptions,
     show: bool = False,
 ) -> Result:
-    """Build a character and report on it.
+    """Build a character from a DNA file, and report warnings or the error.
 
     Args:
-        operator: operator for the report.
-        context: Blender context.
-        path: of the DNA file.
-        options: build.BuildOptions.
-        show: frame it in the 3D views of the user's window.
+        operator: operator that reports.
+        context: context of Blender.
+        path: path of the DNA file.
+        options: options of the build.
+        show: True: frame the face in the 3D views of the user's window.
 
     Returns:
-        The result for `execute`.
+        The return value for `execute`.
     """
     try:
         with shown_progress(context) as progress:
@@ -85,7 +85,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
 
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
-    # Several files, from the file browser or dropped together.
+    # Several files, chosen in the file browser or dropped together.
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
@@ -267,7 +267,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         return done
 
     def finish(self, context: Context) -> Result:
-        """Import the built face."""
+        """Import the face that the task has built, or report its error."""
         error = self._task.error
         if error is None:
             return self._import(context)
@@ -297,7 +297,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
 
 
 def draw_import(self: Menu, _context: Context) -> None:
-    """Entry of File > Import."""
+    """Add an entry to File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
 
 
@@ -333,7 +333,7 @@ class RISORIUS_MT_sample_studio(Menu):
 
 
 def draw_add(self: Menu, _context: Context) -> None:
-    """Entry of the 3D view's Add menu."""
+    """Add an entry to the 3D view's Add menu."""
     self.layout.menu(RISORIUS_MT_sample.bl_idname, icon="USER")
 
 

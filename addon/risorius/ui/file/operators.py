@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators between a face and its file: replace it, read it again."""
+"""Operators that replace, reload and export the DNA file of a face."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,12 +25,12 @@ from ..words import local, of_error, say
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
-    """Report sentences; those beyond a limit as a number.
+    """Report the first sentences, and the number of others.
 
     Args:
-        operator: the reporting operator.
-        sentences: in their order.
-        shown: largest number of shown sentences.
+        operator: operator that reports.
+        sentences: the sentences, in the order of the report.
+        shown: largest number of sentences to report.
     """
     for sentence in sentences[:shown]:
         operator.report({"INFO"}, local(sentence))
@@ -61,7 +61,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
 
 
 class _FileOperator(FaceOperator):
-    """Operators on a face that may have lost its controls or its DNA: a file brings them back."""
+    """Base of operators on a face that may lack its controls or DNA, which a file restores."""
 
     whole_face = False
 
@@ -93,7 +93,7 @@ class RISORIUS_OT_reload(_FileOperator, Operator):
         path = self._path(context)
         if not path or not Path(path).is_file():
             bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")  # pyright: ignore  made by registration
-            return {"CANCELLED"}  # the file selector does the work
+            return {"CANCELLED"}  # the file selector runs the other operator
         return self.execute(context)
 
     def execute(self, context: Context) -> Result:
@@ -169,9 +169,9 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
 
 def draw_export(self: Menu, _context: Context) -> None:
-    """Entries of File > Export."""
+    """Add entries to File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Beside Blender's own entries, which write live faces at rest.
+    # Placed near Blender's own entries, which write live faces at rest.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""A head with shape keys becomes a face: joints that do what its shapes did."""
+"""Operators that make a face with joints from a head with shape keys."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, cast
@@ -118,7 +118,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         return words.say("No rig was made.")
 
     def finish(self, context: Context) -> Result:
-        """Import what was written; the head stays, and lends its materials."""
+        """Import the written face beside the head and give it the head's materials."""
         task = self._task
         try:
             if task.result is None:
@@ -143,7 +143,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         self._draw_meshes(context)
 
     def _draw_meshes(self, context: Context) -> None:
-        """Which meshes become the face."""
+        """Draw the names of the meshes that become the face."""
         head = shape_key_head.head_of(context)
         if head is None:
             return
@@ -163,13 +163,13 @@ def _named(items: Sequence[MeshObject]) -> list[str]:
 
 
 class MadeFace(NamedTuple):
-    """A face that was made of a head, and written.
+    """A face that was made from a head and written to a file.
 
     Attributes:
-        head: name of the mesh object.
-        shapes: what the face was made from.
-        rig: risorius.author.JointRig.
-        odd: sentences.
+        head: name of the head's mesh object.
+        shapes: meshes and shapes from which the face was made.
+        rig: the joint rig, with its errors.
+        odd: warnings, one sentence each.
     """
 
     head: str
@@ -186,17 +186,17 @@ def show_made(
     *,
     with_materials: bool = False,
 ) -> Result:
-    """Import a face beside the head that it was made of, which lends its materials; report on it.
+    """Import the face beside its head, give it the head's materials, and report.
 
     Args:
-        operator: reports through it.
-        context: Blender context.
-        path: of the DNA file.
-        made: what was made.
-        with_materials: build materials for meshes that no object lends one.
+        operator: operator that reports.
+        context: context of Blender.
+        path: path of the DNA file.
+        made: the face that was made.
+        with_materials: True: build materials for meshes that have none on the head.
 
     Returns:
-        What `execute` returns.
+        The return value for `execute`.
     """
     before, materials = set(bpy.data.objects), set(bpy.data.materials)
     options = build.BuildOptions(materials=with_materials)
@@ -204,7 +204,7 @@ def show_made(
         return {"CANCELLED"}
     _take_place(context, made, before)
     for material in set(bpy.data.materials) - materials:
-        if not material.users:  # the head lent its own
+        if not material.users:  # replaced by a material of the head
             bpy.data.materials.remove(material)
     for sentence in made.shapes.notes:
         operator.report({"INFO"}, sentence)
@@ -225,7 +225,7 @@ def show_made(
 
 
 def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object]) -> None:
-    """Beside the head, and with its materials."""
+    """Place the new face beside the head and assign the head's materials."""
     head = bpy.data.objects.get(face.head)
     made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
     if head is None or made is None:
@@ -239,7 +239,7 @@ def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object])
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:
-    """Entry of the menu beside the list of shape keys, and of Object."""
+    """Add an entry to the menu of the shape key list and to the menu Object."""
     self.layout.separator()
     self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
 

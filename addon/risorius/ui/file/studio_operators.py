@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""A studio around an existing face."""
+"""The operator that builds a studio around an existing face."""
 
 import bpy
 
@@ -22,12 +22,12 @@ SCENE_CAMERA = bpy.props.BoolProperty(
 
 
 def add_studio(by: Operator, context: Context, scene_camera: bool) -> None:
-    """Build a studio around the active face, and report on it and on the scene's cameras.
+    """Build a studio around the active face, and report it and changes of the scene's camera.
 
     Args:
-        by: the operator that reports.
-        context: has the scene and the face.
-        scene_camera: make its camera the scene's.
+        by: operator that reports.
+        context: context with the scene and the face.
+        scene_camera: True: the studio's camera becomes the scene's camera.
     """
     scene = context.scene
     before = scene.camera

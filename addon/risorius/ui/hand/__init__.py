@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moving controls by hand: keys, poses between poses, tweaks, gaze, favourites, the pie menu."""
+"""Animation by hand: keys, breakdown poses, tweaks, gaze, favourites, the pie menu."""
 
 from . import favourites, gaze, operators, panel, pie
 

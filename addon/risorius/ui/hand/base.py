@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The base class of operators that move controls as the animator's hand does."""
+"""The base class of operators that change controls by hand and insert keys."""
 
 from collections.abc import Collection
 
@@ -23,7 +23,7 @@ MOMENTS = (
 class HandOperator(FaceOperator):
     """Base of all operators that move sliders or control bones.
 
-    They define `move`; keys are inserted by shared code.
+    Subclasses define `move`; the base class inserts keys.
     """
 
     at: bpy.props.EnumProperty(
@@ -34,12 +34,12 @@ class HandOperator(FaceOperator):
         """Move the controls from their current values.
 
         Returns:
-            The handled sliders; None if it did nothing and reported the reason.
+            Names of the changed sliders; None if nothing changed and the reason was reported.
         """
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Called with the frame before each move."""
+        """Prepare for a frame; called before each `move`."""
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

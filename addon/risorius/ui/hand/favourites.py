@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Favourite sliders: the star beside a slider."""
+"""Favourite sliders, and the operator of the star next to a slider."""
 
 from typing import Any
 

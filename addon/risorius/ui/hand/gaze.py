@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Eyes and head: target of the eyes, share of a body's rotation, blinks."""
+"""Operators for eyes and head: target of the gaze, share of a body's rotation, blinks."""
 
 import bpy
 
@@ -25,14 +25,14 @@ TARGETS = (
 
 
 def proposed(context: Context) -> str:
-    """The most likely target of the eyes: the active object, or the camera, or "".
+    """The name of the most likely target of the eyes: the active object, or the camera, or "".
 
     Args:
-        context: has the selection and the scene.
+        context: context with the selection and the scene.
     """
     chosen = [context.object, *context.selected_objects]
     free = [item for item in chosen if item is not None and parts.rig_of(item) is None]
-    free.sort(key=lambda item: item.type != "EMPTY")  # made for this, and it stays sorted
+    free.sort(key=lambda item: item.type != "EMPTY")  # empties first; the sort is stable
     item = free[0] if free else context.scene.camera
     return item.name if item is not None else ""
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of the animator's hand: to the next key, poses between poses, tweaks, colours."""
+"""Operators for animation by hand: next key, breakdown poses, tweaks, colours of curves."""
 
 from collections.abc import Collection
 
@@ -20,13 +20,13 @@ from ..words import of_error, say
 from .base import HandOperator
 from .favourites import favourites_of
 
-_REACH = 0.3  # of a window's width: how far the mouse goes from nothing to all
-_AROUND = 12  # frames on each side of the current one
-_NONE = 0.5  # of a breakdown: in the middle
+_REACH = 0.3  # share of the window's width that changes the factor from 0 to 1
+_AROUND = 12  # frames before and after the current one
+_NONE = 0.5  # factor of a breakdown in the middle
 
 
 def control_under_mouse(context: Context) -> str:
-    """The slider under the mouse, or "". Args: context of a key or a menu."""
+    """The slider under the mouse, or "". Args: context  context of a key or a menu."""
     found = getattr(context, "property", None)
     if found is None or found[0] != parts.controls_of(face_rig(context)):
         return ""
@@ -127,7 +127,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         now, paths, factor = keying.pose_of(controls), self._paths(context), self.factor
         if self.kind == "REST":
             return between.move(rig, now, between.rest_pose(rig, now), factor, paths)
-        # Controls without a curve have no pose before and after.
+        # Controls without an F-curve have no earlier or later pose.
         paths &= set(keying.curves_by_path(controls))
         skipped = keying.selected_frames(controls) if self.at == "SELECTED" else ()
         found = between.neighbours(controls, self._frame, now, paths, skipped)
@@ -152,7 +152,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         return {"RUNNING_MODAL"}
 
     def _preview(self, context: Context) -> bool:
-        """Show the pose at the factor of now; whether it could be."""
+        """Show the pose at the current factor. Returns whether it exists."""
         keying.show(face_controls(context), self._start)
         try:
             self.move(context)
@@ -189,13 +189,13 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
 
 
 def proposed_range(context: Context) -> tuple[int, int]:
-    """First and last frame of a tweak: of selected keys, of the preview range, or around this
-    frame.
+    """First and last frame for a tweak.
 
-    If all keys are selected, the selection is ignored, because an import selects its keys.
+    They are those of the selected keys, or of the preview range, or the frames around the current
+    one. If all keys are selected, the selection is ignored, because an import selects its keys.
 
     Args:
-        context: has the face and the scene.
+        context: context with the face and the scene.
     """
     controls, scene = face_controls(context), context.scene
     selected = keying.selected_frames(controls)

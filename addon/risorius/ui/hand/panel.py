@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel By Hand: from key to key, between poses, a tweak over a range."""
+"""The panel By Hand: next key, breakdown poses, tweaks over a range of frames."""
 
 from ...scene.animation import tweaks
 from ..blender_types import Context, Panel
@@ -9,7 +9,7 @@ from ..common import FaceOnlyPanel, face_controls
 class RISORIUS_PT_hand(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_hand"
     bl_label = "By Hand"
-    bl_parent_id = "RISORIUS_PT_animation"  # the sections of the tab are to be seen at once
+    bl_parent_id = "RISORIUS_PT_animation"  # a subpanel saves room in the tab
 
     def draw(self, context: Context) -> None:
         layout = self.layout

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """A pie menu of frequent tools. It has no key until the user assigns one."""
 
@@ -36,7 +36,7 @@ class RISORIUS_MT_pie(Menu):
 
 
 def shortcut(context: Context) -> bpy.types.KeyMapItem | None:
-    """The key that opens the pie menu, or None."""
+    """The key map item that opens the pie menu, or None."""
     config = context.window_manager.keyconfigs.user
     keymap = config.keymaps.get(_KEYMAP[0]) if config is not None else None
     items = keymap.keymap_items if keymap is not None else ()
@@ -56,7 +56,7 @@ class RISORIUS_OT_shortcut(Operator):
     def execute(self, context: Context) -> Result:
         config = context.window_manager.keyconfigs.user
         if config is None:
-            return {"CANCELLED"}  # there is none without a window
+            return {"CANCELLED"}  # there is no key configuration without a window
         keymap = config.keymaps.get(_KEYMAP[0])
         if keymap is None:
             keymap = config.keymaps.new(_KEYMAP[0], space_type=_KEYMAP[1])
@@ -71,7 +71,7 @@ class RISORIUS_OT_shortcut(Operator):
 
 
 def draw_preferences(layout: UILayout, context: Context) -> None:
-    """The pie menu's key. Args: layout, context  of the preferences."""
+    """Draw the key of the pie menu. Args: layout, context  of the preferences."""
     row, item = layout.row(), shortcut(context)
     row.operator("risorius.shortcut", icon="EVENT_F", depress=item is not None)
     if item is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers and reactions: their list, operators, menus."""
+"""Layers and reactions: lists, operators, menus and panel."""
 
 from . import lists, menus, operators, panel
 

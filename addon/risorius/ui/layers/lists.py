@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lists of the panel Layers: a line per layer, a line per fired reaction."""
+"""Lists of the panel Layers: one line per layer, one line per fired reaction."""
 
 from ...scene.animation import layer_properties, layers
 from ...scene.base.blender_types import ArmatureObject

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menus of the panel Layers: sources of a layer, reactions, specials."""
+"""Menus of the panel Layers: sources of a new layer, reactions, and further actions."""
 
 import bpy
 

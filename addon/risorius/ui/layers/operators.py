@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """Operators on the layers and the reactions of a face."""
 
@@ -28,7 +28,7 @@ class LayerOperator(FaceOperator):
 
     @staticmethod
     def place(controls: ArmatureObject) -> int:
-        """The place of the active layer, or of the highest one."""
+        """The index of the active layer, or of the highest layer if none is active."""
         place, count = controls.risorius_layers_index, len(layers.places(controls))
         if 0 <= place < count and not layers.places(controls)[place].removed:
             return place

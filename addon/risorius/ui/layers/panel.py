@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Layers."""
+"""The panel Layers: lists of layers and reactions, and settings of the active layer."""
 
 from ...logic.animation import layer_rules as logic
 from ...scene.animation import layer_mixing, layer_properties, layers

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live capture: choices, operators, panel; the range of a person in captures."""
+"""Live capture: settings, operators and panel; the capture range of a person."""
 
 from . import operators, panel, properties, range_operators, range_panel
 

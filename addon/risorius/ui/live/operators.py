@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of live capture: start and stop, record, neutral face, subject."""
+"""Operators of live capture: start, stop, record, neutral face, subject."""
 
 from collections.abc import Callable
 
@@ -74,7 +74,7 @@ class RISORIUS_OT_live_start(Operator):
 
 
 def _session(context: Context) -> sessions.Session:
-    """The capture of the active face, after poll has said that there is one. Raises: FaceError."""
+    """The capture of the active face. Raises: FaceError: no capture runs."""
     session = sessions.of(active_controls(context))
     if session is None:
         raise FaceError(_NOT_STARTED)
@@ -113,7 +113,7 @@ class RISORIUS_OT_live_record(_Running, Operator):
 
 
 class _Waiting(OperatorBase):
-    """Base of operators that need a waiting recording."""
+    """Base of operators on a recording that is not an action yet."""
 
     index: bpy.props.IntProperty(
         name="Recording", description="Number of the waiting recording", options={"SKIP_SAVE"}
@@ -129,7 +129,7 @@ class _Waiting(OperatorBase):
         return True
 
     def recording(self) -> recordings.Recording | None:
-        """The Recording that is meant, or None."""
+        """The recording with the number `index`, or None after an error report."""
         found = recordings.waiting()
         if not 0 <= self.index < len(found):
             self.report(
@@ -226,15 +226,15 @@ def _finish(
     context: Context,
     finish: Callable[[ArmatureObject, bpy.types.Scene], clip_actions.Report | None],
 ) -> bool:
-    """End a recording as an action.
+    """Convert a recording to an action and report it.
 
     Args:
-        operator: operator for the report.
-        context: has the face and the scene.
-        finish: called with both.
+        operator: operator that reports.
+        context: context with the face and the scene.
+        finish: function that converts; called with the face's armature and the scene.
 
     Returns:
-        Whether an action was made; otherwise the recording waits.
+        Whether an action was made; otherwise the recording is kept.
     """
     rig = face_rig(context)
     try:

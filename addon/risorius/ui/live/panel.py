@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Live Capture."""
+"""The panel Live Capture: connection, recording and received faces."""
 
 from ...logic.base import names
 from ...scene.live import capture, recordings, sessions
@@ -49,7 +49,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
 
 
 def _where(chosen: RISORIUS_PG_live) -> str:
-    """The address to type into the app."""
+    """A sentence with the address that the user types into the capture app."""
     if not chosen.everywhere:
         return words.say("Hears this computer only, at 127.0.0.1, port {port}.", port=chosen.port)
     address = capture.address() or words.say("this computer's address")
@@ -57,7 +57,7 @@ def _where(chosen: RISORIUS_PG_live) -> str:
 
 
 def _draw_waiting(layout: UILayout) -> None:
-    """The recordings that are no action yet."""
+    """Draw the recordings that are not actions yet."""
     for index, recording in enumerate(recordings.waiting()):
         box = layout.box()
         count = len(recording.take)

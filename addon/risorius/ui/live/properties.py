@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The user's settings of live capture."""
+"""The user's settings of live capture, stored with the window manager."""
 
 from typing import cast
 
@@ -87,12 +87,12 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_live:
-    """The user's settings."""
+    """The user's settings of live capture."""
     return cast(RISORIUS_PG_live, context.window_manager.risorius_live)
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The choices as scene/live/sessions.py takes them."""
+    """The settings in the form that scene/live/sessions.py needs."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of the capture range of a face: learn it, read it, write it, forget it."""
+"""Operators for the capture range of a face: learn, load, save, remove."""
 
 from pathlib import Path
 
@@ -38,12 +38,12 @@ class _Learns(FaceOperator):
         """Learn a range from a captured clip and store it with the active face.
 
         Args:
-            context: has the face.
-            clip: risorius.Clip of raw controls.
-            performance: True: the clip shows acting and not all extremes.
+            context: context with the face.
+            clip: clip of raw controls.
+            performance: True: the clip shows acting, which need not contain all extremes.
 
         Raises:
-            risorius.RisoriusError: the clip gives no range.
+            risorius.RisoriusError: no range can be learned from the clip.
         """
         found = native.part("ranges").learn(clip, performance=performance, most_gain=self.most_gain)
         range_properties.keep(face_controls(context), found)
@@ -142,7 +142,7 @@ class RISORIUS_OT_load_range(FaceOperator, Operator, ImportHelper):
 
 
 class _HasRange(FaceOperator):
-    """Base of operators that need a range."""
+    """Base of operators that need a face with a range."""
 
     baked_too = True
 

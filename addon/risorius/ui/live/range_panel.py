@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Capture Range: how far the controls of this person go in captures."""
+"""The panel Capture Range: the extreme values of each control that a person reaches in captures."""
 
 from ...logic.base import names
 from ...scene.animation import range_properties
@@ -10,7 +10,7 @@ from ..blender_types import Context, Panel, UILayout, UIList
 from ..common import FaceOnlyPanel, face_controls
 
 _PREFIX = "CTRL_expressions."
-# As risorius.ranges.learn gives them.
+# Reasons that risorius.ranges.learn gives for unused controls.
 _REASONS = (
     words.mark("gaze is an angle"),
     words.mark("hardly moves"),
@@ -82,7 +82,7 @@ class RISORIUS_PT_ranges(FaceOnlyPanel, Panel):
 
 
 def _draw_chosen(layout: UILayout, row: range_properties.RISORIUS_PG_range) -> None:
-    """The gain of the control that is selected, or why it is left alone."""
+    """Draw the gain of the selected control, or the reason why it is not stretched."""
     if row.used:
         gain = f"{1.0 / max(row.extreme - row.neutral, 0.01):.2f}"
         words.show(layout, words.say("Gain {gain}", gain=gain))

@@ -97,7 +97,7 @@ class RISORIUS_MT_face_layers(Menu):
     def draw(self, context: Context) -> None:
         layout = self.layout
         if active_controls(context) is None:
-            layout.operator("risorius.layer_add", icon="ADD")  # its tooltip says what lacks
+            layout.operator("risorius.layer_add", icon="ADD")  # its tooltip gives the reason
             return
         layout.menu("RISORIUS_MT_layer_add", icon="ADD")
         layout.operator("risorius.layer_remove", icon="REMOVE")
@@ -206,7 +206,7 @@ class RISORIUS_MT_face_about(Menu):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
-        # Blender's own operators have no words of ours.
+        # Blender's operators are not in our translation table.
         text = words.say("Preferences")
         layout.operator(
             "preferences.addon_show", text=text, icon="PREFERENCES", translate=False

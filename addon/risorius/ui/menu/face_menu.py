@@ -12,7 +12,7 @@ from ..blender_types import Context, Icon, Menu, UILayout
 from ..common import active_controls
 from . import entries
 
-_MODES = {"OBJECT", "POSE"}  # in edit mode Blender has a menu Face of its own
+_MODES = {"OBJECT", "POSE"}  # in edit mode Blender has its own menu Face
 _PARTS: tuple[tuple[type[Menu], Icon], ...] = (
     (entries.RISORIUS_MT_face_keys, "KEYINGSET"),
     (entries.RISORIUS_MT_face_sides, "MOD_MIRROR"),
@@ -31,7 +31,7 @@ class RISORIUS_MT_face(Menu):
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
-        if native.problem():  # only what may mend it is of use
+        if native.problem():  # only the submenu About can help
             layout.menu(entries.RISORIUS_MT_face_about.bl_idname)
             return
         layout.operator("risorius.frame_face", icon="ZOOM_SELECTED").instead = False
@@ -54,7 +54,7 @@ class RISORIUS_MT_face(Menu):
 
 
 def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
-    """The most frequent actions."""
+    """Draw the most frequent actions."""
     layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
     layout.operator("risorius.rest_others")
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
@@ -71,7 +71,7 @@ def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
 
 
 def draw_header(self: Menu, context: Context) -> None:
-    """The menu's name in the header. Args: self, context  of the header's menus.
+    """Draw the menu's name in the header. Args: self, context  of the header's menus.
 
     Blender's search also uses the names of the menus that contain an entry, so the name of the
     add-on finds every command.
@@ -87,7 +87,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take it away."""
+    """Remove the menu."""
     bpy.types.VIEW3D_MT_editor_menus.remove(draw_header)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mix Faces: choices, operators, panel."""
+"""Mix Faces: settings, operators and panel."""
 
 from . import operators, panel, properties
 

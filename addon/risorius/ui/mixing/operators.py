@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of Mix Faces: which faces, the preview, the file."""
+"""Operators of Mix Faces: add and remove faces, show the preview, write the file."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,10 +20,10 @@ from .properties import choices, follow, paths_of, shares_of
 
 
 def _not_mixed(own: Mapping[str, str]) -> list[str]:
-    """Sentences on pictures that are one face's own. Hair's are so by intent and get none.
+    """Sentences about textures that were not mixed, except hair, which is never mixed.
 
     Args:
-        own: names of pictures, each with the reason.
+        own: name of a texture -> reason.
     """
 
     def names(why: str) -> str:
@@ -64,7 +64,7 @@ def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
 
 
 class _Usable:
-    """Operators that need the native module."""
+    """Base of operators that need the native module."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -128,7 +128,7 @@ class RISORIUS_OT_mix_remove(Operator):
 
 
 class _Mixes(_Usable):
-    """Operators that need faces to mix."""
+    """Base of operators that need at least one face in the mix."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -184,7 +184,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         except (OSError, *native.user_errors()) as error:
-            # Of a parent that is gone, its name.
+            # The name of the missing file, if the file of a parent is missing.
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Mix Faces."""
+"""The panel Mix Faces: the faces with their shares, the preview and the file."""
 
 from pathlib import Path
 
@@ -19,8 +19,10 @@ class RISORIUS_PT_mix(FacePanel, Panel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Beside a face the panel is in Options, because one more section does not fit a laptop's
-        window."""
+        """Whether no face is active.
+
+        Otherwise the panel is in Options, because the tab has no room for it on a laptop's screen.
+        """
         return active_controls(context) is None
 
     def draw(self, context: Context) -> None:
@@ -41,8 +43,8 @@ def draw_mix(layout: UILayout, context: Context) -> None:
     """Draw the faces of the mix and its actions.
 
     Args:
-        layout: of a panel.
-        context: Blender context.
+        layout: layout of the panel.
+        context: context of Blender.
     """
     rows = choices(context).parents
     for index, parent in enumerate(rows):

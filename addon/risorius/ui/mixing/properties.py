@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Which faces are mixed, and how much of each; the preview follows."""
+"""The faces to mix and their shares; the preview follows changes."""
 
 from typing import cast
 
@@ -50,30 +50,30 @@ class RISORIUS_PG_mix(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_mix:
-    """The user's settings.
+    """The settings of Mix Faces.
 
     Args:
-        context: Blender context.
+        context: context of Blender.
     """
     return cast(RISORIUS_PG_mix, context.window_manager.risorius_mix)  # type: ignore[attr-defined]
 
 
 def paths_of(context: Context) -> list[str]:
-    """The files, absolute.
+    """The absolute paths of the DNA files to mix.
 
     Args:
-        context: Blender context.
+        context: context of Blender.
     """
     return [system_path(parent.path) for parent in choices(context).parents]
 
 
 def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]]]:
-    """Shares of the whole, and by region of the parents that have one there.
+    """The share of each face, and region -> index of a face -> its share of that region.
 
-    Where the shares of a region are more than 1 together, they are made to be 1.
+    If the shares of a region sum to more than 1, they are divided by their sum.
 
     Args:
-        context: Blender context.
+        context: context of Blender.
     """
     rows = list(choices(context).parents)
     regions: dict[str, dict[int, float]] = {}
@@ -86,10 +86,10 @@ def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]
 
 
 def follow(context: Context) -> None:
-    """Update the preview, if there is one, to the sliders.
+    """Update the preview, if it exists, to the shares of the sliders.
 
     Args:
-        context: Blender context.
+        context: context of Blender.
     """
     if parents.preview(context) is None:
         return
@@ -99,7 +99,7 @@ def follow(context: Context) -> None:
         try:
             parents.show(context, paths, shares, regions)
         except (OSError, *native.user_errors()):
-            parents.hide(context)  # a file is gone: buttons say so
+            parents.hide(context)  # a file is missing; the operators report it
 
 
 CLASSES = (RISORIUS_PG_mix_parent, RISORIUS_PG_mix)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing of See Why over the 3D view: solo and mute, the ramp of a heat map, correctives."""
+"""Draws over the 3D view: state of solo and mute, colours of a heat map, correctives."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ _BOX: Colour = (0.09, 0.09, 0.10, 0.86)
 _ON: Colour = (0.33, 0.62, 0.86, 1.0)
 _LINE: Colour = (0.75, 0.75, 0.75, 0.55)
 _ALERT: Colour = (0.72, 0.28, 0.06, 0.95)
-_STEPS = 48  # of the ramp
-_MOST = 9  # correctives that are drawn
+_STEPS = 48  # number of colours in the drawn ramp
+_MOST = 9  # largest number of drawn correctives
 
 
 def start() -> None:
-    """Start drawing."""
+    """Add the draw handler."""
     if not _handles:
         view = bpy.types.SpaceView3D
         _handles.append(view.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
 
 
 def stop() -> None:
-    """Stop drawing."""
+    """Remove the draw handler."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
 class _Pen:
-    """Draws in pixels of the region, sized for the interface's scale."""
+    """Draws boxes and text in pixels of the region, in sizes for the interface scale."""
 
     def __init__(self, context: Context) -> None:
         self.scale: float = context.preferences.system.ui_scale
@@ -68,7 +68,7 @@ class _Pen:
         batch.draw(self.flat)
 
     def text(self, text: str, x: float, y: float, colour: Colour = _WHITE) -> float:
-        """Write a line. Returns its width."""
+        """Draw a line of text. Returns its width in pixels."""
         blf.size(0, self.size)
         blf.color(0, *colour)
         blf.position(0, x, y, 0)
@@ -80,7 +80,7 @@ class _Pen:
         return float(blf.dimensions(0, text)[0])
 
     def cut(self, text: str, most: float) -> str:
-        """A name shortened with dots to fit."""
+        """A text that is shortened with dots to a width in pixels."""
         if self.width(text) <= most:
             return text
         while text and self.width(text + "...") > most:
@@ -99,7 +99,7 @@ def _draw() -> None:
         return
     pen = _Pen(context)
     gpu.state.blend_set("ALPHA")
-    # Start above the redo panel, which lies in this corner.
+    # Start above the redo panel, which is in this corner.
     x, y = 20.0 * pen.scale + _tools(context), 72.0 * pen.scale
     if shown is not None:
         y = _draw_ramp(pen, words.say(title(context, rig, shown)), shown, x, y)
@@ -116,7 +116,7 @@ def _tools(context: Context) -> int:
 
 
 def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> float:
-    """Draw the colours with their range. Returns: the next free height."""
+    """Draw the colours with their range in mm. Returns the next free height in pixels."""
     width, height, unit = 220.0 * pen.scale, 14.0 * pen.scale, pen.scale
     full = max(width, pen.width(text)) + 20 * unit
     pen.box(x - 10 * unit, y - 8 * unit, full, height + 48 * unit, _BOX)
@@ -132,11 +132,11 @@ def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> fl
 
 
 def look_in_words(context: Context, look: look_masks.Look) -> str:
-    """A sentence about solo and mute of a face.
+    """A sentence about the solo and mute state of a face.
 
     Args:
-        context: has the preferences.
-        look: the Look of the face.
+        context: context with the preferences.
+        look: solo and mute state of the face.
     """
     if look.solo:
         names = ", ".join(sorted(spoken(context, label) for label in look.solo))
@@ -162,7 +162,7 @@ def _draw_look(pen: _Pen, sentence: str, x: float, y: float) -> float:
 
 
 def _draw_graph(pen: _Pen, context: Context, rig: ArmatureObject, x: float, y: float) -> None:
-    """The control at the left, each corrective that it takes part in at the right."""
+    """Draw the chosen control on the left, and the correctives that depend on it on the right."""
     label, now = choices(context).control, present.of(rig)
     control = causes.control_of(rig, label)
     if control < 0 or now is None:

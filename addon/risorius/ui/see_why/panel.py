@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel See Why."""
+"""The panel See Why: solo and mute, causes of a vertex's motion, heat maps, correctives."""
 
 import bpy
 
@@ -14,8 +14,8 @@ from ..common import FaceOnlyPanel, face_controls, face_rig
 from .properties import choices
 from .spoken import spoken, title
 
-_ROWS = 10  # of a list
-# Whether the strongest correctives are asked for, a moment after a change.
+_ROWS = 10  # most rows of a list
+# True: a timer will compute the strongest correctives.
 _soon = session.value("see_why.panel.soon", False, ("load",))
 
 
@@ -51,7 +51,7 @@ def _draw_mutes(layout: UILayout, look: look_masks.Look) -> None:
         button = row.operator("risorius.mute", text=text, depress=kind in look.muted)
         button.kind, button.enable = kind, kind not in look.muted
     row = layout.row()
-    row.enabled = not look.is_whole  # there at all times: nothing moves when a control is alone
+    row.enabled = not look.is_whole  # always drawn, so that buttons do not move when solo starts
     row.operator("risorius.mask_renders", depress=look.in_renders).enable = not look.in_renders
 
 
@@ -95,7 +95,7 @@ def _draw_more(layout: UILayout, count: int) -> None:
 
 
 def _draw_cause(layout: UILayout, context: Context, cause: causes.Cause, most: float) -> None:
-    """A line: name, millimetres, its heat map, it alone."""
+    """Draw a cause: name, motion in mm, and buttons for its heat map and solo."""
     row, name = layout.row(align=True), spoken(context, cause.name)
     if cause.now:
         text = words.say("{name}  {now:.2f} mm", name=name, now=cause.now)
@@ -154,7 +154,7 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
 
 
 def _ask_soon() -> None:
-    """Compute the list when the hand rests for a moment: a drag shall not wait for it."""
+    """Compute the list 0.2 s later, so that a drag of a slider need not wait for it."""
     if not _soon.now:
         _soon.now = True
         bpy.app.timers.register(_ask, first_interval=0.2)
@@ -171,7 +171,7 @@ def _ask() -> None:
 
 
 def stop() -> None:
-    """Stop the requests."""
+    """Stop the timer."""
     if bpy.app.timers.is_registered(_ask):
         bpy.app.timers.unregister(_ask)
     _soon.now = False

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The operator What Moves This Vertex: the vertex is picked in the view, selected, or given by
-number."""
+"""The operator What Moves This Vertex.
+
+The vertex is clicked in the view, selected, or given by its number.
+"""
 
 from typing import cast
 
@@ -26,10 +28,16 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
     bl_options = {"REGISTER"}
 
     mesh: bpy.props.IntProperty(
-        name="Mesh", description="Its number in the file; -1: the active mesh", default=-1, min=-1
+        name="Mesh",
+        description="Number of the mesh in the file; -1: the active mesh",
+        default=-1,
+        min=-1,
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Its number; -1: the first that is selected", default=-1, min=-1
+        name="Vertex",
+        description="Number of the vertex; -1: the first selected vertex",
+        default=-1,
+        min=-1,
     )
 
     def execute(self, context: Context) -> Result:
@@ -109,7 +117,7 @@ def _redraw(context: Context) -> None:
 
 
 def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
-    """The active mesh of the face and its first selected vertex; -1 for none."""
+    """Index of the face's active mesh and of its first selected vertex; -1 for none."""
     item = context.object
     if item is None or item.type != "MESH" or parts.rig_of(item) != rig:
         return -1, -1
@@ -123,11 +131,11 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The face, its mesh and the vertex under the pointer; None without a face.
+    """The armature of the face, its mesh and the vertex under the cursor; None without a face.
 
     Args:
-        context: Blender context.
-        event: with the place of the pointer in the window.
+        context: context of Blender.
+        event: event with the place of the cursor in the window.
     """
     area = context.area
     if area is None:
@@ -149,7 +157,7 @@ def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int
     data = cast("bpy.types.Mesh", seen.data)
     mesh = causes.mesh_of(item)
     if len(data.vertices) != len(cast("MeshObject", item).data.vertices):
-        local = np.array(rig.matrix_world.inverted() @ where)  # subdivided: by place
+        local = np.array(rig.matrix_world.inverted() @ where)  # subdivided: find the nearest vertex
         return rig, mesh, causes.nearest(rig, mesh, local)
     local = seen.matrix_world.inverted() @ where
     corners = data.polygons[polygon].vertices

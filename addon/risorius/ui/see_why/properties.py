@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The settings of See Why, stored with the window."""
+"""The settings of See Why, stored with the window manager."""
 
 from collections.abc import Iterator
 from typing import cast
@@ -15,7 +15,7 @@ from ..blender_types import Context
 
 
 def _labels(_self: bpy.types.PropertyGroup, given: bpy.types.Context, typed: str) -> Iterator[str]:
-    """The sliders of the active face that have the typed words."""
+    """The sliders of the active face that match the typed words."""
     rig = parts.active_rig(cast(Context, given))
     live = runtime.of(rig) if rig is not None else None
     labels = live.labels if live is not None else ()
@@ -38,7 +38,7 @@ class RISORIUS_PG_why(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_why:
-    """The settings of See Why. Args: context Blender context."""
+    """The settings of See Why. Args: context  context of Blender."""
     return cast(RISORIUS_PG_why, context.window_manager.risorius_why)  # type: ignore[attr-defined]
 
 

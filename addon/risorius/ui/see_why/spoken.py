@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How See Why calls controls and correctives: in the words of the sliders' panel."""
+"""Titles of controls, correctives and heat maps, in the words of the panel Controls."""
 
 from functools import partial
 
@@ -9,14 +9,14 @@ from ...scene.see_why import heat
 from ..blender_types import Context
 from ..common import as_seen
 
-_PRODUCT = " x "  # between the factors of a corrective
+_PRODUCT = " x "  # separates the factors of a corrective
 
 
 def spoken(context: Context, name: str) -> str:
-    """A control's name in words, with left and right as in the panel of the sliders.
+    """The title of a control or corrective, with left and right as in the panel Controls.
 
     Args:
-        context: has the preferences.
+        context: context with the preferences.
         name: name of a control, or names of a corrective's factors.
     """
     swapped = as_seen(context)
@@ -29,8 +29,8 @@ def title(context: Context, rig: ArmatureObject, shown: heat.Heat) -> str:
     """The title of a heat map.
 
     Args:
-        context: has the preferences.
+        context: context with the preferences.
         rig: deforming armature of the face.
-        shown: its heat map.
+        shown: heat map of the face.
     """
     return heat.title(rig, shown, partial(spoken, context))

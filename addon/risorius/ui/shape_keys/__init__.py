@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a head's shape keys with pictures, before a rig is made from it."""
+"""Assigns a head's shape keys to controls, with pictures, before a rig is made from the head."""
 
 from . import curves, operators, panel
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Unknown curves of an imported file: assigning them, and saving the mapping."""
+"""Assigns unknown curves of an imported file to controls, and saves the mapping."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ..expressions import previews
 from . import shown
 from .operators import choice_items, fill_choices
 
-_MOST = 40  # lines that are drawn
+_MOST = 40  # largest number of drawn lines
 
 
 class _OfCurves(FaceOperator):
@@ -119,7 +119,7 @@ class RISORIUS_OT_save_curve_mapping(_OfCurves, Operator, ExportHelper):
         settings = {**found.settings, "mapping": "FILE", "mapping_file": self.filepath}
         try:
             done: Result = cast(Any, bpy.ops).risorius.import_animation(**settings)
-        except (RuntimeError, TypeError) as error:  # how Blender passes a report of it on
+        except (RuntimeError, TypeError) as error:  # Blender raises its error reports
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
         return done

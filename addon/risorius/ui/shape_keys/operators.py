@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that assign shape keys, save and load the assignments, and draw pictures of keys."""
+"""Operators that assign shape keys to controls, save and load assignments, and draw pictures."""
 
 from __future__ import annotations
 
@@ -36,22 +36,24 @@ WAYS = (
     ("OWN", "Control of Its Own", "A new control with the name of the key"),
     ("NOTHING", "Leave Out", "Leave the key out of the rig"),
 )
-_AT_ONCE = 6  # pictures after which the sidebar is drawn again
+_AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 
 EnumItem = tuple[str, str, str, int, int]
-# Items of the enum; Blender keeps no copy of their strings.
+# Items of an enum; Blender keeps no references to their strings.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
 class OfHead(OperatorBase):
-    """Base of all operators on the keys of a head."""
+    """Base of operators on the shape keys of a head."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the active object is a head whose keys can be assigned; otherwise set the
-        reason."""
+        """Whether the active object is a head whose keys can be assigned.
+
+        If not, the reason is set.
+        """
         if not usable(cls):
             return False
         if not shape_key_head.usable_head(context.active_object):
@@ -61,12 +63,12 @@ class OfHead(OperatorBase):
 
 
 def head_of(context: Context) -> MeshObject:
-    """The active object, after poll has said that it is a head. Args: context  any."""
+    """The active object, which poll requires to be a head. Args: context  context of Blender."""
     return cast(MeshObject, context.active_object)
 
 
 class Says(OfHead):
-    """Base of operators that assign a key."""
+    """Base of operators that assign a shape key."""
 
     key: bpy.props.StringProperty(
         name="Shape Key", description="Empty: the active one", options={"SKIP_SAVE"}
@@ -82,7 +84,7 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Store the assignment of the key. Args: context, value None: its name decides."""
+        """Store the assignment of the key. Args: context  of it, value  None: by its name."""
         item = head_of(context)
         name = self.key or shown.active_key(item)
         if name not in assigned.of(item).rows:
@@ -129,12 +131,12 @@ def _listed(_self: object, _context: object) -> Any:  # noqa: ANN401  stubs know
     return _items
 
 
-# Blender takes an icon's number in an item too, which its stubs do not know.
+# An enum item may contain the number of an icon, which Blender's stubs do not know.
 choice_items = _listed
 
 
 def fill_choices() -> None:
-    """Fill the enum with the existing pictures."""
+    """Fill the enum with the choices and their existing pictures."""
     _items[:] = [
         (
             choice.value,
@@ -264,7 +266,7 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.wait_beside()
-        self.use_choices = True  # drawn once for all heads, and last
+        self.use_choices = True  # sample pictures are drawn last, once for all heads
         return self.execute(context)
 
     def execute(self, context: Context) -> Result:

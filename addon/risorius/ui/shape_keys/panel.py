@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The panel Names of Shape Keys: the assignment of each key of a head, with its picture."""
+"""The panel Names of Shape Keys: each key of a head with its picture and assignment."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from ..expressions import previews
 from . import shown
 
 _ROWS = 5
-_PICTURE = 6.0  # lines that a picture is high
-_LITTLE = 2.0  # the same in the list
+_PICTURE = 6.0  # height of the large picture, in lines
+_LITTLE = 2.0  # height of a picture in the list, in lines
 # Heads with assignments whose pictures were started automatically.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
@@ -59,7 +59,7 @@ class RISORIUS_UL_shape_key_names(UIList):
         both = line.column(align=True)
         words.show(both, item.name)
         below = both.row(align=True)
-        # Blender's list takes clicks on its first line alone.
+        # Blender's list reacts to clicks on its first line only.
         below.alignment = "LEFT"
         is_open = not row.is_known and not row.is_said
         below.active = is_open or row.is_said
@@ -71,7 +71,7 @@ class RISORIUS_UL_shape_key_names(UIList):
         button.key = item.name
 
     def draw_filter(self, context: Context, layout: UILayout) -> None:
-        """Draw the filter of the list. Args: context, layout Blender's, below the list."""
+        """Draw the filter below the list. Args: context, layout  passed by Blender."""
         row = layout.row(align=True)
         row.prop(self, "filter_name", text="", icon="VIEWZOOM")
         row.prop(self, "only_unknown", text="", icon="QUESTION")
@@ -92,7 +92,7 @@ class RISORIUS_UL_shape_key_names(UIList):
 
         flags = [self.bitflag_filter_item if is_shown(name) else 0 for name in names]
         known = [name in rows and rows[name].is_known for name in names]
-        # Sort by names alone, so that an assignment does not move a row.
+        # Sort unknown names first, regardless of assignments, so that an assignment moves no row.
         ranked = sorted(range(len(names)), key=known.__getitem__)
         order = [0] * len(names)
         for place, index in enumerate(ranked):
@@ -146,7 +146,7 @@ def _draw_count(layout: UILayout, names: assigned.Names) -> None:
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
-    """Draw the active key: its picture beside the picture of its assignment, and the buttons."""
+    """Draw the active key's picture, the sample of its assignment, and buttons."""
     box = layout.box()
     pair = box.split(factor=0.5)
     _draw_picture(pair.column(align=True), picture, row.key)
@@ -179,7 +179,7 @@ def _icon(paths: Mapping[str, Path] | None, key: str) -> int:
 
 
 def _ask_once(mesh: int, sample: str) -> None:
-    """Begin to draw pictures that are not there, as soon as this is drawn."""
+    """Start to draw missing pictures once, after the panel is drawn."""
     if (mesh, sample) in _asked or bpy.app.background:
         return
     _asked.add((mesh, sample))
@@ -187,7 +187,7 @@ def _ask_once(mesh: int, sample: str) -> None:
 
 
 def _begin() -> None:
-    """Blender calls this outside of drawing."""
+    """Start the operator that draws pictures; a timer calls this, because panels must not."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.shape_key_pictures.poll():

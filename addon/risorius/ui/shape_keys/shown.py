@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words for assignments of shape keys, and the active key of a head."""
+"""Texts about assignments of shape keys, and the active key of a head."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .. import words
 
 
 def active_key(item: MeshObject) -> str:
-    """The name of the active shape key. Args: item  has keys."""
+    """The name of the active shape key. Args: item  mesh object with shape keys."""
     keys = parts.keys_there(item).key_blocks
     return keys[min(item.active_shape_key_index or 0, len(keys) - 1)].name
 
 
 def label_of_choice(choice: assigned.Choice) -> str:
-    """The searchable label of a choice. Args: choice one of assigned.choices."""
+    """The searchable label of a choice. Args: choice  one of assigned.choices."""
     if choice.kind == assigned.UNIT:
         return f"{choice.label} (ARKit)"
     if choice.kind == assigned.EXPRESSION:
@@ -30,12 +30,12 @@ def label_of_choice(choice: assigned.Choice) -> str:
 
 
 def tooltip_of_choice(choice: assigned.Choice) -> str:
-    """The tooltip of a choice in the user's language. Args: choice one of assigned.choices."""
+    """The tooltip of a choice in the user's language. Args: choice  one of assigned.choices."""
     return (bpy.app.translations.pgettext_tip(choice.does) or "") if choice.does else ""
 
 
 def becomes(row: assigned.Row) -> str:
-    """The assignment of a key in a few words. Args: row from assigned.of."""
+    """The assignment of a key in a few words. Args: row  from assigned.of."""
     if row.kind == assigned.EXPRESSION:
         own = _expressions().get(row.expression)
         label = words.say(own.label) if own is not None else row.expression
@@ -52,7 +52,7 @@ def becomes(row: assigned.Row) -> str:
 
 
 def who_knows(row: assigned.Row) -> str:
-    """A sentence about the source of an assignment. Args: row from assigned.of."""
+    """A sentence about the source of an assignment. Args: row  from assigned.of."""
     if row.holder:
         return words.say("{name} is that already: a control has one key.", name=row.holder)
     if row.is_said:
@@ -64,10 +64,10 @@ def who_knows(row: assigned.Row) -> str:
 
 
 def words_of_controls(controls: tuple[str, ...]) -> str:
-    """The words of a control; of several the ARKit unit that they are, or the first and a number.
+    """A short text for controls: one title, the equivalent ARKit shape, or the first and a number.
 
     Args:
-        controls: without prefix.
+        controls: names of controls without their prefix.
     """
     if len(controls) == 1:
         return slider_words.title(controls[0])
@@ -79,7 +79,7 @@ def words_of_controls(controls: tuple[str, ...]) -> str:
 
 
 def words_of_value(value: str) -> str:
-    """A choice in a few words. Args: value of an assigned.Choice, "" for left out."""
+    """A choice in a few words. Args: value  value of an assigned.Choice, "" for left out."""
     if not value:
         return words.say("Left out")
     choice = next((c for c in assigned.choices() if c.value == value), None)
@@ -87,17 +87,17 @@ def words_of_value(value: str) -> str:
 
 
 def value_of(row: assigned.Row) -> assigned.Said:
-    """The assignment of a key in the form of a file of names. Args: row from assigned.of."""
+    """The assignment of a key as a file of names stores it. Args: row  from assigned.of."""
     if row.expression:
         return f"@{row.expression}"
     return row.controls[0] if len(row.controls) == 1 else list(row.controls)
 
 
 def sample_of(row: assigned.Row) -> str:
-    """The choice that the sample man shows for a key, as assigned.Choice; "" for none.
+    """The value of the assigned.Choice whose picture the sample man shows for a key; "" for none.
 
     Args:
-        row: from assigned.of.
+        row: row of the key, from assigned.of.
     """
     if row.kind == assigned.EXPRESSION:
         return f"@{row.expression}" if row.expression in _expressions() else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speech: converting a sound file to movement of the face, and correcting it."""
+"""Speech: animates a face from a sound file, and corrects the result."""
 
 from . import correcting, install, operators, panel
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """Operators that correct the sounds, words and markers of a voice."""
 
@@ -23,24 +23,24 @@ _MOVED = "The markers were changed: choose Update Speech first."
 
 
 def voice_of(context: Context) -> bpy.types.Action | None:
-    """The action whose voice the panel shows, or None."""
+    """The action with the voice that the panel shows, or None."""
     return next(iter(voices.all_of(face_controls(context))), None)
 
 
 def are_moved(context: Context, action: bpy.types.Action) -> bool:
-    """Whether markers of a voice wait to be read.
+    """Whether the markers of a voice were changed and not yet applied.
 
     Args:
-        context: has the face and the scene.
-        action: with the voice.
+        context: context with the face and the scene.
+        action: action with the voice.
     """
     return spoken_markers.are_changed(context.scene, action)
 
 
 class _Corrects(FaceOperator):
-    """Base of all corrections: keys and markers follow, errors are sentences."""
+    """Base of all corrections, which update keys and markers and report errors as sentences."""
 
-    reads_markers = False  # it may be used while changed markers wait
+    reads_markers = False  # True: usable while changed markers are not applied
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -67,12 +67,12 @@ class _Corrects(FaceOperator):
         return {"FINISHED"}
 
     def _correct(self, context: Context, action: bpy.types.Action) -> None:
-        """Make the correction. Raises: SpokenError and others of the user's errors."""
+        """Make the correction. Raises: SpokenError and other errors that a user can mend."""
         raise NotImplementedError
 
 
 class _CorrectsSound(_Corrects):
-    """A correction at one sound of the list."""
+    """Base of corrections of one sound of the list."""
 
     place: bpy.props.IntProperty(
         name="Place",
@@ -102,12 +102,12 @@ class _CorrectsSound(_Corrects):
     def _corrected(
         self, sounds: Sequence[Sound], place: int, end: float
     ) -> tuple[list[Sound], int]:
-        """The new list, and the selected place in it. Raises: SpokenError."""
+        """The list after a correction at `place`, and the index to select. Raises: SpokenError."""
         raise NotImplementedError
 
 
 def _phoneme(text: str) -> str:
-    """Raises: SpokenError."""
+    """The phoneme for the name of a mouth shape or phoneme. Raises: SpokenError: unknown name."""
     name = spoken_markers.named(text)
     if name is None:
         raise SpokenError(
@@ -221,7 +221,7 @@ class RISORIUS_OT_speech_update(_Corrects, Operator):
     def _correct(self, context: Context, action: bpy.types.Action) -> None:
         scene, placing = context.scene, voices.placing(face_controls(context), action)
         if not spoken_markers.are_shown(scene, action):
-            spoken_keys.rebuild(action)  # a script may have written into the list
+            spoken_keys.rebuild(action)  # a script may have changed the list
             return
         for name in spoken_markers.take(scene, action, placing):
             text = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether speech can be used: the package it needs, and the button that installs it."""
+"""Installs the speech recognition package, and shows whether it is present."""
 
 import bpy
 
@@ -38,8 +38,7 @@ class RISORIUS_OT_install_speech(Operator):
 
 
 def offer(context: Context) -> None:
-    """Show a menu beside the pointer that names the missing package, with a button that installs
-    it."""
+    """Show a menu at the cursor with a button that installs the speech recognition package."""
 
     def draw(menu: Menu, _context: Context) -> None:
         _draw_button(menu.layout)
@@ -50,7 +49,7 @@ def offer(context: Context) -> None:
 
 
 def draw_preferences(layout: UILayout) -> None:
-    """Whether speech works, and the button that makes it work."""
+    """Draw whether speech recognition is installed, or the button that installs it."""
     if speech_task.has_recogniser():
         layout.label(text="Speak from Audio is ready.", text_ctxt=words.CONTEXT, icon="CHECKMARK")
         return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Speech: a sound file becomes movement of the face, and a strip that is heard with it."""
+"""The operator Speak from Audio: animates the face from a sound file and adds its sound strip."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ _MISSING = (
     "the add-on's preferences."
 )
 
-_FADE = 0.1  # seconds in which a voice's layer comes and goes
+_FADE = 0.1  # seconds for fading in and fading out a voice's layer
 
 
 class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
@@ -88,7 +88,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        if not speech_task.has_recogniser():  # before anybody chooses a file and types words
+        if not speech_task.has_recogniser():  # before the user chooses a file
             install.offer(context)
             self.report({"WARNING"}, words.say(_MISSING))
             return {"CANCELLED"}
@@ -121,7 +121,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             accents=self.use_accents,
             correctable=True,
             library=self._own or None,
-            # Made for these frames, not sampled at them: lips that meet shall meet on one.
+            # Animated at the scene's frame rate, not resampled, so that lips meet exactly on a
+            # frame.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = rig.session_uid
@@ -135,7 +136,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Speech was cancelled.")
 
     def finish(self, context: Context) -> Result:
-        """Put the result onto the face, which may have been deleted meanwhile."""
+        """Place the animation on the face, unless the face was deleted or is not active."""
         task = self._task
         try:
             if task.result is None:
@@ -166,7 +167,10 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of a voice's layer: it moves the face only while it sounds."""
+        """Settings of a voice's layer, which moves the face only during the sound.
+
+        Args: context  has the frame rate.
+        """
         fade = round(_FADE * clip_actions.frame_rate(context.scene))
         return {"extend": "NOTHING", "fade_in": float(fade), "fade_out": float(fade)}
 
@@ -175,7 +179,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             return
         try:
             clip_actions.add_sound(context.scene, self.filepath, self.start)
-        except ClipError as error:  # the face speaks all the same
+        except ClipError as error:  # the face keeps the animation
             self.report({"WARNING"}, explain(self.filepath, error))
 
     def draw(self, context: Context) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Speech: the sounds of a face's voice, for correction."""
+"""The panel Speech: the list of sounds of a face's voice, for correction."""
 
 from ... import native
 from ...scene.speech import spoken_keys, spoken_markers, spoken_properties, voices

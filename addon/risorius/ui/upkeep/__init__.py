@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces that are linked from other files or have lost parts."""
+"""Repairs faces that are linked from other files or have lost parts."""
 
 from . import operators
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators and words for faces that are linked from other files or have lost parts."""
+"""Operators and texts for faces that are linked from other files or have lost parts."""
 
 import bpy
 
@@ -23,7 +23,7 @@ SHAPES = (
 
 
 def override_trouble(rig: ArmatureObject | None) -> str:
-    """The reason why an override face does not move; empty for all others and for None."""
+    """The reason why a face with a library override does not move; "" for other faces."""
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences and buttons of the panel Face about problems that keep a face from moving."""
+"""Warnings and buttons of the panel Face about problems that keep a face from moving."""
 
 from ...scene.base import parts
 from ...scene.upkeep import applied_transforms, library_overrides, migrations, repair
@@ -9,14 +9,14 @@ from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, overri
 
 
 def draw_trouble(layout: UILayout, context: Context) -> bool:
-    """Draw sentences and buttons about problems that keep the active face from moving.
+    """Draw warnings and buttons about problems that keep the active face from moving.
 
     Args:
-        layout: of the panel.
-        context: has the active object.
+        layout: layout of the panel.
+        context: context with the active object.
 
     Returns:
-        Whether the panel is complete with this.
+        True: nothing else shall be drawn in the panel.
     """
     linked, active = library_overrides.linked_rig(context), parts.active_rig(context)
     shown = linked or active

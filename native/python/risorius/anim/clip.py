@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Control animation: named curves over time, for any character whose rig has these controls; and
-.rzc files of clips, read as a whole or in parts."""
+"""Clips: named control curves over time, and their .rzc files, read completely or in parts.
+
+A clip plays on every character whose rig has these controls.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,9 @@ from ..base import signatures
 from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
-_AT_ONCE = 4096  # frames
-# Limit for one read, even of a small file: 75 minutes of 1,000 controls at rest.
+_AT_ONCE = 4096  # frames that are resampled at a time
+# Largest result of one read, plus BYTES_PER_BYTE times the file's size: 75 minutes of 1,000
+# controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -45,12 +48,12 @@ class Clip:
         names: the controls, each once, usually in the spelling of a DNA's raw controls.
         curves: float32[controls, frames], contiguous and read-only. All bits are kept, including
             NaN, -0 and denormals.
-        rate: frames per second. For a clip with individual times it is the rate that tools should
-            offer.
+        rate: frames per second. For a clip with individual times, the rate that tools should
+            propose.
         start: seconds, the time of the first frame.
         times: float64[frames] in seconds, strictly ascending, or None: then frame i is at start + i
             / rate.
-        events: by ascending time.
+        events: events in the order of their times.
         metadata: facts about the clip, such as source, take and actor.
     """
 
@@ -65,11 +68,11 @@ class Clip:
         events: Iterable[Event] = (),
         metadata: Mapping[str, str] | None = None,
     ) -> None:
-        """Copy the arguments.
+        """Copy the arguments, which the class describes.
 
         Raises:
-            ValueError: a repeated name, a wrong shape, a rate that is not above 0, times that do
-                not ascend; the sentence says which.
+            ValueError: a repeated name, a wrong shape, a rate that is not above 0, or times that do
+                not ascend.
         """
         self.names: tuple[str, ...] = tuple(names)
         self.curves: Floats = _frozen(np.array(curves, np.float32, order="C"))
@@ -137,26 +140,26 @@ class Clip:
         return (self.frame_count - 1) / self.rate
 
     def frame_times(self) -> Times:
-        """float64[frames], seconds."""
+        """Times of all frames in seconds, float64[frames]."""
         if self.times is not None:
             return self.times
         return self.start + np.arange(self.frame_count) / self.rate
 
     def curve(self, name: str) -> Floats:
-        """float32[frames] of a control. Raises: KeyError."""
+        """The curve of a control, float32[frames]. Raises: KeyError: the clip lacks the control."""
         return self.curves[self._index[name]]
 
     def __contains__(self, name: str) -> bool:
         return name in self._index
 
     def sample(self, times: npt.ArrayLike) -> Floats:
-        """The curves at any times: linear between frames, constant before and after.
+        """The curves at any times, interpolated linearly between frames and constant outside.
 
         Args:
             times: seconds, [n], on the clip's own clock.
 
         Returns:
-            float32[n, controls]. The time of a frame gives exactly its bits.
+            float32[n, controls]. At the time of a frame the values equal that frame bit for bit.
         """
         wanted = np.atleast_1d(np.asarray(times, np.float64))
         count = self.frame_count
@@ -177,20 +180,21 @@ class Clip:
         return np.where(part == 0.0, here, here + (following - here) * part)
 
     def resampled(self, rate: float) -> Clip:
-        """The clip with `rate` frames per second, from its start to its end.
+        """The clip with evenly spaced frames at `rate` per second, from its first to its last time.
 
         Raises:
-            BudgetError: frames far apart would become more than a clip of this size may need.
+            BudgetError: long gaps between frames would give more frames than a clip of this size
+                may need.
         """
         count = self._even_count(rate, 1e-6)
         times = self.start + np.arange(count) / rate
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with evenly spaced frames at its own rate, from its first frame on.
+        """The clip with evenly spaced frames at its own rate, from its first time on.
 
         Raises:
-            BudgetError: as resampled.
+            BudgetError: see resampled.
         """
         count = self._even_count(self.rate, 0.5)
         start = float(self.frame_times()[0]) if self.frame_count else self.start
@@ -198,7 +202,7 @@ class Clip:
         return self.replaced(curves=curves, start=start, times=None)
 
     def _even_count(self, rate: float, rounding: float) -> int:
-        """The number of frames from the first to the last at a rate, if they fit the budget."""
+        """The number of frames at `rate` from the first to the last time. Raises: BudgetError."""
         frames = self.duration * rate
         budget = Budget.of(self.curves.nbytes + 8 * self.frame_count)
         each = 4 * len(self.names) + 8  # float32 of each control, and a time
@@ -219,7 +223,7 @@ class Clip:
         return f"frame {frame + 1} comes {step:g} s after frame {frame} at {self.times[frame]:g} s"
 
     def _sampled(self, times: Times) -> Floats:
-        """float32[controls, times]; in blocks of frames, to save memory."""
+        """The curves at many times, float32[controls, times]; sampled in blocks to save memory."""
         out = np.empty((len(self.names), times.size), np.float32)
         for first in range(0, times.size, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
@@ -227,13 +231,15 @@ class Clip:
         return out
 
     def selected(self, names: Sequence[str]) -> Clip:
-        """The clip with only these controls, in this order. Raises: KeyError."""
+        """The clip with only the named controls, in the order of `names`. Raises: KeyError."""
         rows = [self._index[name] for name in names]
         return self.replaced(names=names, curves=self.curves[rows])
 
     def replaced(self, **changes: object) -> Clip:
-        """The clip with other values for some attributes (names, curves, rate, start, times,
-        events, metadata)."""
+        """The clip with other values for some of its attributes.
+
+        These are names, curves, rate, start, times, events and metadata.
+        """
         values: dict[str, object] = {
             "names": self.names,
             "curves": self.curves,
@@ -249,7 +255,7 @@ class Clip:
         return Clip(**{**values, **changes})  # type: ignore[arg-type]
 
     def to_bytes(self) -> bytes:
-        """The clip as the bytes of a .rzc file, lossless."""
+        """The contents of a .rzc file with this clip, without loss."""
         return encode_clip(
             self.names,
             self.curves,
@@ -275,28 +281,29 @@ class Clip:
         frames: tuple[int, int] | None = None,
         controls: Sequence[str] | None = None,
     ) -> Clip:
-        """Read a .rzc file, or some of its frames or controls.
+        """Read a .rzc file, or only some of its frames or controls.
 
         Args:
             source: a path, or the bytes of a .rzc file.
-            frames: first and end (exclusive), from 0; None: all.
-            controls: names of curves, in the wanted order; None: all.
+            frames: first frame and end (exclusive), counted from 0; None for all.
+            controls: names of the curves to read, in the wanted order; None for all.
 
         Raises:
-            ClipError: not a .rzc file, cut, damaged, of another version, or it cannot be opened.
-            KeyError: an unknown control.
+            ClipError: not a .rzc file, truncated, damaged or of another version, or it cannot be
+                opened.
+            KeyError: the file lacks a control.
         """
         return ClipReader(source).read(frames, controls)
 
     def raw_controls(self, rig_names: Sequence[str]) -> tuple[Floats, list[str]]:
-        """The curves as input of a rig.
+        """The curves as input of `Rig.evaluate_batch`.
 
         Args:
             rig_names: `Rig.raw_control_names`.
 
         Returns:
-            float32[frames, rig_names], 0 for controls without a curve, for `Rig.evaluate_batch`;
-            and the names of curves that the rig lacks.
+            float32[frames, rig_names], 0 for controls without a curve, and the names of curves that
+            the rig lacks.
         """
         index = {name: i for i, name in enumerate(rig_names)}
         raw = np.zeros((self.frame_count, len(rig_names)), np.float32)
@@ -310,30 +317,33 @@ class Clip:
 
 
 class ClipReader:
-    """A .rzc file that is read in parts. Frames are decoded in blocks, and the last block stays in
-    memory compressed: for playing, read a few hundred frames at a time.
+    """Reads a .rzc file in parts.
+
+    Frames are decoded in blocks, and the last block stays in memory compressed. For playback, read
+    a few hundred frames at a time.
 
     Attributes:
-        names: the controls.
+        names: names of the controls.
         rate, start: as in a Clip.
-        has_times: the frames have individual times.
-        frame_count: frames in the file.
-        byte_count: bytes of the file that belong to the clip; smaller than the file only after a
-            recovery.
-        block_starts: the first frame of each block, and the frame behind the last.
+        has_times: whether each frame has its own time.
+        frame_count: number of frames in the file.
+        byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
+            a recovery.
+        block_starts: first frame of each block, and the number of frames.
         events, metadata: as in a Clip.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:
-        """Read the head and the index.
+        """Read the file's header and index.
 
         Args:
             source: a path, or the bytes of a file.
-            recover: also accept a file that was cut during recording, up to its last complete
-                block.
+            recover: True: also accept a file that was truncated during recording, up to its last
+                complete block.
 
         Raises:
-            ClipError: not a .rzc file, cut, damaged, of another version, or it cannot be opened.
+            ClipError: not a .rzc file, truncated, damaged or of another version, or it cannot be
+                opened.
         """
         if isinstance(source, bytearray | memoryview):
             source = bytes(source)
@@ -359,16 +369,16 @@ class ClipReader:
     def read(
         self, frames: tuple[int, int] | None = None, controls: Sequence[str] | None = None
     ) -> Clip:
-        """Frames begin to end - 1 of some controls, or of all.
+        """Read frames begin to end - 1 of the named controls, or of all.
 
         Returns:
             A clip that starts at the time of its first frame. It has the events within its time
-            span; the whole clip has all events.
+            span; a read of all frames has all events.
 
         Raises:
-            ClipError: frames that do not exist, a damaged block, or more frames at once than a file
-                of this size may have.
-            KeyError: an unknown control.
+            ClipError: frames that do not exist, a damaged block, or more frames than one read of a
+                file of this size may return.
+            KeyError: the file lacks a control.
         """
         begin, end = frames if frames is not None else (0, self.frame_count)
         if begin < 0 or end < begin or end > self.frame_count:

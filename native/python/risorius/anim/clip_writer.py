@@ -15,12 +15,11 @@ from .clip import Event
 
 
 class ClipWriter:
-    """Records a clip: frames go to PATH.part as they arrive, and close() renames it to PATH. If it
-    is not closed, the .part file stays: `ClipReader(part, recover=True)` reads it up to the last
-    complete block. As a context manager it closes at the end, but not after an exception.
+    """Records a clip to PATH.part frame by frame; close() renames it to PATH.
 
-        with ClipWriter("take.rzc", names, 60.0) as take:
-            take.append(frames)
+    A clip that was not closed stays as a .part file, which `ClipReader(part, recover=True)` reads
+    up to the last complete block. As a context manager, the writer closes at the end, but not after
+    an exception.
     """
 
     def __init__(
@@ -37,7 +36,7 @@ class ClipWriter:
         """Open a file for recording.
 
         Args:
-            has_times: each frame will have its own time.
+            has_times: True: each frame has its own time.
             block_frames: 1 to 4096. Small blocks lose less in a crash; large blocks take less
                 space.
 
@@ -58,7 +57,7 @@ class ClipWriter:
 
     @property
     def part(self) -> str:
-        """The file that holds the frames until the clip is closed."""
+        """The path of the file that holds the frames until the clip is closed."""
         return os.fspath(self._file.part)
 
     @property
@@ -70,11 +69,12 @@ class ClipWriter:
 
         Args:
             frames: float32[n, controls], or [controls] for one frame.
-            times: float64[n] in seconds, later than all before, if the clip has times.
+            times: float64[n], seconds, ascending and later than all earlier frames; only if
+                has_times.
 
         Raises:
             ClipError: times that do not ascend, a closed clip, a full disk.
-            ValueError: another shape.
+            ValueError: `frames` has another shape.
         """
         given = np.asarray(frames, np.float32)
         if given.ndim == 1:
@@ -83,7 +83,7 @@ class ClipWriter:
         self._file.append(given, own)
 
     def event(self, event: Event) -> None:
-        """Add an event; it is written together with the next frames."""
+        """Add an event, which is written together with the next frames."""
         self._file.event(event)
 
     def close(self) -> None:

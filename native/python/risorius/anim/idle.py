@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Idle life from a seed: blinks, saccades with following lids, and hardly visible movement.
+"""Idle movement from a random seed: blinks, saccades with lids that follow, and subtle motion.
 
-Randomness comes from the raw bits of PCG64, which NumPy keeps stable, and the rest from sums,
-products and quotients: the same blinks at the same times on every machine.
+Randomness comes from the raw bits of PCG64, which NumPy keeps stable; all other arithmetic is sums,
+products and quotients. So every machine makes the same blinks at the same times.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Doubles = npt.NDArray[np.float64]
 
 PREFIX = "CTRL_expressions."
 LOOKS = ("Left", "Right", "Up", "Down")
-# Movement at rest: control without side -> its highest value and the seconds between two turns.
+# Subtle motion: control without side -> highest value, and seconds between random values.
 MICRO = {
     "browRaiseIn": (0.07, 1.7),
     "browRaiseOuter": (0.05, 2.3),
@@ -30,12 +30,12 @@ MICRO = {
     "eyeSquintInner": (0.08, 1.3),
     "mouthCornerPull": (0.06, 2.1),
     "mouthCornerDepress": (0.04, 2.6),
-    "noseNostrilDilate": (0.09, 1.8),  # half a breath
+    "noseNostrilDilate": (0.09, 1.8),  # one value for half a breath
     "mouthPressU": (0.05, 2.9),
     "mouthPressD": (0.05, 2.9),
 }
 MICRO_JAW = ("jawOpen", 0.018, 1.5)
-# Directions of saccades and their frequencies: up, down and the sides about twice as often as
+# Directions of saccades (frequency, x, y): up, down and the sides are about twice as frequent as
 # diagonals (Lee, Badler & Badler 2002, Eyes Alive, table of measured directions).
 _DIAGONAL = 0.70710678
 _DIRECTIONS = (
@@ -55,14 +55,15 @@ class Life:
     """Parameters of idle life.
 
     Attributes:
-        blinks_per_minute: without double blinks and blinks of large saccades, which add about 2 a
-            minute. People have 17 at rest, 26 in talk, 4.5 when reading (Bentivoglio et al. 1997).
-        double_blinks: share of blinks that are followed by another one at once.
-        gaze: scales how far the eyes wander; at 0 they look straight ahead.
-        look_degrees: rotation of an eye by eyeLookLeft/Right and eyeLookUp/Down at 1.
-        lid_follow: share of a blink by which the upper lid follows a full look down, in addition to
-            the character's own look controls.
-        micro: scales the movement of brows, lids, nostrils, mouth and jaw at rest.
+        blinks_per_minute: blinks without double blinks and blinks of large saccades, which add
+            about 2 per minute. People blink 17 times at rest, 26 when talking, 4.5 when reading
+            (Bentivoglio et al. 1997).
+        double_blinks: share of blinks that a second blink follows at once, 0 to 1.
+        gaze: factor for the range of the gaze; 0 looks straight ahead.
+        look_degrees: degrees that an eye turns if eyeLookLeft/Right and eyeLookUp/Down are 1.
+        lid_follow: share of a full blink by which the upper lid follows a full look down; the
+            character's own look controls add to it.
+        micro: factor for the subtle motion of brows, lids, nostrils, mouth and jaw.
     """
 
     blinks_per_minute: float = 15.0
@@ -74,7 +75,7 @@ class Life:
 
 
 class Blink(NamedTuple):
-    """Times in seconds, and the closing of the lids in [0, 1]."""
+    """A blink: times in seconds, and `amount`, the closing of the lids from 0 to 1."""
 
     start: float
     close: float
@@ -90,7 +91,7 @@ class Blink(NamedTuple):
 
 
 class Saccade(NamedTuple):
-    """A jump of both eyes; angles in degrees, towards the face's own left and up."""
+    """A jump of both eyes; times in seconds, angles in degrees towards the face's left and up."""
 
     start: float
     duration: float
@@ -107,16 +108,16 @@ def idle(
     loop: bool = False,
     life: Life | None = None,
 ) -> Clip:
-    """A clip of a face at rest, for a layer below or above others.
+    """Make a clip of a face at rest, for a layer below or above others.
 
     Args:
         seed: 0 or more; the same seed gives the same clip.
         duration: seconds.
         rate: frames per second.
         start: seconds, the time of the first frame.
-        loop: make the last frame equal the first, for Layer(extend="repeat"); a loop under half a
-            minute is noticeable.
-        life: parameters of the movement.
+        loop: True: the last frame equals the first, for Layer(extend="repeat"); viewers notice a
+            loop under half a minute.
+        life: parameters of the movement; None for the defaults.
 
     Returns:
         A clip of raw controls, values in [0, 1], with an event "idle.blink" for each blink.
@@ -160,7 +161,7 @@ def idle(
     )
 
 
-# -- chance ----------------------------------------------------------------------------------------
+# -- random numbers --------------------------------------------------------------------------------
 
 
 class _Dice:
@@ -195,13 +196,13 @@ def _exp(x: float) -> float:
 def make_blinks(
     seed: int, length: float, life: Life, loop: bool, saccades: list[Saccade]
 ) -> list[Blink]:
-    """Blinks by ascending start; they do not overlap.
+    """Make blinks, sorted by start; they do not overlap.
 
     Args:
         seed: 0 or more; the same seed gives the same blinks.
         length: seconds to fill.
-        life: their frequency.
-        loop: the end must fit the beginning, so the eyes are open at both.
+        life: frequency of the blinks.
+        loop: True: the eyes are open at the start and the end.
         saccades: saccades of the same face; some of the large ones trigger a blink.
     """
     dice = _Dice(seed, 1)
@@ -239,8 +240,10 @@ def _blink(dice: _Dice, start: float) -> Blink:
 
 
 def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
-    """The closing of the left lid by a blink at times, in [0, 1]: down fast, up slower and
-    slower."""
+    """The closing of the left lid by a blink at some times, 0 to 1.
+
+    The lid closes fast and opens ever more slowly.
+    """
     t = np.asarray(times, np.float64) - blink.start
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)
     down, back = smooth_step(t / blink.close), smooth_step(up * (2.0 - up))
@@ -250,7 +253,7 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 def _close_lids(
     curves: dict[str, Doubles], times: Doubles, blinks: list[Blink], life: Life
 ) -> None:
-    """Combine blinks smoothly with lids that follow the gaze."""
+    """Set the lid controls of both sides from blinks and from the gaze, which the lids follow."""
     for side, sign in (("L", 0.0), ("R", 1.0)):
         closed = np.zeros(times.size)
         for blink in blinks:
@@ -268,13 +271,13 @@ def _close_lids(
 
 
 def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Saccade]:
-    """Saccades by ascending start; each begins where the last one ended.
+    """Make saccades, sorted by start; each begins where its predecessor ended.
 
     Args:
         seed: 0 or more; the same seed gives the same saccades.
         length: seconds to fill.
-        life: the range of the gaze; with a gaze of 0 there are none.
-        loop: the last one ends at the start of the first one.
+        life: range of the gaze; a gaze of 0 gives no saccades.
+        loop: True: the last saccade ends at the direction in which the first one starts.
     """
     if life.gaze == 0.0:
         return []
@@ -284,7 +287,7 @@ def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Sacc
     end = length - 0.4 if loop else length
     time = dice.uniform(0.2, 0.8)
     while time < end:
-        if dice.uniform() < 0.45:  # a small one during a fixation
+        if dice.uniform() < 0.45:  # a small saccade during a fixation
             after = _beside(dice, place, 0.35)
             pause = dice.lognormal(0.5, 0.5)
         else:
@@ -315,7 +318,7 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """Mostly back to the middle when away from it; otherwise anywhere, far places less often."""
+    """The next point to look at, in degrees: often near the middle if the gaze is far from it."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale
@@ -351,11 +354,11 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
     }
 
 
-# -- movement at rest ------------------------------------------------------------------------------
+# -- subtle motion ---------------------------------------------------------------------------------
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Both sides share most of the movement, like the two halves of a face."""
+    """Curves of subtle motion; both sides share three quarters of it."""
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (
@@ -369,13 +372,13 @@ def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[s
 
 
 def _raised(noise: Doubles) -> Doubles:
-    """[-1, 1] to [0, 1], mostly low, without a kink."""
+    """Map [-1, 1] smoothly to [0, 1], with mostly low values."""
     half = 0.5 + 0.5 * noise
     return half * half
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """In [-1, 1]: two octaves of cubic B-splines over random numbers, slow and without a period."""
+    """Slow noise in [-1, 1] without a period: two octaves of cubic B-splines."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

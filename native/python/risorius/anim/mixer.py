@@ -22,40 +22,42 @@ from .reactions import Exclusives, Reaction, load_exclusives, load_reactions
 Floats = npt.NDArray[np.float32]
 Points = tuple[npt.ArrayLike, npt.ArrayLike]
 
-# Curves with these prefixes are rotations in radians and not limited to [0, 1].
+# Curves with these prefixes are rotations in radians and are not clamped to [0, 1].
 _ROTATIONS = ("head.", "neck.", "eyeL.", "eyeR.")
 _NO_POINTS = (np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One layer of a Mixer. Times are in seconds of the scene, unless they are called clip times.
+    """One layer of a Mixer. Times are in seconds of the scene, except clip times.
 
     Attributes:
         source: a Clip; a pose as {control: value}; or the name of an expression.
-        name: for people.
+        name: name for display.
         blend: "override" blends to the layer's value by its weight (Blender: Replace), "additive"
-            adds weight * value (Blender: Add), "max" blends to the higher of the two values.
-        weight: in [0, 1]; or (times, values), linear between, constant outside.
+            adds weight * value (Blender: Add), "max" blends to the higher of both values.
+        weight: a number in [0, 1]; or (times, weights), linear between these times and constant
+            outside.
         mask: {region, control or pattern: weight}, see regions.mask; or float[controls] in [0, 1];
-            None: everything. Controls without a curve in the source are never changed.
-        start: start of the clip (or its clip_range), by default by the clip's own times; start of a
-            pose, by default always.
-        end: for a pose only; the end of a clip follows from its length, scale and repeat.
-        clip_range: (first, last) in clip time: the part to play, by default all.
-        scale: 2 plays half as fast.
-        repeat: number of times the part is played; need not be an integer.
-        reverse: plays it backwards.
+            None for all controls. Controls without a curve in the source never change.
+        start: scene time at which the clip (or its clip_range) or the pose starts; None: the clip's
+            own start, or always for a pose.
+        end: scene time at which a pose ends; the end of a clip follows from its length, scale and
+            repeat.
+        clip_range: first and last clip time to play; None for the whole clip.
+        scale: factor of the duration; 2 plays at half speed.
+        repeat: number of repeats; need not be an integer.
+        reverse: True: plays backwards.
         warp: (scene times, clip times), linear between; it replaces start, end, clip_range, scale,
             repeat and reverse. The layer lasts from the first to the last scene time; descending
             clip times play backwards.
-        extend: before its start and after its end the layer may "hold", "hold_forward" (only after
-            its end), be "nothing", or "repeat" for ever in both directions.
-        fade_in: seconds of a linear increase from 0 to full weight at its start.
-        fade_out: the same at its end. A layer that is held after a fade-out has weight 0, as in
-            Blender.
-        mute: leave it out.
-        solo: if any layer has it, only layers with it play.
+        extend: outside its time the layer may "hold" its first or last value, "hold_forward" (after
+            its end only), have no effect ("nothing"), or "repeat" for ever in both directions.
+        fade_in: seconds in which the weight grows linearly from 0 at the start.
+        fade_out: seconds in which the weight falls linearly to 0 at the end. A layer that is held
+            after a fade-out has weight 0, as in Blender.
+        mute: True: the layer does not play.
+        solo: if True for any layer, only layers with solo play.
     """
 
     source: Clip | Mapping[str, float] | str
@@ -91,15 +93,15 @@ class Layer:
 
 
 class Mixer:
-    """Mixes layers, reactions and rules of one face to its controls at a time.
+    """Mixes layers, reactions and rules of one face to its controls at any time.
 
     The result depends only on the time, the layers, and the fired reactions, so that any frame can
     be evaluated alone. native/clip/mixer/mixer.h documents the arithmetic; layers behave like
     Blender's NLA.
 
     Attributes:
-        names: the controls, in the order of evaluate's result.
-        reactions: by name, for fire.
+        names: names of the controls, in the order of the result.
+        reactions: reactions by name, for fire.
     """
 
     def __init__(
@@ -112,21 +114,21 @@ class Mixer:
         reactions: Mapping[str, Reaction] | None = None,
         max_fired: int = 256,
     ) -> None:
-        """A mixer for a list of controls.
+        """Make a mixer for a list of controls.
 
         Args:
-            names: e.g. Rig.raw_control_names; each once.
-            layers: bottom to top.
+            names: names of the controls, e.g. Rig.raw_control_names; each once.
+            layers: layers, the lowest first.
             ranges: limits of the values, {name: (low, high)} or float[names, 2]. Default: [0, 1],
                 and no limits for rotations of head and eyes ("head.yaw" ...).
             exclusives: rules of controls that exclude each other: None, "default", the path of a
                 TOML file such as risorius/anim/exclusives.toml, or the result of load_exclusives.
             reactions: available reactions; by default load_reactions().
-            max_fired: number of remembered firings; a new one then replaces the one that ended
+            max_fired: number of firings that are remembered; a new one replaces the one that ended
                 first.
 
         Raises:
-            ValueError: the sentence names the layer or reaction and its field.
+            ValueError: an invalid layer or reaction; the sentence names its field.
         """
         self.names = tuple(names)
         low, high = _limits(self.names, ranges)
@@ -152,8 +154,9 @@ class Mixer:
         self._set([(layer, self._curves(layer)) for layer in layers])
 
     def add(self, source: Layer | Clip | Mapping[str, float] | str, **settings: Any) -> int:
-        """Put a layer on top, e.g. add(clip, blend="additive"). Returns its index, from 0 at the
-        bottom.
+        """Add a layer above all others, e.g. add(clip, blend="additive").
+
+        Returns its index, from 0 at the bottom.
 
         Args:
             source: a layer, or the source of a new layer.
@@ -175,13 +178,13 @@ class Mixer:
         self.layers = tuple(layers)
 
     def remove(self, place: int) -> None:
-        """Take a layer away."""
+        """Remove the layer at index `place`, from 0 at the bottom."""
         layers = list(self.layers)
         del layers[place]
         self.layers = tuple(layers)
 
     def missing(self, place: int) -> list[str]:
-        """The names of a layer's curves without a control in this mixer."""
+        """The names of a layer's curves without a control in this mixer. Args: place  its index."""
         known = set(self.names)
         return [name for name in self._layers[place][0].clip().names if name not in known]
 
@@ -192,12 +195,12 @@ class Mixer:
         a running reaction again causes no jump.
 
         Args:
-            name: one of reactions.
-            time: seconds; may lie in the future.
-            strength: in [0, 1].
+            name: name of one of the reactions.
+            time: scene time in seconds; may be in the future.
+            strength: factor of the reaction, 0 to 1.
 
         Returns:
-            False, and nothing happens, if max_fired reactions have not ended by then.
+            False without effect, if max_fired reactions have not ended by `time`.
 
         Raises:
             KeyError: unknown reaction. ValueError: time or strength out of range.
@@ -223,17 +226,17 @@ class Mixer:
         return count
 
     def clear_fired(self) -> None:
-        """Forget all firings."""
+        """Remove all firings."""
         self._core.clear_fired()
 
     def evaluate(
         self, time: float, base: npt.ArrayLike | None = None, out: Floats | None = None
     ) -> Floats:
-        """The controls at a time.
+        """The controls at a scene time.
 
         Args:
-            time: seconds, of the scene.
-            base: float32[names] below the lowest layer, e.g. an animator's values; default 0.
+            time: scene time in seconds.
+            base: float32[names], values below the lowest layer, e.g. an animator's; default 0.
             out: a contiguous float32[names] for the result; may be base.
 
         Returns:
@@ -245,8 +248,8 @@ class Mixer:
         """The controls at many times; row n equals evaluate(times[n]).
 
         Args:
-            times: seconds, [n].
-            base: float32[names], or float32[n, names].
+            times: float[n], scene times in seconds.
+            base: float32[names] or float32[n, names], values below the lowest layer; default 0.
 
         Returns:
             float32[n, names], ready for Rig.evaluate_batch.
@@ -257,8 +260,8 @@ class Mixer:
         """The result of the mixer from start to end, as a clip of all its controls.
 
         Args:
-            start: seconds, of the first frame.
-            end: seconds; the last frame is there, or less than one frame earlier.
+            start: time of the first frame in seconds.
+            end: time in seconds; the last frame is at it, or less than one frame before.
             rate: frames per second.
         """
         count = max(math.floor((end - start) * rate + 1e-6) + 1, 0)
@@ -308,7 +311,7 @@ def _points(points: Points) -> Points:
 
 
 def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
-    """A layer in the form of the native mixer."""
+    """The settings of a layer as the native mixer expects them."""
     still = curves.frame_count < 2
     first, last = layer.clip_range or curves.range
     start, end = layer.start, layer.end

@@ -25,12 +25,12 @@ _Yield = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32], str, float]
 
 @dataclass(frozen=True)
 class ReactionPart:
-    """Controls that share one envelope; see Reaction."""
+    """Controls of a reaction with one envelope: delay, attack, hold and release in seconds."""
 
     weights: Mapping[str, float]
-    """By control, in [0, 1]: share of the way to 1, or to its upper limit if that is lower."""
+    """Control -> share of the way to 1 (or to its upper limit, if lower) at the peak, in [0, 1]."""
     delay: float = 0.0
-    """Seconds after the firing; the other times are in seconds too."""
+    """Seconds from the firing to the start of the attack."""
     attack: float = 0.1
     hold: float = 0.0
     release: float = 0.3
@@ -47,11 +47,11 @@ class Reaction:
 
     @property
     def duration(self) -> float:
-        """Seconds until everything is at rest again."""
+        """Seconds from the firing until all controls are at rest."""
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:
-        """The parts in the form of the native mixer, without unknown controls."""
+        """The parts as the native mixer expects them, without controls that the face lacks."""
         out = []
         for p in self.parts:
             there = {index[name]: weight for name, weight in p.weights.items() if name in index}
@@ -63,7 +63,7 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """While `by` are on, `of` are reduced: of *= 1 - amount * measure(by)."""
+    """A rule: active controls `by` multiply the controls `of` by 1 - amount * measure(by)."""
 
     name: str
     by: tuple[str, ...]
@@ -82,7 +82,7 @@ class Exclusives:
     """Pairs; the common amount is subtracted from both."""
 
     def rules_of(self, index: Index) -> tuple[list[_Yield], list[tuple[int, int]]]:
-        """The rules in the form of the native mixer, without unknown controls."""
+        """The rules as the native mixer expects them, without controls that the face lacks."""
 
         def there(names: tuple[str, ...]) -> npt.NDArray[np.uint32]:
             return np.array([index[name] for name in names if name in index], np.uint32)
@@ -96,7 +96,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
-        ValueError: with the file, the found and the expected value.
+        ValueError: invalid file; the text has the file, the found and the expected value.
     """
     table, where = _read(path, "reactions.toml")
     prefix = table.get("prefix", "")
@@ -108,7 +108,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
-        ValueError: with the file, the found and the expected value.
+        ValueError: invalid file; the text has the file, the found and the expected value.
     """
     table, where = _read(path, "exclusives.toml")
     prefix = table.get("prefix", "")
@@ -138,7 +138,7 @@ def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any]
 
 @cache
 def _own(file: str) -> dict[str, Any]:
-    """The package's own table, read only once because every new mixer needs it."""
+    """A table of the package; cached, because every new mixer needs it."""
     text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
     return toml.parse(text)
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A rig on a head without expressions, and a DNA file's own topology fitted to any head."""
+"""Transfers a rig to a head without expressions, and conforms the meshes of a DNA file to it."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Materials of template meshes: eyes, teeth and lashes of a template keep their textures."""
+"""Gives eyes, teeth and lashes that come from a template the textures of the template."""
 
 from __future__ import annotations
 
@@ -14,23 +14,25 @@ from ..base.reading import read_file
 from ..files.names import is_file_name
 
 _ROLES = ("color", "normal", "roughness")
-_MOST_BYTES = 1 << 28  # of a picture
+_MOST_BYTES = 1 << 28  # largest size of a texture file
 
 
 def lend_materials(
     parts: Sequence[FacePart], template: Dna, path: Path, own: Collection[str]
 ) -> None:
-    """Give the parts that come from a template their materials of the template.
+    """Give the parts that come from a template the materials of the template's meshes.
 
     Args:
-        parts: of the face; `source` of a part that comes from the template is the name of a
-            mesh of the template.
+        parts: parts of the face; `source` of a part that comes from the template is the name of
+            a mesh of the template.
         template: the face that the parts come from.
-        path: the file of the template. Textures lie beside it; a missing texture is left out.
-        own: sources of the head's own meshes, which may have names of template meshes.
+        path: the file of the template. Textures are read from its folder and from its texture
+            folder; a missing texture is left out.
+        own: sources of the head's own meshes; these parts are skipped, even if a mesh of the
+            template has the same name.
 
     Raises:
-        OSError: a texture that is there cannot be read.
+        OSError: a texture exists but cannot be read.
     """
     lent = _materials(template, path)
     for part in parts:
@@ -39,7 +41,7 @@ def lend_materials(
 
 
 def _materials(template: Dna, path: Path) -> dict[str, Material]:
-    """By the names of meshes."""
+    """The materials of the template by mesh name."""
     out: dict[str, Material] = {}
     read: dict[str, bytes | None] = {}
     for key, name in template.metadata.items():

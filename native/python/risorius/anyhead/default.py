@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The template where none is named: the sample person, built once and kept among the caches."""
+"""The default template: the sample person, which is built once and kept in the cache folder."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..files.caches import cache_folder
 from ..people import NoPeopleError, people
 from .errors import AnyHeadError
 
-_TEXELS = 64  # the pictures are not kept
+_TEXELS = 64  # texture size in pixels; small because the textures are deleted
 
 
 def default_template() -> Dna:
-    """The sample person as a face of blend shapes; built in half a minute when first asked for.
+    """The sample person as a face of blend shapes. The first call takes half a minute to build it.
 
     Raises:
-        AnyHeadError: the person's data are not on this machine; says how to get them.
+        AnyHeadError: the person's data are not on this machine; the message says how to get them.
         OSError: the cache cannot be written.
     """
     try:
@@ -34,7 +34,7 @@ def default_template() -> Dna:
         try:
             return load(path)
         except DnaError:
-            path.unlink()  # cut off by a full disk: it is made anew
+            path.unlink()  # incomplete, for example after a full disk: built again below
     if not package.is_fetched():
         raise AnyHeadError(
             "a template was expected: name a DNA file with expressions, or build the sample person "
@@ -55,7 +55,7 @@ def _quiet(_line: str) -> None:
 
 
 def _digest(package: ModuleType) -> str:
-    """Of the code that makes the person: another version makes another template."""
+    """Hash of the code that builds the person, so that a new version builds a new template."""
     out = hashlib.sha256()
     folder = Path(package.__path__[0])
     for path in sorted(folder.rglob("*")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Errors of putting a rig onto a head without expressions."""
+"""Errors of the transfer of a rig to a head without expressions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class AnyHeadError(RisoriusError):
 
 
 class Stopped(RisoriusError):  # noqa: N818  # nothing went wrong
-    """Whoever was told of the progress wants no more of it."""
+    """The progress function of the caller returned False."""
 
     code = "cancelled"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The template's skin laid onto a head, from landmarks to the last vertex."""
+"""Registers the skin of a template onto a head, beginning with landmarks."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from .transfer.template import Progress, TemplateFace
 
 @dataclass(frozen=True)
 class Laid:
-    """A template on a head.
+    """A template that was registered onto a head.
 
     Attributes:
-        points: float64[V, 3], the template's vertices.
-        trust: float64[V], 0 to 1: how sure the place of each is.
-        registered: None: the head has the template's own triangles.
+        points: float64[V, 3], positions of the template's vertices on the head.
+        trust: float64[V], 0 to 1: confidence in the position of each vertex.
+        registered: the registration; None: none was needed because the head has the template's
+            triangles.
     """
 
     points: Doubles
@@ -38,19 +39,20 @@ def lay(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Laid:
-    """Lay a template onto a head.
+    """Register a template onto a head.
 
     Args:
         face: the template.
-        target: the head, standing, cm.
-        found: its form and landmarks.
-        threads: 0: one for each core.
-        progress: told the share that is done, 0 to 1; False stops.
+        target: the head in cm, y up, the face towards +z.
+        found: the fitted model and landmarks of the head.
+        threads: number of threads; 0: one for each core.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        LandmarkError: the template has no face.
-        RegistrationError: nothing of the head near the template.
-        Stopped: progress said False.
+        LandmarkError: no face was found in the template.
+        RegistrationError: no surface of the head is near the template.
+        Stopped: `progress` returned False.
     """
     return lay_surface(face.surface, face.name or "the template", target, found, threads, progress)
 
@@ -63,20 +65,21 @@ def lay_surface(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Laid:
-    """Lay the skin of a face onto a head.
+    """Register the skin of a face onto a head.
 
     Args:
-        template: the skin, standing, cm.
-        name: what errors call it.
-        target: the head, standing, cm.
-        found: its form and landmarks.
-        threads: 0: one for each core.
-        progress: told the share that is done, 0 to 1; False stops.
+        template: the skin in cm, y up, the face towards +z.
+        name: name of the skin in error messages.
+        target: the head in cm, y up, the face towards +z.
+        found: the fitted model and landmarks of the head.
+        threads: number of threads; 0: one for each core.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        LandmarkError: the template has no face.
-        RegistrationError: nothing of the head near the template.
-        Stopped: progress said False.
+        LandmarkError: no face was found in the template.
+        RegistrationError: no surface of the head is near the template.
+        Stopped: `progress` returned False.
     """
     if np.array_equal(template.triangles, target.triangles):
         return Laid(target.points, np.ones(len(target.points)))

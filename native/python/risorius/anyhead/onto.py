@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A head without expressions gets those of a template: from meshes to a face of blend shapes.
+"""Transfers the expressions of a template to a head: from meshes to a face of blend shapes.
 
-parts -> standing -> laying -> transfer -> fittings, repair -> author's joining -> ShapeSet -> Dna
+The steps: standing, laying, transfer, fittings, repair, author's joining, ShapeSet, Dna.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ from .transfer.template import Floats, Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
-_JOINT = np.array([[0.0, -4.0, -6.0]])  # of the form of heads, whose 0 lies between the eyes
-# Shares of the work at whose ends the steps are.
+_JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
+# Progress after each step, 0 to 1.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
 
 
 @dataclass(frozen=True)
 class OntoOptions:
-    """How a head gets expressions.
+    """Options of the transfer of expressions to a head.
 
     Attributes:
-        strength: 0 to 1.5, what all expressions are multiplied with.
-        repaired: whether lids, lips and what lies in others are mended.
-        marks: landmarks that a person gave, in the space of the head's meshes.
-        wishes: what is said of the head and not guessed.
-        threads: 0: one for each core.
+        strength: factor of all expressions, 0 to 1.5.
+        repaired: whether lids and lips are closed, and skin is taken out of eyes and teeth.
+        marks: landmarks that the user placed, in the space of the head's meshes.
+        wishes: properties of the head that the user gave and that are not guessed.
+        threads: number of threads; 0: one for each core.
     """
 
     strength: float = 1.0
@@ -67,11 +67,11 @@ class Onto:
     """A head with expressions.
 
     Attributes:
-        shapes: the head, standing; its expressions are called as the template's controls, and
-            those of correctives by theirs with a + between.
-        landmarks: in the space that the meshes had.
-        joint: float64[3], the middle of the head, about which it nods.
-        notes: what was guessed and done, a sentence each; those of shape_face come beside.
+        shapes: the head, y up, face towards +z. An expression has the name of the template's
+            control; a corrective has the names of its controls, joined by +.
+        landmarks: the landmarks in the space of the input meshes.
+        joint: float64[3], position of the head joint, about which the head nods.
+        notes: sentences about guesses and steps, without the notes of shape_face.
     """
 
     shapes: ShapeSet
@@ -89,23 +89,24 @@ def onto(
     progress: Progress | None = None,
     say: Say | None = None,
 ) -> Onto:
-    """Puts the expressions of a template onto a head.
+    """Transfer the expressions of a template to a head.
 
     Args:
-        where: what errors call the head; its name is the face's.
-        parts: its meshes in one space; shapes of their own are left out.
-        unit: of their numbers as the format has it, "cm" or "m".
+        where: name of the head in error messages.
+        parts: the meshes of the head in one space; their own shapes are ignored.
+        unit: the unit of the head's file format, "cm" or "m".
         template: a face with expressions.
-        options: how strong they are, and what is known of the head.
-        progress: told the share that is done, 0 to 1; False stops.
-        say: told each step, a sentence.
+        options: options of the transfer; None: the defaults.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
+        say: receives a sentence at the beginning of each step.
 
     Raises:
-        AnyHeadError: meshes, a template or options that cannot be used.
-        LandmarkError: no face in the meshes, or landmarks that are missing.
-        RegistrationError: the template finds no place on the head.
-        ShapeFileError: the meshes make no head.
-        Stopped: progress said False.
+        AnyHeadError: the meshes, the template or the options cannot be used.
+        LandmarkError: no face was found in the meshes, or landmarks are missing.
+        RegistrationError: no surface of the head is near the template.
+        ShapeFileError: the meshes cannot be joined to a head.
+        Stopped: `progress` returned False.
     """
     o, tell = options or OntoOptions(), say or _silent
     notes = _own_shapes(parts)
@@ -145,7 +146,7 @@ def _mended(
     progress: Progress | None,
     tell: Say,
 ) -> dict[Pose, Doubles]:
-    """The same poses, repaired where that is wished."""
+    """The displacements of the poses, repaired unless the options forbid it."""
     if not o.repaired or not o.strength:
         return ways
     tell("closing lids and lips, taking skin out of eyes and teeth")
@@ -159,18 +160,18 @@ def _mended(
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:
-    """The face of blend shapes of what was made, as author.input.spec.read_face gives it.
+    """The head with expressions as a face of blend shapes, in the form of author.input.spec.Read.
 
     Args:
-        made: the head with expressions; it is used up.
-        template: whose board of controls the face gets.
-        where: what errors call the head.
+        made: the head with expressions; its shapes are changed.
+        template: the face whose GUI controls are copied.
+        where: name of the head in error messages.
 
     Raises:
         ArgumentError: no expression moves a vertex.
     """
     shapes = made.shapes
-    together = {  # a tongue that is not there meets no lip
+    together = {  # without correctives of controls that the head lacks, such as a tongue's
         name: delta
         for name, delta in take_combined(shapes).items()
         if set(name.split("+")) <= set(shapes.expressions)
@@ -191,10 +192,11 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
 
 
 def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
-    """float64[V, 3] by pose, the whole way of all its controls, of what transfer gives.
+    """float64[V, 3] by pose: the displacements with all controls of the pose at 1.
 
     Args:
-        ways: of controls alone, and what is left over of those of correctives.
+        ways: the result of `transfer`: for a control its displacements, for a corrective only its
+            own addition to them.
     """
     out = {}
     for pose in ways:
@@ -209,7 +211,7 @@ def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:
-    """The controls for hands of a template, as far as what they lead is there."""
+    """Copy the GUI controls of a template that drive raw controls of the face."""
     names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
     table = template.gui_to_raw
     led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]
@@ -228,7 +230,7 @@ def _copy_board(template: Dna, dna: Dna) -> None:
 
 
 def _place_head(dna: Dna, place: Doubles) -> None:
-    """The joint of the head where the head is, also in a mesh with a body below."""
+    """Move the head joint to a place; joints below it keep their positions."""
     joint = dna.joint_names.index("head")
     local = np.array(dna.neutral_joint_translations, np.float64)
     below = np.asarray(dna.joint_parents, np.int64) == joint

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a file that holds a head at rest."""
+"""Reads the meshes of a head at rest from an OBJ, glTF or FBX file."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def read_head(path: Path) -> tuple[list[HeadPart], str]:
         path: an OBJ, glTF, GLB or FBX file, or a folder of OBJ files, one for each mesh.
 
     Raises:
-        AnyHeadError: another kind of file, or a folder without OBJ files.
-        ShapeFileError: a file that cannot be used.
-        AnimationFileError: a file that is damaged.
+        AnyHeadError: the file is of another kind, or the folder has no OBJ files.
+        ShapeFileError: a file cannot be used.
+        AnimationFileError: a file is damaged.
         OSError: a file cannot be read.
     """
     if path.is_dir():
@@ -52,7 +52,8 @@ def read_head(path: Path) -> tuple[list[HeadPart], str]:
 
 
 def _obj_parts(path: Path) -> list[HeadPart]:
-    """The objects of an OBJ file; of one without objects, its islands by their materials."""
+    """The objects of an OBJ file as parts; a file with fewer than two objects is split only if
+    its islands have different materials."""
     mesh = read_obj(path)
     names, of_face = _objects(path)
     if len(names) < 2 or len(of_face) != len(mesh.faces):
@@ -70,7 +71,7 @@ def _welded(part: HeadPart) -> HeadPart:
 
 
 def _objects(path: Path) -> tuple[list[str], Ints]:
-    """The names of a file's objects, each once, and which of them each polygon belongs to."""
+    """The distinct names of a file's objects, and int64[F]: the object index of each polygon."""
     names: dict[str, int] = {}
     rows, own = [], ""
     data = io.BytesIO(read_file(path, MESH, found=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A template laid onto a head of any topology; the native registration and its options."""
+"""Registers a template onto a head of any topology: interface of the native registration."""
 
 from __future__ import annotations
 
@@ -19,51 +19,56 @@ Pair = tuple[int, Sequence[float]]
 
 
 class RegistrationError(RisoriusError):
-    """Surfaces, pairs or options that cannot be used, or nothing of the target near the start."""
+    """Surfaces, pairs or options cannot be used, or no surface of the target is near the start."""
 
     code = "registration"
 
 
 class StoppedError(RegistrationError):
-    """Progress said that the work shall end."""
+    """The progress function of the caller returned False."""
 
     code = "stopped"
 
 
 @dataclass(frozen=True)
 class RegisterOptions:
-    """How a registration is made."""
+    """Options of a registration."""
 
     mm: float = 10.0
-    """Millimetres of one unit of the template. The target is measured as if it were as large."""
+    """Millimetres per unit of the template. Lengths on the target are scaled to the template's size
+    before they are compared with limits in mm."""
     trusted: npt.NDArray[np.bool_] | None = None
-    """bool[V]: the vertex has a counterpart on a whole head. None: each that is in no cavity."""
+    """bool[V]: True for vertices with a counterpart on every head. None: all vertices outside
+    cavities."""
     mirrored: Ints | None = None
-    """int[V], the vertex of the other side, itself in the middle. None: no symmetry."""
+    """int[V]: the mirror vertex of each vertex, in the middle the vertex itself. None: no symmetry.
+    """
     symmetry: float = 0.0
-    """How much what one side finds counts for the other; 1: as much as what that finds itself."""
+    """Weight of the result of one side for the mirrored side; 1: the weight of its own result."""
     nodes: int = 2000
-    """Of the coarse steps."""
+    """Number of deformation nodes of the coarse steps."""
     noise: float = 2.0
-    """Millimetres by which points of pairs may be wrong."""
+    """Expected error of the points of pairs in mm."""
     threads: int = 0
-    """0: one for each core. The result does not depend on it."""
+    """Number of threads; 0: one for each core. The result does not depend on it."""
 
 
 @dataclass(frozen=True)
 class Registered:
-    """Where the vertices of a template lie on a target."""
+    """The positions of a template's vertices on a target."""
 
     points: Doubles
-    """float64[V, 3] in the unit of the target."""
+    """float64[V, 3]: vertex positions in the unit of the target."""
     triangle: npt.NDArray[np.int32]
-    """int32[V], of the target: the nearest one that looks the same way. -1: none."""
+    """int32[V]: the nearest triangle of the target with a similar normal, or the nearest triangle
+    of any direction if it is more than 0.5 mm closer. -1: none."""
     shares: Doubles
     """float64[V, 3], barycentric coordinates in the triangle."""
     distance: Doubles
-    """float64[V] from the target, in its unit."""
+    """float64[V]: distances from the target, in its unit."""
     trusted: npt.NDArray[np.bool_]
-    """bool[V]: the target has this vertex; others were carried along."""
+    """bool[V]: True for vertices with a counterpart on the target; others follow their neighbours.
+    """
 
 
 def register(
@@ -74,21 +79,22 @@ def register(
     start: Doubles | None = None,
     progress: Progress | None = None,
 ) -> Registered:
-    """Lay a template onto a target, in about a minute for 26,000 vertices.
+    """Register a template onto a target; 26,000 vertices take about a minute.
 
     Args:
-        template: of one head, without eyes and teeth.
-        target: a head of any topology; hair, a collar, holes and a body may be there.
-        pairs: vertices of the template with the points of the target that they belong to.
-        options: how.
-        start: float64[V, 3], the template brought near the target; None: what the pairs tell, at
-            least three that lie on no line.
-        progress: told the share that is done; False stops the work.
+        template: the skin of a head, without eyes and teeth.
+        target: a head of any topology; it may have hair, a collar, holes and a body.
+        pairs: vertices of the template and their points on the target.
+        options: options of the registration; None: the defaults.
+        start: float64[V, 3], the template's vertices near the target; None: computed from the
+            pairs, of which at least three must not lie on a line.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        RegistrationError: a value that is not finite, too few or too many triangles, pairs or
-            options that cannot be used, nothing of the target near the start.
-        StoppedError: progress said False.
+        RegistrationError: a value is not finite, there are too few or too many triangles, pairs or
+            options cannot be used, or no surface of the target is near the start.
+        StoppedError: `progress` returned False.
     """
     chosen = options or RegisterOptions()
     ended = False
@@ -117,7 +123,7 @@ def register(
 
 
 def _corners(surface: Surface) -> npt.NDArray[np.int32]:
-    """Corners as the native code takes them: what is no vertex becomes -1, which it refuses."""
+    """int32[T, 3]: corners for the native code; an invalid index becomes -1, which it refuses."""
     corners = np.asarray(surface.triangles).reshape(-1, 3)
     known = (corners >= 0) & (corners < len(surface.points))
     return np.where(known, corners, -1).astype(np.int32)

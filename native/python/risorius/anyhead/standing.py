@@ -18,10 +18,10 @@ from .errors import AnyHeadError
 from .form.standing import CHIN, TOP
 from .landmarks.find import Found, Hints, find_form
 from .landmarks.marks import LandmarkError, Landmarks
-from .landmarks.stand import inside_out, upright
 from .surface import Surface
 
 _FLAT = 1e-3  # of the longest side
+_SNAP = 20.0  # degrees
 _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 
@@ -73,7 +73,7 @@ def stand(
         notes.append("the polygons show their backs: they are turned")
     found.landmarks.require(where)
     found.require_lips(where)
-    turn = upright(found.pose.rotation)
+    turn = _upright(found.pose.rotation)
     factor, odd = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)
     if not np.array_equal(turn, np.eye(3)):
         looks, top = word_of(turn[2]), word_of(turn[1])
@@ -98,7 +98,7 @@ def stand(
 def _found(skin: Surface, hints: Hints) -> tuple[Found, bool]:
     """The form of a head, and whether its polygons are to be turned. What hangs on it may be
     turned where the head is not."""
-    if inside_out(skin):
+    if _inside_out(skin):
         try:
             return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints), True
         except LandmarkError:
@@ -158,3 +158,34 @@ def _stood(part: HeadPart, turn: Doubles, *, backwards: bool) -> HeadPart:
         [face[::order] for face in mesh.uv_faces],
     )
     return HeadPart(part.name, placed, {}, part.material, part.source, part.polygons)
+
+
+def _inside_out(surface: Surface) -> bool:
+    """Whether most triangles show their backs, as in a mirrored file.
+
+    Args:
+        surface: closed, or with openings that are small against the whole.
+    """
+    middle = surface.points[np.unique(surface.triangles)].mean(axis=0)
+    a, b, c = (surface.points[surface.triangles[:, k]] - middle for k in range(3))
+    return float(np.einsum("ti,ti->t", a, np.cross(b, c)).sum()) < 0
+
+
+def _upright(rotation: Doubles) -> Doubles:
+    """The rotation that makes a head stand, float64[3, 3].
+
+    A head within 20 degrees of the axes of its file keeps to these axes.
+
+    Args:
+        rotation: float64[3, 3], from the standing form to the head.
+    """
+    axes = np.zeros((3, 3))
+    for row, column in ((1, 1), (2, 2)):  # up, then front
+        way = rotation[:, column] * (1 - np.abs(axes).sum(axis=0))
+        at = int(np.abs(way).argmax())
+        axes[row, at] = np.sign(way[at])
+    axes[0] = np.cross(axes[1], axes[2])
+    cosine = (np.trace(axes @ rotation) - 1) / 2
+    if np.degrees(np.arccos(np.clip(cosine, -1, 1))) < _SNAP:
+        return axes
+    return np.asarray(rotation.T.copy())

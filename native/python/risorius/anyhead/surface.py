@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A surface of triangles: what is laid onto another, and what it is laid onto."""
+"""A triangle mesh with its normals, edges and border."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..author.geometry.skeleton import Doubles, Ints
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in any one unit, y up, the face towards +z, the character's left at +x."""
+    """Triangles in any unit, y up, the face towards +z, the character's left at +x."""
 
     points: Doubles  # [V, 3]
     triangles: Ints  # [T, 3], counter-clockwise seen from outside
 
     @staticmethod
     def of_polygons(points: Doubles, faces: Sequence[Sequence[int]]) -> Surface:
-        """Polygons cut into fans of triangles.
+        """A surface of polygons, which are split into fans of triangles.
 
         Args:
             points: float64[V, 3].
@@ -31,12 +31,12 @@ class Surface:
         return Surface(np.asarray(points, np.float64), np.array(fans, np.int64).reshape(-1, 3))
 
     def face_normals(self) -> Doubles:
-        """float64[T, 3]; its length is twice the area of the triangle."""
+        """float64[T, 3]: normals with twice the area of the triangle as length."""
         a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
         return np.cross(b - a, c - a)
 
     def normals(self) -> Doubles:
-        """float64[V, 3] of length 1, weighted by area; 0 at a vertex without a triangle."""
+        """float64[V, 3]: unit vertex normals, weighted by area; 0 at a vertex without triangles."""
         out = np.zeros_like(self.points)
         normals = self.face_normals()
         for k in range(3):
@@ -49,18 +49,18 @@ class Surface:
         return np.unique(self._sides(), axis=0)
 
     def border(self) -> npt.NDArray[np.bool_]:
-        """bool[V]: vertices of an edge that belongs to one triangle alone."""
+        """bool[V]: True for vertices of an edge that belongs to only one triangle."""
         edges, times = np.unique(self._sides(), axis=0, return_counts=True)
         out = np.zeros(len(self.points), bool)
         out[edges[times == 1]] = True
         return out
 
     def at(self, triangle: Ints, shares: Doubles) -> Doubles:
-        """float64[n, 3], points of the surface.
+        """float64[n, 3]: points on the surface.
 
         Args:
-            triangle: int[n].
-            shares: float64[n, 3], barycentric coordinates.
+            triangle: int[n], triangle of each point.
+            shares: float64[n, 3], barycentric coordinates in the triangle.
         """
         return np.einsum("nk,nkd->nd", shares, self.points[self.triangles[triangle]])
 

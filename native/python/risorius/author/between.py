@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a face is to do on the way to an expression, and what its joints do there."""
+"""The wanted positions at values between 0 and 1 of an expression, and the joints' errors there."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ SHARES = (0.25, 0.5, 0.75)
 
 
 class Ways:
-    """Where joints are at 1 and on the way there, of the face that is made and of its source: once
-    for all meshes.
+    """Motions of joints at 1 and at SHARES, of the new face and of its source, for all meshes.
 
     Attributes:
-        rest: float64[joints, 3], where all joints lie.
-        whole: float64[C, joints, 3, 4], how they move at 1.
-        made: the same at each of SHARES.
-        before: of the source's joints at each of SHARES.
+        rest: float64[joints, 3], neutral positions of all joints.
+        whole: float64[C, joints, 3, 4], motions with the input at 1.
+        made: share -> motions of the new face's joints.
+        before: share -> motions of the source's joints.
         turning: bool[C], whether an input moves joints of the source.
-        middles: float64[3], what an input's motion goes round.
+        middles: row of an expression -> float64[3], the pivot of its motion.
     """
 
     def __init__(self, work: Work) -> None:
@@ -47,7 +46,7 @@ class Ways:
 
 
 class Between:
-    """How far joints are off on the way to 1: from the line, or from the arc about a pivot."""
+    """The joints' errors at SHARES, measured from a line or from the arc about a pivot."""
 
     def __init__(self, ways: Ways, mesh: Mesh) -> None:
         self.ways = ways
@@ -55,19 +54,19 @@ class Between:
         self.weights = sk.dense_weights(mesh, len(ways.work.source.joint_names))
 
     def truth(self, row: int, wanted: Doubles, shares: Sequence[float]) -> list[Doubles]:
-        """float64[V, 3] of each share, what is added to the neutral positions.
+        """The wanted displacements float64[V, 3] at each share.
 
         Args:
-            row: the expression.
-            wanted: float64[V, 3], what it adds at 1.
-            shares: of the way, some of SHARES.
+            row: row of the expression.
+            wanted: float64[V, 3], its displacements at 1.
+            shares: values of the control, some of SHARES.
         """
         if not self.ways.turning[row]:
             middle = self.ways.middles.get(row)
             if middle is None:
                 return [share * wanted for share in shares]
             return [arc(self.positions, wanted, middle, share) for share in shares]
-        # Joints that were there go their own arc; what shapes do beside them is a line.
+        # Joints of the source follow their own arc. Blend shapes beside them follow a line.
         goal = self.positions + wanted
         whole = self.ways.work.motions[row]
         shape = sk.before_skin(goal, self.weights, whole) - self.positions
@@ -79,12 +78,12 @@ class Between:
         return out
 
     def largest(self, row: int, wanted: Doubles, skin: sk.Skin) -> float:
-        """How far the joints are off at most, at the shares, in the file's unit.
+        """The largest error of the joints at SHARES, in the file's unit.
 
         Args:
-            row: the expression.
-            wanted: float64[V, 3], what it adds at 1.
-            skin: the mesh on the joints of the face that is made.
+            row: row of the expression.
+            wanted: float64[V, 3], its displacements at 1.
+            skin: the mesh with its weights on the joints of the new face.
         """
         worst = 0.0
         for share, truth in zip(SHARES, self.truth(row, wanted, SHARES), strict=True):

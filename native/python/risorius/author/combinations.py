@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What joints do where expressions meet: their turns do not add up as shapes do.
+"""Solves the joint values of correctives, because turns of joints do not add up like blend shapes.
 
-The face of joints is to lie where the face of shapes lies with all controls of a corrective at 1.
-What its joints add there is solved at that pose (Gauss and Newton); blend shapes keep what they
-leave.
+With all controls of a corrective at 1, the face of joints must have the form of the face of shapes.
+The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes hold the
+remaining displacements.
 """
 
 from __future__ import annotations
@@ -22,30 +22,31 @@ from .geometry import skeleton as sk
 from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
-_STEPS = 3  # of Gauss and Newton
-_OFF_MM = 0.05  # vertices that are further off are solved for, others hold them
-_MOST_OFF, _MOST_HELD = 1500, 500  # of these, evenly
-_MOST_JOINTS, _LEAST_SHARE = 128, 2e-4  # that take part: of what is off, by the one that does most
+_STEPS = 3  # number of Gauss-Newton steps
+_OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
+_MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
+# Largest number of joints in a step, and smallest share of a joint relative to the strongest one.
+_MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
 _AXES = np.eye(3)
-_THREADS = 2  # more wait for the interpreter
+_THREADS = 2  # more threads would wait for the interpreter lock
 T = TypeVar("T")
 
 
 @dataclass
 class Combination:
-    """What is left of a corrective's pose on the finest meshes, mm."""
+    """The errors in a corrective's pose on the finest meshes, mm."""
 
     name: str
-    before: float  # largest, by joints without the corrective
-    joints_largest: float
-    largest: float  # with blend shapes
-    column: int = -1  # its input
+    before: float  # largest error of the joints without the corrective
+    joints_largest: float  # largest error of the joints with the corrective
+    largest: float  # largest error with blend shapes
+    column: int = -1  # index of its input
 
 
 class _Side:
-    """The face of shapes, or that of joints: where it lies with some inputs at 1."""
+    """The face of shapes or the face of joints, posed with some inputs at 1."""
 
     def __init__(self, dna: Dna, columns: int) -> None:
         self.dna, self.columns = dna, columns
@@ -53,7 +54,12 @@ class _Side:
         self.rest = np.linalg.inv(sk.world_matrices(dna, np.zeros_like(self.deltas[0])))
 
     def worlds(self, active: Sequence[int], extra: Doubles | float = 0.0) -> Doubles:
-        """float64[joints, 4, 4]."""
+        """float64[joints, 4, 4]: world matrices with inputs at 1.
+
+        Args:
+            active: inputs at 1.
+            extra: values added to the joints' attributes, float64[joints, 9].
+        """
         return sk.world_matrices(self.dna, self.deltas[list(active)].sum(axis=0) + extra)
 
     def motions(self, worlds: Doubles) -> Doubles:
@@ -61,7 +67,7 @@ class _Side:
 
 
 class _Skin:
-    """A mesh as both sides have it."""
+    """A mesh of both faces."""
 
     def __init__(self, before: Dna, after: Dna, mesh: Mesh, made: Mesh, columns: int) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
@@ -74,7 +80,7 @@ class _Skin:
         self.made_shapes = sk.column_shapes(after, made, columns)
 
     def hangs_on(self, first: int) -> bool:
-        """Whether a joint from this one on moves it."""
+        """Whether a joint with this or a larger index has a weight on the mesh."""
         return bool(self._made.weights[self._made.joints >= first].any())
 
     def goal(self, side: _Side, active: Sequence[int]) -> Doubles:
@@ -83,24 +89,24 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3] of the face of joints, before them."""
+        """float64[V, 3]: the face of joints with its blend shapes, before skinning."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
         )
 
     def made(self, shaped: Doubles, motions: Doubles) -> Doubles:
-        """float64[V, 3]: where the joints bring it."""
+        """float64[V, 3]: the skinned vertices of the face of joints."""
         return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
-        """float64[n, joints]: weights of some vertices."""
+        """float64[n, joints]: dense weights of some vertices."""
         out = np.zeros((len(at), self._count))
         np.put_along_axis(out, self._made.joints[at], self._made.weights[at], axis=1)
         return out
 
     def touched(self, joints: Ints) -> Ints:
-        """The vertices that hang on one of these joints."""
+        """Indices of the vertices on which one of these joints has a weight."""
         there = np.zeros(self._count, bool)
         there[joints] = True
         held = there[self._made.joints] & (self._made.weights > 0)
@@ -108,7 +114,7 @@ class _Skin:
 
 
 class Combinations:
-    """The correctives of a face, those of few controls first."""
+    """The correctives of a face, sorted by the number of their controls."""
 
     def __init__(self, work: Work, options: RigOptions) -> None:
         self.work, self.options = work, options
@@ -120,16 +126,16 @@ class Combinations:
         self.first = len(work.source.joint_names)
 
     def active(self, column: int) -> list[int]:
-        """Its controls, and the correctives that are 1 where they are, itself last."""
+        """The inputs at 1 in a corrective's pose: controls, smaller correctives, the corrective."""
         on = self.work.combined[column]
         smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
         return [*sorted(on), *smaller, column]
 
     def solve(self, tell: Callable[[float], None]) -> None:
-        """Joint values of all correctives, as one group more in the face of joints.
+        """Solve the joint values of all correctives.
 
         Args:
-            tell: gets the share that is done.
+            tell: gets the finished fraction of the work.
         """
         skins = self._skins(0)
         self._each(lambda column: self._solve_one(column, skins), tell)
@@ -137,11 +143,11 @@ class Combinations:
     def _each(
         self, work: Callable[[int], T], tell: Callable[[float], None] = lambda share: None
     ) -> list[T]:
-        """What is found for each corrective, in their order, by threads.
+        """Call a function for each corrective in threads. Returns the results in order.
 
         Args:
-            work: gets a corrective; may use what it found for those that this one reads.
-            tell: gets the share that is done; what it raises ends the work.
+            work: function of a corrective. When it runs, the smaller correctives are finished.
+            tell: gets the finished fraction; an exception that it raises ends the work.
         """
         out: list[T] = []
         pool = ThreadPoolExecutor(_THREADS)
@@ -155,7 +161,7 @@ class Combinations:
         return out
 
     def _waves(self) -> list[list[int]]:
-        """The correctives in their order, in runs of which none reads another."""
+        """The correctives in their order, divided into runs of independent correctives."""
         out: list[list[int]] = []
         for column in self.order:
             on = self.work.combined[column]
@@ -191,7 +197,7 @@ class Combinations:
         self._leave(column, active, rows, joints)
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
-        """Joints that do nothing that is seen take no part in a corrective."""
+        """Set the values of joints to 0 that move no vertex by least_effect_mm or more."""
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -203,8 +209,10 @@ class Combinations:
                 self.after.deltas[column, joint] = 0
 
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
-        """Vertices that joints do not bring where they belong, some that they do; and the new
-        joints that are asked to."""
+        """Choose the vertices and the new joints of a corrective's equations.
+
+        Returns: vertices with an error and some held vertices; indices of the joints.
+        """
         motions = self.after.motions(self.after.worlds(active))
         parts, found, errors = [], [], []
         for skin in skins:
@@ -228,7 +236,16 @@ class Combinations:
         return _Rows(goals, shapes, weights), joints
 
     def _step(self, joints: Ints, worlds: Doubles, rows: _Rows, left: Doubles) -> Doubles:
-        """float64[joints, 6]: shifts and rotation vectors in the parents' frames."""
+        """float64[joints, 6]: a Gauss-Newton step of shifts and rotation vectors.
+
+        Args:
+            joints: indices of the joints.
+            worlds: world matrices of all joints, float64[joints, 4, 4].
+            rows: the vertices.
+            left: remaining displacement of each vertex, float64[V, 3].
+
+        The step is in the frames of the joints' parents.
+        """
         count = len(joints)
         above = worlds[np.asarray(self.work.dna.joint_parents, np.int64)[joints]]
         places = np.linalg.inv(above) @ worlds[joints]
@@ -242,14 +259,14 @@ class Combinations:
         return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
-        """float64[new joints, 6, correctives]: what they add, in the order of `order`."""
+        """float64[new joints, 6, correctives]: values that the correctives add, in `order`."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
     def finish(self, lods: int) -> list[Combination]:
-        """Blend shapes for what joints leave, at so many levels; what is left then.
+        """Add blend shapes for the joints' errors, and return the errors of the finest meshes.
 
         Args:
-            lods: levels of the source.
+            lods: number of levels of the source.
         """
         work = self.work
         self.after = _Side(work.dna, self.columns)
@@ -315,7 +332,7 @@ class Combinations:
 
 @dataclass
 class _Rows:
-    """Vertices that a corrective's joints are solved for."""
+    """Vertices of a corrective's equations: goals, places before skinning, and weights."""
 
     goal: Doubles
     shaped: Doubles
@@ -325,34 +342,34 @@ class _Rows:
 def _equations(
     turns: Doubles, arms: Doubles, shaped: Doubles, held: Doubles, left: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Normal equations of small shifts and turns of joints, over vertices that hang on them.
+    """Normal equations of small shifts and turns of joints.
 
-    A joint moves a vertex by its weight times T (shift + turn x arm), and the arm is linear in the
-    vertex' place: so sums over vertices are ten moments of each pair of joints, and no matrix with
-    a row for each vertex is made.
+    A joint moves a vertex by weight * T (shift + turn x arm), and the arm is linear in the vertex'
+    place. So the sums over vertices reduce to ten moments for each pair of joints, and no matrix
+    with a row for each vertex is needed.
 
     Args:
-        turns: float64[J, 3, 3], from the parents' frames.
-        arms: float64[J, 3, 4], what gives the arm of a place.
-        shaped: float64[V, 3], the places.
+        turns: float64[J, 3, 3], rotations from the parents' frames to the world (T).
+        arms: float64[J, 3, 4], matrices from a place to the arm in the parent's frame.
+        shaped: float64[V, 3], places of the vertices before skinning.
         held: float64[V, J], weights.
-        left: float64[V, 3], where vertices have still to go.
+        left: float64[V, 3], remaining displacements.
 
     Returns:
-        float64[6 J, 6 J] and float64[6 J], by joint: shift, rotation vector.
+        Matrix float64[6 J, 6 J] and right side float64[6 J]; by joint: shift, rotation vector.
     """
     count, middle = len(turns), shaped.mean(axis=0)
     arms = arms.copy()
     arms[..., 3] += arms[..., :3] @ middle
     places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
-    # What a unit of a shift and of a turn does to a vertex, by each coordinate of its place.
+    # The displacement by a unit shift and a unit turn, for each coordinate of a vertex' place.
     moves = np.zeros((4, count, 6, 3))
     moves[3, :, :3] = turns.transpose(0, 2, 1)
     crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]
     moves[:, :, 3:] = crossed @ turns.transpose(0, 2, 1)
     flat = moves.reshape(4, -1, 3)
     normal, asked = np.zeros((6 * count, 6 * count)), np.zeros((count, 6))
-    part, weighted = np.empty_like(normal), np.empty_like(held)  # one memory for all that is added
+    part, weighted = np.empty_like(normal), np.empty_like(held)  # buffers, reused for all terms
     for k in range(4):
         asked += (moves[k] @ (held.T @ (places[:, k, None] * left))[..., None])[..., 0]
         for other in range(k, 4):

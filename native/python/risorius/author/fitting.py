@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints, weights and motions that repeat shapes; the native fit and its options."""
+"""The native fit of joints, weights and motions to expressions, and its options."""
 
 from __future__ import annotations
 
@@ -23,33 +23,34 @@ _IN_THE_MIDDLE = 0xFFFFFFFF  # kInTheMiddle of native/author/fit.h
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How a fit is made."""
+    """Options of a fit."""
 
-    joints: int = 120  # new ones
-    influences: int = 8  # joints of a vertex at most
-    smoothness: float = 1.0  # 0: only the error counts; 1: as smooth as Dem Bones' default
-    emphasis: float = 3.0  # how far the largest error is fought; 0: least squares alone
-    rounds: int = 40
-    symmetric: bool = True  # where the mesh is
-    threads: int = 0  # 0: all cores; the result does not depend on it
-    # A joint takes no part in an expression in which it moves no vertex so far, in the mesh' unit.
+    joints: int = 120  # number of new joints
+    influences: int = 8  # largest number of joints per vertex
+    smoothness: float = 1.0  # smoothness of weights; 0: only the error counts; 1: as Dem Bones
+    emphasis: float = 3.0  # weight of large errors; 0: least squares only
+    rounds: int = 40  # number of iterations
+    symmetric: bool = True  # symmetric joints if the mesh is symmetric
+    threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
+    # A joint takes no part in an expression if it moves no vertex by this distance, in the mesh'
+    # unit.
     least_effect: float = 0.0
-    # Of the second half of the rounds the one is kept whose largest error is the smallest; else of
-    # the last four.
+    # True keeps the round with the smallest largest error of the second half of the rounds. False
+    # keeps the best of the last four rounds.
     bound: bool = False
 
 
 def bounded(options: FitOptions) -> FitOptions:
-    """The same, with the largest error fought for several times as long."""
+    """The options with at least 200 rounds and `bound`, for a smaller largest error."""
     return replace(options, rounds=max(options.rounds, 200), bound=True)
 
 
 def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:
-    """Rotation vectors and shifts float64[E, J, 3] of rigid motions about the joints.
+    """Rotation vectors and shifts of the joints, both float64[E, J, 3], of rigid motions.
 
     Args:
         motions: float64[E, J, 3, 4].
-        positions: float64[J, 3] of the joints.
+        positions: float64[J, 3], positions of the joints.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
     return rotation_vectors(motions[..., :3]), moved - positions
@@ -67,21 +68,22 @@ def fit_joints(
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> JointFit:
-    """New joints beside those that are there, weights on all, motions of the new ones.
+    """Fit new joints beside given joints: their positions and motions, and weights of all joints.
 
     Args:
-        neutral: float64[V, 3]; the left side of the face is +x or -x, its middle x = 0.
-        displacements: float32[E, V, 3] of each expression at 1.
-        edges: uint32[n, 2] of the polygons.
-        given: float64[J, 3], joints that stay where they are.
-        motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
-        importance: float64[V], how much a vertex' squared error counts; None: all alike.
-        pivots: points that joints of some expressions are placed at.
-        options: how.
-        progress: told the share that is done; False stops the work, with a DnaError "stopped".
+        neutral: float64[V, 3], neutral vertices; the face's middle is x = 0.
+        displacements: float32[E, V, 3], displacements with each expression at 1.
+        edges: uint32[n, 2], edges of the polygons.
+        given: float64[J, 3], positions of the given joints.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
+            all expressions.
+        importance: float64[V], weight of a vertex' squared error; None: 1.
+        pivots: points at which joints of some expressions are placed.
+        options: options of the fit.
+        progress: gets the finished fraction; returns False to stop with DnaError "stopped".
 
     Raises:
-        DnaError: a value that is not finite, no motion at all, options out of their range.
+        DnaError: a value is not finite, nothing moves, or an option is out of range.
     """
     return _native.fit_joints(
         _shapes(neutral, displacements, edges, importance),
@@ -103,21 +105,22 @@ def fit_motions(
     at: Sequence[int | None],
     options: FitOptions | None = None,
 ) -> JointFit:
-    """What new joints do on a face of the same topology as the one that their weights are of.
+    """Fit positions and motions of new joints whose weights are known from another face.
 
     Args:
-        neutral: float64[V, 3].
-        displacements: float32[E, V, 3] of each expression at 1.
-        edges: uint32[n, 2] of the polygons.
-        given: float64[J, 3], joints that stay where they are.
-        motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
+        neutral: float64[V, 3], neutral vertices.
+        displacements: float32[E, V, 3], displacements with each expression at 1.
+        edges: uint32[n, 2], edges of the polygons.
+        given: float64[J, 3], positions of the given joints.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
+            all expressions.
         weights: float64[V, J + new joints].
-        pivots: points that joints may be placed at.
-        at: [new joints] the pivot of each; None: it lies in the middle of what it moves.
-        options: emphasis, threads and least_effect of it count.
+        pivots: points at which joints may be placed.
+        at: index of the pivot of each new joint; None: the middle of its vertices.
+        options: options of the fit; only emphasis, threads and least_effect are used.
 
     Raises:
-        DnaError: a value that is not finite, no motion at all, a joint or pivot that is not there.
+        DnaError: a value is not finite, nothing moves, or a joint or pivot does not exist.
     """
     settings = _settings(options, pivots)
     settings.joints = len(at)
@@ -142,21 +145,21 @@ def fit_weights(
     start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
-    """Weights of another mesh on joints that move as they do: a coarser level of detail.
+    """Fit weights of a mesh on joints with known motions, for example at a coarser level.
 
     Args:
-        neutral: float64[V, 3].
-        displacements: float32[E, V, 3].
-        edges: uint32[n, 2].
-        given: float64[J, 3], all joints.
-        motions: float64[E, J, 3, 4].
-        importance: as fit_joints.
+        neutral: float64[V, 3], neutral vertices.
+        displacements: float32[E, V, 3], displacements with each expression at 1.
+        edges: uint32[n, 2], edges of the polygons.
+        given: float64[J, 3], positions of all joints.
+        motions: float64[E, J, 3, 4], motions of all joints.
+        importance: float64[V], weight of a vertex' squared error; None: 1.
         mirrored: int64[J], the joint of the other side; None: found by place and motion.
-        start: float64[V, J], weights to begin with, such as those of the finer mesh.
-        options: influences, smoothness, symmetric and threads of it count.
+        start: float64[V, J], weights to start with, for example of the finer mesh.
+        options: options of the fit; only influences, smoothness, symmetric and threads are used.
 
     Raises:
-        DnaError: as fit_joints.
+        DnaError: as fit_joints().
     """
     return _native.fit_weights(
         _shapes(neutral, displacements, edges, importance),
@@ -202,7 +205,7 @@ def _weights(dense: Doubles) -> _native.FitWeights:
 
 
 def _rows(dense: Doubles) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
-    """Joints and weights [V, n] of dense rows [V, J], n the most of any vertex."""
+    """Joints and weights [V, n] of dense rows [V, J]; n is the largest number per vertex."""
     most = int((dense > 0).sum(axis=1).max(initial=0)) if dense.size else 0
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
     return joints.astype(np.uint32), np.take_along_axis(dense, joints, axis=1).astype(np.float32)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A face that moves by blend shapes made into one that moves by joints.
+"""Turns a face that moves by blend shapes into a face that moves by joints.
 
-Dna --columns, displacements--> fit --weights, joint groups--> Dna --what remains--> blend shapes
+Dna --columns, displacements--> fit --weights, joint groups--> Dna --errors--> blend shapes
 """
 
 from __future__ import annotations
@@ -45,26 +45,26 @@ from .work import (
     resting,
 )
 
-_EMPTY = 2.0  # groups by region may be so many times larger than those by what drives joints
+_EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
 
 
 @dataclass
 class JointRig:
-    """A face made of joints, and how near it comes to the one it was made from."""
+    """A face of joints, and its errors relative to the face of shapes."""
 
     dna: Dna
     new_joints: list[str]
-    errors: list[MeshErrors]  # of the meshes of all levels
+    errors: list[MeshErrors]  # errors of the meshes of all levels
     levels: list[Level]
-    height_mm: float  # of the largest mesh
-    deltas_before: int  # vertices times targets, at LOD 0
-    deltas_after: int
-    tolerance_mm: float | None  # beyond which blend shapes keep what joints leave; None: none do
-    raised: bool  # whether it is more than what was asked for: the deltas of the input were used up
-    columns: list[int]  # the input of each expression
-    combinations: list[Combination]  # correctives
-    reference: Reference  # what other people's faces take over
-    ended: str = ""  # why there are fewer levels than asked for
+    height_mm: float  # height of the tallest mesh
+    deltas_before: int  # number of blend shape deltas of the input at LOD 0
+    deltas_after: int  # number of blend shape deltas of the rig at LOD 0
+    tolerance_mm: float | None  # blend shapes correct larger errors of joints; None: no shapes
+    raised: bool  # whether the tolerance was raised to keep at most the input's number of deltas
+    columns: list[int]  # index of each expression's input
+    combinations: list[Combination]  # errors of the correctives
+    reference: Reference  # joints, weights and levels for other faces
+    ended: str = ""  # reason why there are fewer levels than requested, or ""
 
 
 def make_joint_rig(
@@ -73,22 +73,22 @@ def make_joint_rig(
     progress: Progress | None = None,
     like: Reference | None = None,
 ) -> JointRig:
-    """The same face with new joints that do what its blend shapes did.
+    """Replace the blend shapes of a face by new joints with the same motion.
 
-    Joints that are there keep their motions, controls and correctives keep their names and
-    meaning; skin weights, joint groups and blend shape targets are made anew.
+    Existing joints keep their motions. Controls and correctives keep their names and meaning. Skin
+    weights, joint groups and blend shape targets are replaced.
 
     Args:
-        dna: a face with blend shapes; it stays as it is.
-        options: how many joints, and what blend shapes keep.
-        progress: told the share that is done, 0 to 1; False stops.
-        like: of a joint rig of the same topology whose joints, weights and levels this face is to
-            have: only what they do is found, in a part of the time.
+        dna: a face with blend shapes; it is not changed.
+        options: options of the rig, such as the number of joints.
+        progress: gets the finished fraction, 0 to 1; returns False to stop.
+        like: reference of a joint rig of the same topology. The face gets its joints, weights and
+            levels, and only the motions are fitted, which takes less time.
 
     Raises:
-        DnaError: a value that is not finite, nothing that moves, or progress said False.
-        ValueError: no mesh, a joint that changes its size, no joint that rests, a face of another
-            topology than `like`.
+        DnaError: a value is not finite, nothing moves, or progress returned False.
+        ValueError: the face has no mesh, a joint changes its size, no joint rests, or the face has
+            another topology than `like`.
     """
     work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
     made.finish()
@@ -116,11 +116,11 @@ def make_joint_rig(
 
 
 def lighten(rig: JointRig, source: Dna) -> None:
-    """Leave out what makes a rig heavier than its input, and say in it what that costs.
+    """Remove the shortest deltas until a rig has at most as many as its input. Updates its errors.
 
     Args:
-        rig: of joints; it is changed.
-        source: the face of shapes that it is measured by.
+        rig: the joint rig; it is changed.
+        source: the face of shapes from which it was made.
     """
     found = within_deltas(rig.dna, source)
     rig.dna, rig.deltas_before, rig.deltas_after = found.dna, found.before, found.after
@@ -130,7 +130,7 @@ def lighten(rig: JointRig, source: Dna) -> None:
 
 
 def _take_errors(rig: JointRig, found: Lightened) -> None:
-    """What is off without the deltas that were left out, into the errors of a rig."""
+    """Add the errors by removed deltas to the errors of a rig."""
     dna, channels = rig.dna, channels_of(rig.dna)
     for errors in rig.errors:
         for row, column in enumerate(rig.columns):
@@ -149,12 +149,12 @@ def _take_errors(rig: JointRig, found: Lightened) -> None:
 
 
 def height_mm(dna: Dna) -> float:
-    """Of the head, as tolerances and errors are shares of it."""
+    """The height of the head in mm, to which relative tolerances and errors refer."""
     return _height(dna) * MM.get(dna.translation_unit, 10.0)
 
 
 def _height(dna: Dna) -> float:
-    """Of the tallest mesh of LOD 0; of a mesh without height its larger other side."""
+    """The height of the tallest mesh of LOD 0; the largest extent if all meshes are flat."""
     sizes = [
         np.ptp(np.asarray(dna.meshes[m].positions, np.float64), axis=0)
         for m in listed_meshes(dna, 0)
@@ -166,16 +166,16 @@ def _height(dna: Dna) -> float:
 def find_reference(
     dna: Dna, options: RigOptions | None = None, progress: Progress | None = None
 ) -> Reference:
-    """As make_joint_rig, of what other faces take over alone: quicker than the whole rig.
+    """Make only the reference of a joint rig, which is faster than make_joint_rig().
 
     Args:
-        dna: a face with blend shapes; it stays as it is.
-        options: how many joints there are to be.
-        progress: told the share that is done, 0 to 1; False stops.
+        dna: a face with blend shapes; it is not changed.
+        options: options of the rig, such as the number of joints.
+        progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        DnaError: as make_joint_rig.
-        ValueError: as make_joint_rig.
+        DnaError: as make_joint_rig().
+        ValueError: as make_joint_rig().
     """
     work, fit, made, _ = _made(dna, options or RigOptions(), progress, None, whole=False)
     return reference_of(work, fit, made)
@@ -189,13 +189,24 @@ def _made(
     *,
     whole: bool = True,
 ) -> tuple[Work, Joints, Made, dict[str, list[str]]]:
-    """Joints, what they do, and the meshes of all levels; whole: with shapes and errors."""
+    """Make the joints, their behaviour and the meshes of all levels.
+
+    Args:
+        dna: the face of shapes.
+        o: options of the rig.
+        progress: gets the finished fraction.
+        like: reference to reuse, or None.
+        whole: whether meshes get blend shapes and errors are measured.
+
+    Returns: the face with quantities computed from it, the joints, the meshes, names of joints by
+        region.
+    """
     o.lods.check()
     work = begin(dna)
-    wanted, work.wanted = work.wanted, {}  # which are large: not kept longer than they are needed
+    wanted, work.wanted = work.wanted, {}  # large arrays, so they are released early
     needs = {m for m in wanted if needs_joints(work, dna.meshes[m], wanted[m])}
     needs = {m for m in needs if not any(word in dna.mesh_names[m] for word in o.kept)}
-    if like is not None:  # what rests in the other face keeps its shapes here
+    if like is not None:  # meshes without joints in the reference keep their shapes
         needs = {m for m in needs if dna.mesh_names[m] in like.weights}
     if not needs & set(listed_meshes(dna, 0)):
         raise ArgumentError("no mesh of LOD 0 has a blend shape that an expression moves")
@@ -209,7 +220,7 @@ def _made(
     if o.tolerance_mm is None:
         o = replace(o, tolerance_mm=o.tolerance * height_mm(dna))
     if like is None:
-        # The fit is nearly all of the work; levels and weights take what is left of the bar.
+        # The fit takes most of the time, so it gets most of the progress.
         fit, weights = _new_joints(work, shaped, wanted, o, _part(progress, 0.0, 0.7))
     else:
         like.check(work)
@@ -237,7 +248,7 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Joints and dense weights of the finest meshes; parents and levels into the work."""
+    """Fit joints and dense weights of the finest meshes. Sets parents and levels in `work`."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)
@@ -251,7 +262,7 @@ def _new_joints(
 def _combine(
     work: Work, options: RigOptions, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
-    """What joints and shapes do where correctives fire."""
+    """Add joint values and blend shapes for the correctives. Returns their errors."""
     if not work.combined:
         return []
     found = Combinations(work, options)
@@ -261,7 +272,7 @@ def _combine(
             raise DnaError("stopped")
 
     found.solve(tell)
-    # One group again: what a joint does stands in one.
+    # One group for expressions and correctives, because all values of a joint must be in one group.
     before = len(work.source.joint_names)
     columns = sk.column_deltas(work.dna, sk.column_count(work.source))[work.columns, before:, :6]
     values = np.concatenate([columns.transpose(1, 2, 0), found.values()], axis=2)
@@ -272,12 +283,13 @@ def _combine(
 
 
 def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
-    """The same face with joint groups by region, or by what drives joints where these are far
-    smaller: a thousand correctives move a few joints of a region each.
+    """The face with joint groups by region, or by drivers if these are much smaller.
+
+    Groups by drivers are smaller if many correctives each move a few joints of a region.
 
     Args:
-        dna: a face; it stays as it is.
-        regions: names of joints by region.
+        dna: a face; it is not changed.
+        regions: region -> names of its joints.
     """
     out, by_region = regroup(dna, regions=regions, combinations=0, timed=0)
     other, by_drivers = regroup(dna, combinations=0, timed=0)
@@ -286,14 +298,14 @@ def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
 
 
 def _level_count(dna: Dna, options: LodOptions) -> int:
-    """How many levels are made. Networks and solvers list their own levels: those get no others."""
+    """The number of levels. A face with networks or solvers keeps its own number of levels."""
     own = max(1, dna.lod_count)
     fixed = len(dna.machine_learned_behavior.neural_networks) or len(dna.rbf_behavior.solvers)
     return own if fixed else max(own, options.count)
 
 
 def _jaw(work: Work) -> int | None:
-    """The joint that opens the mouth most, if there is one."""
+    """The joint that jawOpen moves most, or None."""
     opening = [e for e, name in enumerate(work.names) if name.endswith("jawOpen")]
     if not opening:
         return None
@@ -308,14 +320,14 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Which of the new joints each level has."""
+    """Choose the new joints of each level. Sets new, mirrored and heirs in `work`."""
     used = given(work)
     count = len(fit.joints) - len(used)
     budgets = joint_budgets(o.lods, work.levels, count)
     own = np.arange(count) + len(work.source.joint_names)
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
-    # What the joints of the neck carry counts as an expression here too, see level_weights.
+    # Shifts of the neck's joints count as expressions, see level_weights.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),
@@ -333,7 +345,7 @@ def _order_levels(
 
 
 def _mirrored_given(work: Work) -> dict[int, int]:
-    """Of each joint of the source that of the other side by its place, else itself."""
+    """Joint of the source -> joint at the mirrored place, or itself."""
     near = 1e-3 * np.ptp(work.positions, axis=0).max()
     out = {}
     for joint, place in enumerate(work.positions):
@@ -351,7 +363,7 @@ def _fit(
     options: FitOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """The fit of all meshes of the finest LOD together, and dense weights of each."""
+    """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh."""
     dna = work.source
     neutral = joined_positions(work, meshes)
     moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
@@ -399,7 +411,7 @@ def _pivots(
 
 
 def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[str]:
-    """Names of the new joints, by where they are and what moves them."""
+    """Names of the new joints, from their places and the expressions that move them."""
     dna = work.dna
     first = len(given(work))
     left = -1 if dna.coordinate_system[0] == "left" else 1
@@ -433,7 +445,7 @@ def _add_joints(work: Work, fit: Joints, names: list[str]) -> dict[str, list[str
 
 
 def _beside_parents(work: Work, fit: Joints) -> Doubles:
-    """float64[C, new joints, 3, 4]: what each new joint does beside what its parent does."""
+    """float64[C, new joints, 3, 4]: motion of each new joint relative to its parent's motion."""
     own = joint_motions(fit)[:, len(given(work)) :]
     parents = work.motions[:, work.parents]
     turns = np.swapaxes(parents[..., :3], -1, -2)
@@ -442,7 +454,7 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
 
 
 def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
-    """float64[new joints, 3]: the middle of what each moves; where it lies, if it moves nothing."""
+    """float64[new joints, 3]: weighted middle of each joint's vertices, or the joint's position."""
     rows = held**2
     total = rows.sum(axis=0)[:, None]
     middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)
@@ -450,7 +462,7 @@ def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Do
 
 
 def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
-    """float64[C, new joints]: how far each expression moves a vertex by each joint, mm."""
+    """float64[C, new joints]: largest displacement of a vertex by each joint alone, mm."""
     positions = joined_positions(work, meshes)
     moves = motions - np.eye(3, 4)
     out = np.zeros(motions.shape[:2])
@@ -470,10 +482,10 @@ def _add_behavior(
     regions: dict[str, list[str]],
     options: RigOptions,
 ) -> None:
-    """A joint group of the new joints, which regroup makes into dense ones by region."""
+    """Add a joint group of the new joints, and divide it into dense groups by region."""
     dna = work.dna
     before = len(work.source.joint_names)
-    # In the parent's frame: its rest matrix carries what is done beside it over.
+    # Transform the motions relative to the parents into the parents' neutral frames.
     frames = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     whole = np.zeros((*motions.shape[:2], 4, 4))
     whole[..., :3, :], whole[..., 3, 3] = motions, 1
@@ -499,10 +511,10 @@ def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGr
     Args:
         work: the face.
         values: float64[new joints, 6, columns].
-        columns: the inputs.
+        columns: indices of the inputs.
     """
     count = len(values)
-    # Joints of the coarsest level first: a level is then the beginning of the rows.
+    # Joints of the coarsest level come first, because a level uses the first rows of a group.
     last = np.array([sum(joint in level for level in work.new) for joint in range(count)])
     order = np.argsort(-last, kind="stable")
     rows = values[order].reshape(6 * count, -1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The triangles of coarser levels of detail, and where they end: before the picture breaks."""
+"""Makes the triangles of coarser levels of detail, and stops before the skin looks broken."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from .geometry.skeleton import Doubles, Ints
 from .levels import LodOptions, mesh_budget, vertex_budgets
 from .work import Work, listed_meshes
 
-_POSES = 6  # the expressions that move most, looked at beside the face that rests
-_LOOKED_AT = 2000  # vertices of the fine skin
-# What a level may have: distances are shares of the skin's size.
+_POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
+_LOOKED_AT = 2000  # number of checked vertices of the fine skin
+# Limits of a level. Largest distances from the fine skin, as fractions of the skin's size.
 _RMS, _FARTHEST = 0.005, 0.015
-_SLIVERS, _LONG = 0.02, 30.0  # triangles that are so many times as long as high
-_FOLDS, _FOLDED = 0.03, -0.5  # edges, and the cosine of 120 degrees
+_SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
+_FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees
 
 
 @dataclass
 class LevelMeshes:
-    """Triangles of each level that is made, in layouts of the fine meshes.
+    """Triangles of each coarser level, as layouts of the fine meshes.
 
     Attributes:
-        count: levels, those of the source too.
-        triangles: by level and mesh of the source; a mesh that is not there is left out.
-        ended: why there are no more, or "".
+        count: number of levels, including levels of the source.
+        triangles: (level, mesh of the source) -> triangles; a level lacks missing meshes.
+        ended: reason why there are no more levels, or "".
     """
 
     count: int
@@ -40,17 +40,17 @@ class LevelMeshes:
 def level_meshes(
     work: Work, wanted: Mapping[int, Doubles], options: LodOptions, levels: int
 ) -> LevelMeshes:
-    """Coarser meshes of the finest level's, level after level.
+    """Simplify the meshes of the finest level for each coarser level.
 
-    Where no numbers of vertices were given, the levels end before one on whose skin triangles are
-    slivers, neighbours fold over 120 degrees or the surface leaves the fine one, at rest or in the
-    expressions that move most.
+    If the options give no vertex budgets, the levels end before the skin of a level looks broken:
+    it has too many slivers, edges folded by more than 120 degrees, or a large distance from the
+    fine skin. The neutral pose and the expressions with the largest motion are checked.
 
     Args:
         work: the face.
-        wanted: float64[E, V, 3] of each mesh of the source, what it is to do.
+        wanted: mesh of the source -> displacements float64[E, V, 3].
         options: the budgets.
-        levels: how many there are to be at most.
+        levels: largest number of levels.
     """
     source = work.source
     had = max(1, source.lod_count)
@@ -58,7 +58,7 @@ def level_meshes(
            for lod in range(had)]  # fmt: skip
     budgets = vertex_budgets(options, levels, own)
     fine = listed_meshes(source, 0)
-    # Hair may have more vertices than the skin; nothing has more to do.
+    # The skin is the mesh with the largest motion. Hair may have more vertices.
     skin = max(fine, key=lambda m: float(np.vdot(wanted[m], wanted[m])))
     out, check = LevelMeshes(min(levels, had)), _Skin(source.meshes[skin], wanted[skin])
     attributes: dict[int, Floats] = {}
@@ -85,7 +85,7 @@ def level_meshes(
 
 
 class _Skin:
-    """The mesh that moves most: its largest piece, at rest and in some expressions."""
+    """The largest piece of the mesh with the largest motion, at rest and in some expressions."""
 
     def __init__(self, mesh: Mesh, wanted: Doubles) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
@@ -100,14 +100,14 @@ class _Skin:
         self.poses = [self.positions, *(self.positions + wanted[e] for e in most)]
         fine = self.places[fan_triangles(mesh)]
         self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
-        # A mesh may have slivers and folds of its own, as rims of lids have.
+        # The fine mesh may already have slivers and folds, for example at the rims of lids.
         self.had = [shape_of(points, self.fine) for points in self.poses]
 
     def wrong(self, triangles: Ints | None) -> str:
-        """What is wrong with a level's skin; "" where nothing is.
+        """The fault of a level's skin as text; "" if there is none.
 
         Args:
-            triangles: int64[n, 3] in layouts, None: it was left out.
+            triangles: int64[n, 3] as layouts; None if the level has no skin.
         """
         if triangles is None:
             return "no skin"
@@ -133,7 +133,7 @@ class _Skin:
 
 
 def shape_of(points: Doubles, triangles: Ints) -> tuple[float, float]:
-    """Shares of triangles that are slivers, and of edges whose two sides fold over 120 degrees.
+    """The fractions of triangles that are slivers, and of edges folded by more than 120 degrees.
 
     Args:
         points: float64[V, 3].

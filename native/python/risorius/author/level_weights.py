@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weights of a mesh on the joints of a level, whose motions are known by then."""
+"""Fits the weights of a mesh on the joints of a level. The joints' motions are already known."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .work import (
     resting,
 )
 
-# Half the way counts so many times beside the whole, for expressions that go along an arc.
+# Weight of a displacement at the value 0.5 relative to the value 1, for expressions along an arc.
 _HALVES = 1.5
 
 
@@ -37,18 +37,18 @@ def level_weights(
 ) -> Doubles:
     """float64[V, joints]: weights on the joints of a level.
 
-    Beside the expressions, what each of the joints that rest carries is asked for as if it were
-    one: the neck shifted, with all that hangs on it. So is what lies half the way of those that go
-    along an arc.
+    The fit gets two kinds of additional expressions. The first shifts each resting joint of the
+    neck with everything below it, so that vertices keep their resting joint. The second is the
+    state at 0.5 of expressions along an arc.
 
     Args:
-        ways: the face, parents of new joints chosen.
-        options: of the fit.
-        lod: the level; the coarser one is, the further apart its vertices lie, and evened out as
-            those of the finest they would lose what they do.
-        mesh: with its skin in the source.
-        wanted: float64[E, V, 3], of it.
-        start: float64[V, joints], weights to begin with.
+        ways: motions of the face; the parents of new joints are chosen.
+        options: options of the fit.
+        lod: the level. Coarser levels use less smoothness, because their vertices are farther
+            apart.
+        mesh: the mesh with its weights in the source.
+        wanted: its displacements float64[E, V, 3].
+        start: float64[V, joints], weights to start with.
     """
     work = ways.work
     extra, shifted, used = _carried(work, mesh)
@@ -57,7 +57,7 @@ def level_weights(
         return start
     joints = np.concatenate([used, len(work.source.joint_names) + work.new[lod]])
     asked = np.concatenate([wanted, shifted, halves])
-    # Smoothness counts beside all that is asked for; it is meant beside the expressions.
+    # Smoothness is relative to all displacements. It is scaled to be relative to the expressions.
     even = options.smoothness * float((wanted**2).sum() / max((asked**2).sum(), 1e-30))
     fit = fit_weights(
         np.asarray(mesh.positions, np.float64),
@@ -73,9 +73,11 @@ def level_weights(
 
 
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
-    """What is asked for beside the expressions, so that each vertex stays with its own joint of
-    neck and head: motions [n, joints, 3, 4] and displacements [n, V, 3]; and which joints of the
-    source take part."""
+    """Additional expressions that shift the resting joints, so that vertices keep theirs.
+
+    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the joints of the source that
+        take part.
+    """
     still, shares = resting(work), carried_shares(work, mesh)
     used = set(carriers(work)[len(work.source.joint_names) :].tolist())
     own = [at for at, j in enumerate(still) if j == work.head or shares[:, at].any() or j in used]
@@ -89,8 +91,10 @@ def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
 
 
 def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
-    """What is to be half the way of expressions that go along an arc, float64[n, V, 3], and what
-    joints do there, float64[n, joints, 3, 4]."""
+    """Additional expressions: the state at 0.5 of expressions along an arc.
+
+    Returns: displacements float64[n, V, 3] and motions float64[n, joints, 3, 4], both weighted.
+    """
     between = Between(ways, mesh)
     rows = sorted({*ways.middles, *np.flatnonzero(ways.turning).tolist()})
     halves = np.zeros((len(rows), len(mesh.positions), 3))
@@ -101,7 +105,13 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
-    """Weights without joints that a level does not have: their heirs take the vertices."""
+    """Move the weights of joints that a level lacks to their heirs.
+
+    Args:
+        work: the face.
+        start: float64[V, joints].
+        there: indices of the level's joints.
+    """
     rows = start.copy()
     for joint in np.flatnonzero(rows.any(axis=0)).tolist():
         heir = joint

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Levels of detail of a joint rig: how many joints and vertices each has, and which.
+"""Chooses the joints and vertex counts of a joint rig's levels of detail.
 
-A coarser level has some of the joints of the finer one, and they move as they do there: a joint
-group then needs only fewer of its rows, and one clip plays at every level.
+A coarser level has a subset of the finer level's joints with the same motions. So a joint group
+needs only fewer rows, and one clip plays at every level.
 """
 
 from __future__ import annotations
@@ -18,25 +18,26 @@ from .. import Dna
 from ..base.errors import ArgumentError
 from .geometry.skeleton import Doubles, Ints
 
-# Of what LOD 0 has, about as in faces that are made by hand: joints stay longer than vertices.
+# Fraction of LOD 0's joints at each level, about as in hand-made faces. It falls more slowly than
+# the number of vertices does.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
-_FALL = 0.6  # of the vertices, from level to level
+_FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
-# Clear films, lashes and what lies inside the mouth; they go when nothing is left of them.
+# Names of small meshes (clear films, lashes, mouth); coarse levels leave them out.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
 
 @dataclass(frozen=True)
 class LodOptions:
-    """How many levels there are, and the budget of each; levels of the source are kept."""
+    """The number of levels and the budgets of each. Levels of the source are kept."""
 
     count: int = 8
-    joints: tuple[int, ...] = ()  # new ones at each level; without: shares of those of LOD 0
-    vertices: tuple[int, ...] = ()  # of all meshes; without: 0.6 of the level before
+    joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
+    vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
 
     def check(self) -> None:
-        """Raises ValueError for budgets of another number of levels, or that grow."""
+        """Raise ValueError if a budget has not `count` numbers or grows from level to level."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -52,12 +53,12 @@ class LodOptions:
 
 
 def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
-    """New joints of each level, none more than of the one before.
+    """The number of new joints of each level.
 
     Args:
-        options: budgets, if there are any.
-        levels: how many there are.
-        joints: of LOD 0.
+        options: budgets, if given.
+        levels: number of levels.
+        joints: number of new joints of LOD 0.
     """
     if options.joints:
         wanted = [min(joints, n) for n in options.joints]
@@ -67,12 +68,22 @@ def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
 
 
 class _Merging:
-    """Joints that leave one after the other, each handing its vertices to the one most like it."""
+    """Removes joints one after the other; the most similar joint takes a removed joint's vertices.
+
+    Attributes:
+        points: float64[V, 4], vertices with a 1.
+        weights: float64[V, J].
+        motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
+        heirs: removed joint -> joint that took its vertices.
+        there: bool[J], whether a joint is still there.
+        can_leave: bool[J], whether a joint may be removed.
+        costs: float64[J, J], squared error if the second joint takes the first joint's vertices.
+    """
 
     def __init__(self, points: Doubles, weights: Doubles, motions: Doubles, fixed: int) -> None:
-        self.points = points  # [V, 4], (p, 1)
+        self.points = points
         self.weights = weights.copy()
-        self.motions = motions  # [J, E, 3, 4], what a joint adds to a point
+        self.motions = motions
         self.heirs: dict[int, int] = {}
         self.there = np.ones(len(motions), bool)
         self.can_leave = np.arange(len(motions)) >= fixed
@@ -81,7 +92,7 @@ class _Merging:
             self._price(int(joint))
 
     def _price(self, joint: int) -> None:
-        """Squared error of a joint's vertices when each of the others takes them."""
+        """Compute the squared errors if each other joint takes a joint's vertices."""
         held = np.flatnonzero(self.weights[:, joint])
         rows = self.weights[held, joint, None] * self.points[held]
         values, axes = np.linalg.eigh(rows.T @ rows)
@@ -92,7 +103,7 @@ class _Merging:
         self.costs[joint] = np.where(self.there, error, np.inf)
 
     def cheapest(self, pairs: Ints) -> list[int]:
-        """The joint that is missed least, and that of the other side with it."""
+        """The joint with the smallest cost, together with its mirrored joint."""
         own = self.costs.min(axis=1)
         score = np.where(pairs == np.arange(len(pairs)), own, own + own[pairs])
         first = int(np.where(self.there & self.can_leave, score, np.inf).argmin())
@@ -120,19 +131,21 @@ def joint_order(
     mirrored: Ints,
     fixed: int,
 ) -> tuple[list[int], dict[int, int]]:
-    """New joints, what a face needs most first; those of both sides one after the other.
+    """The new joints sorted by importance, the most important first; mirrored joints are adjacent.
 
-    Again and again the joint leaves whose vertices another moves most alike; that one takes them.
-    The second value names for each joint the one that took its vertices.
+    The joint whose vertices another joint moves most similarly is removed repeatedly; the other
+    joint takes its vertices. The reverse order of removal is the result.
 
     Args:
         positions: float64[V, 3].
         weights: float64[V, J].
         rotations: float64[E, J, 3, 3].
         translations: float64[E, J, 3].
-        centres: float64[J, 3], where the joints are.
-        mirrored: int64[J], of each joint that of the other side, itself in the middle.
-        fixed: the first joints, which stay at all levels and are not in the list.
+        centres: float64[J, 3], positions of the joints.
+        mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
+        fixed: number of first joints that all levels keep and that the result does not contain.
+
+    Returns: the order, and joint -> joint that took its vertices.
     """
     turned = rotations - np.eye(3)
     shift = translations - np.einsum("ejik,jk->eji", turned, centres)
@@ -151,12 +164,12 @@ def joint_order(
 
 
 def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
-    """The first joints of the order that the budget holds, both of a pair or none; sorted.
+    """The first joints of the order within a budget, sorted. Mirrored pairs are not divided.
 
     Args:
-        order: of joint_order.
-        mirrored: of each joint that of the other side.
-        budget: how many there may be.
+        order: the order of joint_order().
+        mirrored: int64[J], the joint of the other side.
+        budget: largest number of joints.
     """
     out: list[int] = []
     at = 0
@@ -170,12 +183,12 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """Vertices of each level.
+    """The number of vertices of each level.
 
     Args:
-        options: budgets, if there are any.
-        levels: how many there are.
-        existing: vertices of the levels that the source has.
+        options: budgets, if given.
+        levels: number of levels.
+        existing: numbers of vertices of the source's levels.
     """
     out = list(existing)
     while len(out) < levels:
@@ -185,12 +198,12 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
 
 
 def mesh_budget(name: str, vertices: int, share: float) -> int:
-    """Vertices that a mesh has at a level: 0 where it is left out.
+    """The number of vertices of a mesh at a level; 0 leaves the mesh out.
 
     Args:
-        name: of the mesh.
-        vertices: of the fine one.
-        share: of the fine level's vertices that the level may have.
+        name: name of the mesh.
+        vertices: number of vertices of the fine mesh.
+        share: number of vertices of the level relative to the fine level.
     """
     wanted = round(share * vertices)
     if wanted >= _LEAST_VERTICES:
@@ -204,7 +217,7 @@ def level_name(name: str, lod: int) -> str:
     """The name of a mesh at another level: head_lod0_mesh -> head_lod3_mesh.
 
     Args:
-        name: of the fine one.
+        name: name of the fine mesh.
         lod: the level.
     """
     if re.search(r"lod\d+", name):
@@ -213,13 +226,13 @@ def level_name(name: str, lod: int) -> str:
 
 
 def extend_levels(dna: Dna, levels: int) -> None:
-    """As many levels as there are to be: what the new ones list is what the last one did.
+    """Add levels of detail that list the same items as the last level.
 
-    Meshes and joints are not listed here; blend shapes end with the levels that there were.
+    New levels have no blend shapes. Callers replace the lists of meshes and joints.
 
     Args:
-        dna: is changed.
-        levels: at least as many as it has.
+        dna: the face to change.
+        levels: wanted number of levels; nothing changes if the face has as many.
     """
     had = max(1, dna.lod_count)
     more = levels - had

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig is never heavier than its input: the deltas of blend shapes that do least are left out."""
+"""Removes the shortest blend shape deltas, so that a rig has at most as many as its input."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from .work import MM, listed_meshes
 
 @dataclass
 class Lightened:
-    """A face within the budget of another, and what that took."""
+    """A face with a limited number of deltas, and the removed deltas."""
 
     dna: Dna
-    before: int  # deltas of the input at LOD 0
-    after: int
-    shortest_mm: float = 0.0  # no delta that was left out at LOD 0 is longer; 0: all were kept
-    # mm, the longest delta that was left out, by mesh and channel
+    before: int  # number of deltas of the input at LOD 0
+    after: int  # number of deltas of the face at LOD 0
+    shortest_mm: float = 0.0  # length of the longest removed delta at LOD 0; 0: none removed
+    # (mesh, channel) -> length of the longest removed delta, mm
     dropped: dict[tuple[str, int], float] = field(default_factory=dict)
 
 
 def count_deltas(meshes: Sequence[Mesh]) -> int:
-    """How many vertices of targets these meshes move: a delta of 0 is none."""
+    """The number of deltas of these meshes' targets that are not 0."""
     return sum(int((lengths > 0).sum()) for mesh in meshes for lengths in _lengths(mesh))
 
 
 def deltas_of(dna: Dna, lod: int = 0) -> int:
-    """The deltas of a level's meshes.
+    """The number of deltas of a level's meshes.
 
     Args:
         dna: the face.
@@ -42,15 +42,15 @@ def deltas_of(dna: Dna, lod: int = 0) -> int:
 
 
 def within_deltas(dna: Dna, source: Dna) -> Lightened:
-    """The face with at most as many deltas as its source, at each level that both have.
+    """Limit the number of deltas to that of the source at each level of the source.
 
-    The shortest deltas go first, over all meshes and targets of a level, correctives too. A delta
-    is added before the joints move the vertex, and a mean of turns makes nothing longer: without
-    it the vertex is off by its length at most.
+    The shortest deltas of all meshes and targets of a level are removed first, including those of
+    correctives. A delta is added before skinning, and a weighted mean of rotations makes no vector
+    longer. So the error of a vertex grows by at most the length of the removed delta.
 
     Args:
-        dna: a face of joints; it stays as it is.
-        source: the face of shapes that it was made from.
+        dna: a face of joints; it is not changed.
+        source: the face of shapes from which it was made.
     """
     out = Lightened(dna, deltas_of(source), deltas_of(dna))
     meshes, mm = list(dna.meshes), MM.get(dna.translation_unit, 10.0)
@@ -92,7 +92,7 @@ def _lengths(mesh: Mesh) -> list[Doubles]:
 
 
 def _limit(meshes: Sequence[Mesh], budget: int) -> float | None:
-    """The length of the longest delta that has to go; None: none has to."""
+    """The length of the longest delta to remove; None if the budget is kept."""
     if count_deltas(meshes) <= budget:
         return None
     lengths = np.concatenate([part for mesh in meshes for part in _lengths(mesh)])
@@ -100,7 +100,7 @@ def _limit(meshes: Sequence[Mesh], budget: int) -> float | None:
 
 
 def _without(mesh: Mesh, limit: float) -> tuple[Mesh, dict[int, float]]:
-    """A mesh without deltas of this length or less; the longest that went, by channel."""
+    """The mesh without deltas up to a length, and channel -> length of the longest removed one."""
     out, targets, dropped = copy.copy(mesh), [], {}
     for target, lengths in zip(mesh.blend_shape_targets, _lengths(mesh), strict=True):
         kept = lengths > limit

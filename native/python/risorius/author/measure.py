@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a face of joints does beside the face that it was made from, vertex by vertex."""
+"""Measures the distance of a face of joints from the face of shapes, vertex by vertex."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .work import MM
 
 
 def posed_meshes(dna: Dna, column: int, meshes: Sequence[int], *, shapes: bool) -> list[Doubles]:
-    """float64[V, 3] of each mesh with one input at 1.
+    """The vertices float64[V, 3] of some meshes with one input at 1.
 
     Args:
         dna: the face.
-        column: the input.
-        meshes: which.
-        shapes: whether blend shapes take part.
+        column: index of the input.
+        meshes: indices of the meshes.
+        shapes: whether blend shapes are applied.
     """
     count = sk.column_count(dna)
     motion = sk.column_motions(dna, count)[column]
@@ -38,16 +38,16 @@ def posed_meshes(dna: Dna, column: int, meshes: Sequence[int], *, shapes: bool) 
 def expression_errors(
     source: Dna, made: Dna, column: int, names: Sequence[str]
 ) -> tuple[list[Mesh], list[Doubles]]:
-    """Meshes in the form that an expression asks for, and how far joints alone are from there.
+    """The source's meshes posed in an expression, and the errors of the joints alone.
 
     Args:
         source: the face of shapes.
         made: the face of joints.
-        column: the expression's input.
-        names: of meshes that both have, with the same vertices.
+        column: index of the expression's input.
+        names: names of meshes that both faces have, with the same vertices.
 
     Returns:
-        The meshes; float64[V] of each, mm.
+        The posed meshes, and the errors float64[V] of each in mm.
     """
     before = [source.mesh_names.index(name) for name in names]
     after = [made.mesh_names.index(name) for name in names]

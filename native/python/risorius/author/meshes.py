@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of all levels of a joint rig: weights, what blend shapes have still to do, errors."""
+"""Makes the meshes of all levels of a joint rig: weights, blend shapes for errors, errors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LEAST_WEIGHT = 1e-3
 
 
 class Made:
-    """Meshes of all levels as they are made, one level after the other."""
+    """Makes the meshes of all levels, one level after the other."""
 
     def __init__(
         self,
@@ -43,35 +43,35 @@ class Made:
         *,
         whole: bool = True,
     ) -> None:
-        """Begins.
+        """Prepare an empty list of meshes.
 
         Args:
-            work: the face, its joints made.
-            options: what is to be made.
-            weights: float64[V, joints] of the finest meshes.
-            coarse: triangles of the levels that are made.
-            like: what is taken over.
-            whole: with blend shapes and errors, else with weights alone.
+            work: the face; its joints are made.
+            options: options of the rig.
+            weights: mesh -> float64[V, joints] of the finest meshes.
+            coarse: triangles of the coarser levels.
+            like: reference to reuse, or None.
+            whole: whether to make blend shapes and measure errors.
         """
         self.whole = whole
         self.work, self.options, self.weights, self.like = work, options, weights, like
         self.coarse = coarse
-        self.triangles: dict[str, Ints] = {}  # of the coarse meshes, in layouts of the fine ones
+        self.triangles: dict[str, Ints] = {}  # coarse mesh -> layout indices of the fine mesh
         self.ways = Ways(work)
         self.meshes: list[Mesh] = []
         self.names: list[str] = []
         self.listed: list[list[int]] = []
         self.errors: list[MeshErrors] = []
         self.own = max(1, work.source.lod_count)
-        self._numbers: dict[int, int] = {}  # a mesh of the source may be at several levels
+        self._numbers: dict[int, int] = {}  # mesh of the source -> mesh here; levels share meshes
 
     def add_level(self, lod: int, wanted: dict[int, Doubles], needs: set[int]) -> None:
-        """The meshes of a level: those of the source, or the finest ones with fewer vertices.
+        """Make the meshes of a level: meshes of the source, or simplified meshes of LOD 0.
 
         Args:
-            lod: the level; they are added in order.
-            wanted: float64[E, V, 3] of each mesh of the source, what it is to do.
-            needs: meshes that hang on new joints.
+            lod: the level; levels are added in order.
+            wanted: mesh of the source -> displacements float64[E, V, 3].
+            needs: meshes that get weights on new joints.
         """
         self.listed.append([])
         source = self.work.source
@@ -100,14 +100,14 @@ class Made:
             self._add(lod, coarse, name, wanted[m][:, kept], start)
 
     def _triangles(self, lod: int, m: int, name: str) -> Ints:
-        """int64[n, 3]: what a coarse mesh keeps of the fine one's layouts; none: it is left out."""
+        """int64[n, 3]: triangles of a coarse mesh as layouts of the fine mesh; empty: no mesh."""
         none = np.zeros((0, 3), np.int64)
         if self.like is not None:
             return self.like.triangles.get(level_name(name, lod), none)
         return self.coarse.triangles.get((lod, m), none)
 
     def _start(self, mesh: Mesh) -> Doubles:
-        """Dense weights of the nearest vertices of the finest level."""
+        """Weights float64[V, joints] of the nearest vertices of the finest level."""
         source = self.work.source
         fine = np.concatenate([np.asarray(source.meshes[m].positions) for m in self.weights])
         rows = np.concatenate(list(self.weights.values()))
@@ -128,15 +128,15 @@ class Made:
         rows: Doubles | None,
         finest: int | None = None,
     ) -> None:
-        """A mesh with the weights that it has, or with new ones from `rows` on.
+        """Add a mesh with its own weights, or fit new weights that start with `rows`.
 
         Args:
             lod: the level.
-            mesh: with its skin in the source.
-            name: of it.
-            wanted: float64[E, V, 3], of it.
-            rows: dense weights, or None.
-            finest: the mesh of the source whose weights coarser levels begin with.
+            mesh: the mesh with its weights in the source.
+            name: name of the mesh.
+            wanted: its displacements float64[E, V, 3].
+            rows: dense weights to start with; None keeps the mesh unchanged.
+            finest: index of the mesh of the source if coarser levels start with its new weights.
         """
         self.listed[lod].append(len(self.meshes))
         self.names.append(name)
@@ -161,7 +161,7 @@ class Made:
         self.errors.append(left)
 
     def finish(self) -> None:
-        """The meshes into the Dna."""
+        """Store the meshes in the Dna."""
         dna = self.work.dna
         dna.meshes, dna.mesh_names, dna.lod_mesh_mapping = self.meshes, self.names, self.listed
         dna.mesh_blend_shape_channel_mapping = np.array(
@@ -201,7 +201,7 @@ def _finish_mesh(
     wanted: Doubles,
     options: RigOptions,
 ) -> tuple[Mesh, MeshErrors]:
-    """The mesh with its new weights and with what blend shapes have still to do."""
+    """The mesh with new weights and with blend shapes for the joints' errors; and the errors."""
     work = ways.work
     out = copy.copy(mesh)
     _set_skin(out, rows)
@@ -215,7 +215,7 @@ def _finish_mesh(
     still = np.abs(own - np.eye(3, 4)).max(axis=(1, 2, 3)) < sk.STILL
     for row, column in enumerate(work.columns):
         if still[row] and not wanted[row].any():
-            continue  # it is exact, in a mesh that most expressions leave alone
+            continue  # the error is 0, because neither joints nor shapes move the mesh
         goal = positions + wanted[row]
         error = np.linalg.norm(skin.moved(ways.whole[row]) - wanted[row], axis=1) * mm
         if options.between:
@@ -241,7 +241,7 @@ def _finish_mesh(
 
 
 def channels_of(dna: Dna) -> dict[int, int]:
-    """The blend shape channel of each input that drives one."""
+    """Input -> blend shape channel that it drives."""
     channels = dna.blend_shape_channels
     pairs = zip(channels.input_indices, channels.output_indices, strict=True)
     return {int(source): int(channel) for source, channel in pairs}
@@ -257,7 +257,7 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
 
 def _set_skin(mesh: Mesh, rows: Doubles) -> None:
     kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
-    kept[~kept.any(axis=1), 0] = 1  # a vertex that hangs on nothing goes with the root
+    kept[~kept.any(axis=1), 0] = 1  # vertices without weights follow the root
     kept /= kept.sum(axis=1, keepdims=True)
     vertex, joint = np.nonzero(kept)
     counts = (kept > 0).sum(axis=1)

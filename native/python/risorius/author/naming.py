@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of new joints: FACIAL_<side>_<region><number>, counted from the top of the face down."""
+"""Names new joints FACIAL_<side>_<region><number>; numbers count from the top of the face down."""
 
 from __future__ import annotations
 
@@ -23,15 +23,17 @@ def joint_names(
     left: int,
     taken: set[str],
 ) -> list[str]:
-    """A name of its own for each joint; those of a pair differ in their side alone.
+    """A unique name for each joint. The names of a mirrored pair differ in the side only.
 
     Args:
-        positions: float64[J, 3], the middle of what each moves; x across the face, 0 in its middle.
-        effects: float64[E, J], how far an expression moves what hangs on the joint.
-        mirrored: int64[J], the joint of the other side, itself in the middle.
-        controls: names of the expressions, E; the region of what moves a joint most names it.
-        left: 1 where the character's left is +x, -1 where it is -x.
-        taken: names that are there already; is added to.
+        positions: float64[J, 3], the middle of the vertices of each joint; x = 0 is the middle of
+            the face.
+        effects: float64[E, J], how far each expression moves the vertices of each joint.
+        mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
+        controls: names of the E expressions. The region of the expression that moves a joint most
+            gives the joint's name.
+        left: 1 if the character's left is +x, -1 if it is -x.
+        taken: existing names; the new names are added.
     """
     regions = list(TITLES)
     share = np.zeros((len(regions), len(positions)))
@@ -40,7 +42,7 @@ def joint_names(
         share[region] = np.maximum(share[region], row)
     share = np.maximum(share, share[:, mirrored])
     moving = np.flatnonzero(share.any(axis=0))
-    for joint in np.flatnonzero(~share.any(axis=0)):  # one that moves nothing is as its neighbour
+    for joint in np.flatnonzero(~share.any(axis=0)):  # a joint without effect: as the nearest one
         if len(moving):
             apart = ((positions[moving] - positions[joint]) ** 2).sum(axis=1)
             share[:, joint] = share[:, moving[apart.argmin()]]
@@ -66,7 +68,11 @@ def joint_names(
 
 
 def _side(x: float) -> str:
-    """Of a joint that has no other one. Args: x  to its left, of the face's width."""
+    """The side of a joint without a mirrored joint.
+
+    Args:
+        x: its place to the character's left, as a fraction of the face's width.
+    """
     if abs(x) < 1e-3:
         return "C"
     return "L" if x > 0 else "R"

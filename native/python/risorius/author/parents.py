@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What new joints hang on: neck or head by the skin that they move, or the jaw.
+"""Chooses the parents of new joints: neck or head by the skin that they move, or the jaw.
 
-A joint under the jaw goes along the jaw's arc where the jaw turns, and an expression that is laid
-over it turns with it, as a shape does that is added before the skin.
+A joint under the jaw follows the jaw's arc. An expression added to an open jaw then turns with the
+jaw, like a blend shape, which is added before skinning.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from .work import (
     resting,
 )
 
-_MINOR = 0.15  # of what a joint holds: so much on another joint of the neck asks for a second one
-_ROOM = 0.08  # of the new joints are kept for these
+_MINOR = 0.15  # smallest fraction of a joint's weights on another neck joint for a second joint
+_ROOM = 0.08  # fraction of the new joints that is reserved for second joints
 
 
 def joint_motions(fit: Joints) -> Doubles:
-    """float64[E, J, 3, 4]: how each joint of a fit moves what is fixed to it.
+    """float64[E, J, 3, 4]: rigid motion of each joint in each expression.
 
     Args:
-        fit: has them as rotation vectors and shifts about its joints.
+        fit: the joints; it has rotation vectors and shifts about the joints' positions.
     """
     turns = matrices_of_vectors(fit.rotations)
     centres = fit.joints
@@ -43,14 +43,14 @@ def joint_motions(fit: Joints) -> Doubles:
 def choose_parents(
     work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles], jaw: int | None
 ) -> list[int]:
-    """The parent of each new joint, the same for both sides.
+    """The parent of each new joint; mirrored joints get the same parent.
 
     Args:
         work: the face.
-        meshes: those that were fitted.
+        meshes: indices of the fitted meshes.
         fit: the joints.
-        weights: float64[V, joints] of each mesh.
-        jaw: the joint that opens the mouth, if there is one.
+        weights: mesh -> float64[V, joints].
+        jaw: the joint that opens the mouth, or None.
     """
     first = len(given(work))
     mirrored = fit.mirrored[first:] - first
@@ -58,10 +58,10 @@ def choose_parents(
     still = resting(work)
     held = rows.T @ np.concatenate([carried_shares(work, work.source.meshes[m]) for m in meshes])
     if np.abs(work.positions[still, 0]).max() < 1e-3 * np.ptp(work.positions[:, 1]):
-        held += held[mirrored]  # none has a side: both joints of a pair hang on the same
+        held += held[mirrored]  # all resting joints are in the middle, so pairs get the same parent
     out = np.where(held.any(axis=1), still[held.argmax(axis=1)], work.head)
     if jaw is not None:
-        # Not what hangs on the neck: the throat goes with the jaw, but stays with the neck.
+        # Joints under the neck stay there: the throat moves with the jaw, but turns with the neck.
         own = out == carriers(work)[jaw]
         out[own & _follow(work, meshes, fit, rows, mirrored, jaw)] = jaw
     return [int(joint) for joint in out]
@@ -70,14 +70,15 @@ def choose_parents(
 def room_for_second(
     work: Work, meshes: Sequence[int], wanted: dict[int, Doubles], joints: int
 ) -> int:
-    """How many of the new joints are kept for second_joints: none where all that moves hangs on one
-    joint.
+    """The number of new joints reserved for second_joints().
+
+    It is 0 if all moved vertices follow the head only.
 
     Args:
         work: the face.
-        meshes: those that are fitted.
-        wanted: float64[E, V, 3] of each.
-        joints: new ones in all.
+        meshes: indices of the meshes to fit.
+        wanted: mesh -> displacements float64[E, V, 3].
+        joints: number of all new joints.
     """
     for m in meshes:
         shares = carried_shares(work, work.source.meshes[m])
@@ -94,18 +95,20 @@ def second_joints(
     weights: dict[int, Doubles],
     room: int,
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
-    """Joints whose vertices hang on two joints of the neck, or on neck and head, get a second one
-    that does the same under the other parent: what is turned by hand then moves as it did before.
+    """Duplicate joints whose vertices follow two joints of neck and head.
+
+    The second joint has the same motions and the other parent. So the vertices follow a neck that
+    is turned by hand as in the source.
 
     Args:
-        work: the face, parents of new joints chosen.
-        meshes: those that were fitted.
+        work: the face; the parents of new joints are chosen.
+        meshes: indices of the fitted meshes.
         fit: the joints.
-        weights: float64[V, joints] of each mesh.
-        room: how many there may be.
+        weights: mesh -> float64[V, joints].
+        room: largest number of second joints.
 
     Returns:
-        Joints, weights and parents with those of the second joints at the end.
+        Joints, weights and parents; the second joints are at the end.
     """
     first, before = len(given(work)), len(work.source.joint_names)
     mirrored = fit.mirrored
@@ -115,7 +118,7 @@ def second_joints(
     held += held[mirrored[first:] - first]
     least = _MINOR * held.sum(axis=1, keepdims=True)
     held[carriers(work)[before:, None] == still] = 0
-    split: list[tuple[int, int]] = []  # new joint, which resting one the second hangs on
+    split: list[tuple[int, int]] = []  # (new joint, resting joint above its second joint)
     for joint, at in sorted(np.argwhere(held > least).tolist(), key=lambda x: (-held[*x], *x)):
         other = int(mirrored[first + joint]) - first
         pair = [(joint, at)] if other == joint else [(joint, at), (other, at)]
@@ -131,7 +134,7 @@ def _split(
     shares: dict[int, Doubles],
     split: list[tuple[int, int]],
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
-    """Second joints, and the vertices of the first ones divided by what these hang on."""
+    """Add second joints, and divide the weights of the first joints between both."""
     first, before = len(given(work)), len(work.source.joint_names)
     count = len(fit.joints)
     still, own = resting(work), carriers(work)
@@ -166,7 +169,7 @@ def _split(
 def _follow(
     work: Work, meshes: Sequence[int], fit: Joints, rows: Doubles, mirrored: Ints, jaw: int
 ) -> npt.NDArray[np.bool_]:
-    """bool[new joints]: which move more like the jaw than not at all where the jaw moves."""
+    """bool[new joints]: whether a joint's motion is closer to the jaw's motion than to rest."""
     first = len(given(work))
     moving = np.flatnonzero(np.abs(work.motions[:, jaw] - np.eye(3, 4)).max(axis=(1, 2)) > 1e-9)
     own = joint_motions(fit)[moving, first:]

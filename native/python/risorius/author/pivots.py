@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What lids and jaws turn about, found from what is there or from the expressions; and their arcs.
+"""Finds the points about which lids and jaws turn, and computes arcs about them.
 
-A shape is a straight line, a lid goes round an eye: joints in the eye's middle do so too.
+A blend shape moves a vertex along a line, but a lid slides around the eyeball. Joints in the middle
+of the eye move lids along arcs. The points come from existing joints or from the expressions.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from .geometry.skeleton import Doubles, rotation_vectors
 _LID = re.compile(r"eye(Blink|Widen|Squint|LidPress|Relax|UpperLid|LowerLid|LookUp|LookDown)")
 _JAW = re.compile(r"jaw(Open|OpenExtreme|Left|Right)$")
 _EYE_JOINT = re.compile(r"(^|_)([LR])_?eye$|eye_?([LR])$|(left|right)_?eye$", re.IGNORECASE)
-_LEAST_TURN = 0.05  # radians: a jaw that turns less has no hinge that could be found
+_LEAST_TURN = 0.05  # radians; the hinge of a jaw that turns less cannot be found
 
 
 @dataclass(frozen=True)
 class Pivot:
-    """A point, and the rows of the expressions that turn about it."""
+    """A point, and the rows of the expressions that turn about the point."""
 
     position: Doubles  # float64[3]
     expressions: tuple[int, ...]
@@ -38,15 +39,15 @@ def find_pivots(
     *,
     jaw: bool,
 ) -> list[Pivot]:
-    """The eyes, for their lids, and the jaw's hinge.
+    """Find the middles of the eyes, as pivots of the lids, and the hinge of the jaw.
 
     Args:
-        names: of the expressions.
-        positions: float64[V, 3].
+        names: names of the E expressions.
+        positions: float64[V, 3], neutral vertices.
         displacements: float64[E, V, 3].
-        joint_names: of joints that are there.
-        joints: float64[J, 3], where they are.
-        jaw: whether a joint opens the mouth already.
+        joint_names: names of the existing joints.
+        joints: float64[J, 3], their positions.
+        jaw: whether an existing joint opens the mouth; then no hinge is needed.
     """
     out = []
     eyes = {_side(n): p for n, p in zip(joint_names, joints, strict=True) if _EYE_JOINT.search(n)}
@@ -61,7 +62,7 @@ def find_pivots(
                 out.append(Pivot(middle, tuple(rows)))
     rows = [e for e, n in enumerate(names) if _JAW.search(n)]
     opening = [e for e in rows if names[e].endswith("jawOpen")]
-    if opening and not jaw:  # else what goes with the jaw is its child
+    if opening and not jaw:  # with a jaw joint, joints that follow the jaw are its children
         hinge = _hinge(positions, displacements[opening[0]])
         if hinge is not None:
             out.append(Pivot(hinge, tuple(rows)))
@@ -76,7 +77,7 @@ def _side(joint: str) -> str:
 
 
 def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The middle of the ball that a lid lies on, open and shut; None where it is none."""
+    """The middle of the sphere on which the open and the shut lid lie; None if they do not."""
     length = np.linalg.norm(displacement, axis=1)
     edge = length > 0.5 * length.max()
     if np.count_nonzero(edge) < 6:
@@ -94,7 +95,7 @@ def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The point nearest to a jaw that its turning leaves in place; None where it only shifts."""
+    """The fixed point of the jaw's rotation nearest to the jaw; None if the jaw only shifts."""
     length = np.linalg.norm(displacement, axis=1)
     held = length > 0.7 * length.max()
     before, after = positions[held], positions[held] + displacement[held]
@@ -107,13 +108,13 @@ def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def arc(positions: Doubles, displacement: Doubles, middle: Doubles, share: float) -> Doubles:
-    """float64[V, 3], what is added on the way: round the middle, the distance to it in step.
+    """float64[V, 3]: displacements on arcs about a point; the distance changes linearly.
 
     Args:
-        positions: float64[V, 3].
-        displacement: float64[V, 3] at 1.
-        middle: float64[3].
-        share: of the way, 0 to 1.
+        positions: float64[V, 3], neutral vertices.
+        displacement: float64[V, 3] with the control at 1.
+        middle: float64[3], the point.
+        share: value of the control, 0 to 1.
     """
     before, after = positions - middle, positions + displacement - middle
     near, far = (np.linalg.norm(x, axis=1, keepdims=True) for x in (before, after))

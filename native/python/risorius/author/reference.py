@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A joint rig as what other faces of the same topology take over: joints, weights, levels.
+"""Joints, weights and levels of a joint rig, which other faces of the same topology reuse.
 
-The fit is made once; another person's joints then only learn what they do on that person. All
-people so made have the same joints, which is what mixes them.
+The joints are fitted once. For another person, only their motions are fitted. All these people
+have the same joints, so that they can be mixed.
 """
 
 from __future__ import annotations
@@ -31,24 +31,28 @@ Small = npt.NDArray[np.uint8] | npt.NDArray[np.uint16] | npt.NDArray[np.uint32]
 
 @dataclass
 class Reference:
-    """What a joint rig has beside the motions, which are another person's own."""
+    """A joint rig without the joints' motions, because each person has other motions."""
 
-    face: dict[str, list[int]]  # mesh of the source -> vertices, corners
-    joints: list[str]  # of the source
+    face: dict[str, list[int]]  # mesh of the source -> [number of vertices, number of corners]
+    joints: list[str]  # names of the source's joints
     expressions: list[str]
-    names: list[str]  # of the new joints
-    parents: list[int]
-    mirrored: list[int]  # of each new joint that of the other side
-    pivots: list[int | None]  # of each new joint
-    levels: list[list[int]]  # new joints of each
+    names: list[str]  # names of the new joints
+    parents: list[int]  # parents of the new joints
+    mirrored: list[int]  # new joint -> new joint of the other side
+    pivots: list[int | None]  # new joint -> index of its pivot
+    levels: list[list[int]]  # level -> its new joints
     weights: dict[str, Doubles] = field(default_factory=dict)  # mesh -> [V, joints]
-    triangles: dict[str, Ints] = field(default_factory=dict)  # coarse mesh -> [n, 3], fine layouts
+    # Coarse mesh -> triangles [n, 3] as layout indices of the fine mesh.
+    triangles: dict[str, Ints] = field(default_factory=dict)
 
     def check(self, work: Work) -> None:
-        """Raises ValueError where a face is of another topology, or has other controls.
+        """Check that a face has the same joints, expressions, meshes and topology.
 
         Args:
             work: the face.
+
+        Raises:
+            ArgumentError: the face differs.
         """
         for what, own, other in (
             ("joints", list(work.source.joint_names), self.joints),
@@ -72,7 +76,7 @@ class Reference:
                 )
 
     def to_bytes(self) -> bytes:
-        """A file of NumPy's; read by from_bytes."""
+        """The reference as bytes of an NPZ file, which from_bytes() reads."""
         arrays: dict[str, npt.NDArray[np.float32] | Small] = {}
         for name, rows in self.weights.items():
             vertex, joint = np.nonzero(rows)
@@ -92,10 +96,13 @@ class Reference:
 
     @staticmethod
     def from_bytes(data: bytes) -> Reference:
-        """The reference of a file. Raises ValueError where it is none.
+        """Read a reference.
 
         Args:
-            data: of the file.
+            data: bytes that to_bytes() wrote.
+
+        Raises:
+            ArgumentError: the bytes are no reference.
         """
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
@@ -120,16 +127,16 @@ class Reference:
 
     @staticmethod
     def read(path: Path) -> Reference:
-        """As from_bytes, of a file.
+        """Read a reference from a file, as from_bytes() does.
 
         Args:
-            path: of it.
+            path: the file.
         """
         return Reference.from_bytes(path.read_bytes())
 
 
 def fingerprint() -> bytes:
-    """32 bytes that are others where joints may be found otherwise: of module and folder."""
+    """32 bytes that change if the native module or the Python code of this folder changes."""
     known = hashlib.sha256(Path(_native.__file__ or "").read_bytes())
     for entry in sorted(Path(__file__).parent.rglob("*.py")):
         known.update(entry.read_bytes())
@@ -137,7 +144,7 @@ def fingerprint() -> bytes:
 
 
 def _small(numbers: Ints) -> Small:
-    """The same in the fewest bytes each."""
+    """The numbers in the smallest unsigned integer type that holds them."""
     return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
 
 
@@ -152,12 +159,12 @@ class _Meshes(Protocol):
 
 
 def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
-    """What other faces take over of a joint rig that is made.
+    """The reference of a finished joint rig.
 
     Args:
-        work: the face, its levels chosen.
-        fit: its joints.
-        made: its meshes.
+        work: the face; its levels are chosen.
+        fit: the fitted joints.
+        made: the meshes of all levels.
     """
     dna = work.dna
     first, before = len(given(work)), len(work.source.joint_names)
@@ -191,17 +198,19 @@ def refit(
     wanted: dict[int, Doubles],
     options: RigOptions,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """What the joints of a reference do on another face, and their weights on its finest meshes.
+    """Fit the motions of a reference's joints to another face.
 
     Args:
-        work: the other face; gets levels and parents.
-        reference: checked.
-        shaped: the meshes that are fitted.
-        wanted: float64[E, V, 3] of each mesh.
-        options: of the fit.
+        work: the other face; gets the reference's levels and parents.
+        reference: the reference; check() has accepted the face.
+        shaped: indices of the meshes to fit.
+        wanted: mesh -> displacements float64[E, V, 3] of the expressions.
+        options: options of the fit.
+
+    Returns: the joints, and mesh -> weights float64[V, joints] of the finest meshes.
 
     Raises:
-        ValueError: other meshes move than on the face that the reference is of.
+        ArgumentError: expressions move a mesh that the reference has no weights for.
     """
     dna = work.source
     work.new = [np.array(level, np.int64) for level in reference.levels]
@@ -219,7 +228,8 @@ def refit(
     for m in shaped:
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin))
         begin += len(dna.meshes[m].positions)
-    # What hangs on resting joints hangs on the head to the fit: they all rest.
+    # The fit gets the weights of all resting joints as weights of the head, because none of them
+    # moves.
     rows = np.concatenate([weights[m] for m in shaped])
     others = np.setdiff1d(np.arange(rows.shape[1]), own)
     rows[:, work.head] += rows[:, others].sum(axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the steps from a face of shapes to one of joints share: options, errors, the face itself."""
+"""Options, errors and the face, which all steps from a face of shapes to a face of joints share."""
 
 from __future__ import annotations
 
@@ -19,101 +19,103 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# A vertex that follows another joint of the neck than before counts as one that is so far off: a
-# head that is turned moves them about so far against each other.
+# Error of a vertex that follows another neck joint than in the source. A turned head moves vertices
+# of different neck joints about this far apart.
 CARRIED_MM = 20.0
-# The most memory that making a rig may take: the dense table of all expressions is about a hundred
-# times as large as the deltas in the file.
+# Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
+# all expressions is about a hundred times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
-# Of the head's height: 0.16 mm of 240. The default of the command line, of Blender and of the
-# sample people.
+# Tolerance relative to the head's height: 0.16 mm of 240 mm. Default of the command line, of
+# Blender and of the sample people.
 TOLERANCE = 1 / 1500
-_RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
+_RIGID_MM = 0.02  # a mesh needs no new joints if the existing joints' error is smaller
 
 
 @dataclass(frozen=True)
 class RigOptions:
-    """What the joint rig is to be."""
+    """Options of a joint rig."""
 
     fit: FitOptions = field(default_factory=FitOptions)
-    # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: beyond
-    # `tolerance`, a share of the head's height.
+    # Blend shapes correct a vertex if the joints' error exceeds this, in mm. None: the limit is
+    # `tolerance` times the head's height.
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
-    shapes: bool = True  # False: no blend shapes, joints alone
-    # Whether the rig has at most as many deltas as its input: what joints leave beyond the
-    # tolerance is then kept as far as these go.
+    shapes: bool = True  # False: joints only, no blend shapes
+    # Whether the rig has at most as many blend shape deltas as its input. If necessary, the
+    # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint leaves an expression in which it moves no vertex further: others take over.
+    # A joint takes no part in an expression if it moves no vertex by this distance.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
-    # Meshes that keep their weights and blend shapes, by parts of their names: eyeballs, which turn
-    # with a joint of their own.
+    # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
+    # turn with their own joint.
     kept: tuple[str, ...] = ()
-    between: bool = True  # whether errors on the way to 1 are measured, a tenth of the work
+    # Whether errors at control values between 0 and 1 are measured: a tenth of the total time.
+    between: bool = True
 
 
 @dataclass
 class MeshErrors:
-    """What is left of each expression's motion on one mesh, by joints alone and with shapes."""
+    """The errors of each expression on one mesh, by joints alone and with blend shapes."""
 
     name: str
     vertices: int
     expressions: list[str]
-    motion: Doubles  # [E] root mean square of the motion, mm
-    joints_rms: Doubles  # [E] mm
-    joints_largest: Doubles  # [E] mm
-    largest: Doubles  # [E] mm, with blend shapes
-    worst_vertex: Ints  # [E] by joints alone
-    # [E] mm, by joints alone with the control at 0.25, 0.5 and 0.75, against the line or the arc
+    motion: Doubles  # [E] root mean square of the wanted displacements, mm
+    joints_rms: Doubles  # [E] root mean square error of the joints alone, mm
+    joints_largest: Doubles  # [E] largest error of the joints alone, mm
+    largest: Doubles  # [E] largest error with blend shapes, mm
+    worst_vertex: Ints  # [E] vertex with the largest error of the joints alone
+    # [E] largest error in mm of the joints alone with the control at 0.25, 0.5 and 0.75, measured
+    # from the line or the arc
     between_largest: Doubles
     lod: int = 0
 
 
 @dataclass
 class Level:
-    """A level of detail of what was made, and what is left of the motion of all its meshes."""
+    """A level of detail of the rig, and the errors of its meshes."""
 
-    joints: int  # new ones
+    joints: int  # number of new joints
     vertices: int
-    deltas: int
-    rms: float  # mm, by joints alone, over vertices and expressions
-    largest: float  # mm, by joints alone
-    largest_with_shapes: float  # mm
+    deltas: int  # number of blend shape deltas
+    rms: float  # root mean square error of the joints alone, over vertices and expressions, mm
+    largest: float  # largest error of the joints alone, mm
+    largest_with_shapes: float  # largest error with blend shapes, mm
 
 
 @dataclass
 class Joints:
-    """The head and the joints that controls move, then new ones; as a fit gives them."""
+    """Joints of a fit: the head, the existing joints that controls move, then the new joints."""
 
-    joints: Doubles  # [J, 3]
-    rotations: Doubles  # [E, J, 3], vectors
-    translations: Doubles  # [E, J, 3]
-    mirrored: Ints  # [J] the joint of the other side, itself in the middle
+    joints: Doubles  # [J, 3] positions
+    rotations: Doubles  # [E, J, 3] rotation vectors
+    translations: Doubles  # [E, J, 3] shifts of the joints
+    mirrored: Ints  # [J] the joint of the other side; a joint in the middle names itself
 
 
 @dataclass
 class Work:
-    """The face that is made, and what of it is computed once."""
+    """The new face, and quantities that are computed once."""
 
     source: Dna
-    dna: Dna
-    columns: list[int]  # inputs that move a vertex, but correctives
-    names: list[str]  # of these
-    motions: Doubles  # [C, J, 3, 4] of the joints that were there
-    positions: Doubles  # [J, 3]
-    head: int  # what most of the face hangs on
-    wanted: dict[int, Doubles] = field(default_factory=dict)  # displacements of each mesh, at first
+    dna: Dna  # the face that is made
+    columns: list[int]  # inputs that move a vertex, without correctives
+    names: list[str]  # names of these inputs
+    motions: Doubles  # [C, J, 3, 4] motions of the source's joints
+    positions: Doubles  # [J, 3] neutral positions of the source's joints
+    head: int  # the resting joint with the largest weights on moved vertices
+    wanted: dict[int, Doubles] = field(default_factory=dict)  # mesh -> [C, V, 3], released early
     levels: int = 1
-    new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
+    new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
     pivots: list[Pivot] = field(default_factory=list)
-    mirrored: dict[int, int] = field(default_factory=dict)  # joints of the other side
-    groups: list[JointGroup] = field(default_factory=list)  # of the joints that were there
-    combined: dict[int, frozenset[int]] = field(default_factory=dict)  # correctives: their controls
-    parents: list[int] = field(default_factory=list)  # of the new joints
+    mirrored: dict[int, int] = field(default_factory=dict)  # joint -> joint of the other side
+    groups: list[JointGroup] = field(default_factory=list)  # joint groups of the source
+    combined: dict[int, frozenset[int]] = field(default_factory=dict)  # corrective -> controls
+    parents: list[int] = field(default_factory=list)  # parents of the new joints
     heirs: dict[int, int] = field(
         default_factory=dict
-    )  # what takes a joint's vertices in its place
+    )  # joint -> joint that takes its vertices at coarser levels
 
 
 def begin(dna: Dna) -> Work:
@@ -143,14 +145,14 @@ def begin(dna: Dna) -> Work:
 
 
 def require_sizes(dna: Dna) -> None:
-    """Refuse a face whose meshes cannot be computed with.
+    """Reject a face with unusable meshes.
 
     Args:
-        dna: of any file.
+        dna: the face.
 
     Raises:
-        ArgumentError: no mesh, all of its vertices in one point, coordinates that are not finite
-            or beyond FARTHEST, whose squares leave the numbers.
+        ArgumentError: the face has no mesh, all vertices are in one point, or coordinates are not
+            finite or larger than FARTHEST, so that their squares could overflow.
     """
     if not dna.meshes:
         raise ArgumentError("a face with meshes was expected")
@@ -170,17 +172,19 @@ def require_sizes(dna: Dna) -> None:
 
 
 def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
-    """Raises: BudgetError: tables of what inputs do to joints and vertices would be far larger than
-    the face.
+    """Check that the tables of inputs, joints and vertices fit the memory budget.
 
     Args:
         dna: the face.
-        count: of its inputs.
+        count: number of its inputs.
         together: inputs that are correctives.
+
+    Raises:
+        BudgetError: the tables would be too large for the size of the face.
     """
     budget = Budget(_BASE_BYTES + _BYTES_PER_BYTE * dna.size_in_bytes(), 0)
     joints, vertices = len(dna.joint_names), [len(mesh.positions) for mesh in dna.meshes]
-    numbers = 9 + 3 * 16  # attributes, and the matrices of a joint on its way to the world
+    numbers = 9 + 3 * 16  # attributes of a joint, and three matrices for its world transform
     budget.hold(8 * numbers * count * joints, f"{joints:,} joints that {count:,} inputs move")
     budget.hold(8 * joints * max(vertices), f"weights of {joints:,} joints")
     alone = sum(column not in together for column in range(count))
@@ -194,7 +198,7 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint that most of what moves hangs on."""
+    """The resting joint with the largest weights on moved vertices."""
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -207,11 +211,11 @@ def _head(work: Work) -> int:
 
 
 def displacements(work: Work, mesh: Mesh) -> Doubles:
-    """float64[C, V, 3]: where each input at 1 brings the vertices, less where they rest.
+    """float64[C, V, 3]: displacement of the vertices with each input at 1.
 
     Args:
         work: the face of shapes.
-        mesh: one of its own.
+        mesh: one of its meshes.
     """
     positions = np.asarray(mesh.positions, np.float64)
     weights = sk.dense_weights(mesh, len(work.source.joint_names))
@@ -229,12 +233,12 @@ def displacements(work: Work, mesh: Mesh) -> Doubles:
 
 
 def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
-    """Whether blend shapes move the mesh, and not the joints that are there alone (an eyeball).
+    """Whether blend shapes contribute to a mesh's motion; existing joints alone move an eyeball.
 
     Args:
         work: the face.
-        mesh: one of its own.
-        wanted: float64[E, V, 3], of it.
+        mesh: one of its meshes.
+        wanted: its displacements float64[E, V, 3].
     """
     if not mesh.blend_shape_targets:
         return False
@@ -251,18 +255,18 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    To a fit all that rests is alike; which of these a vertex follows when a neck is turned by hand
-    is to stay as it was.
+    The fit cannot distinguish resting joints. But vertices must keep their joint, because a neck
+    may be turned by hand.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: the resting joint that carries a joint: itself, or the next above it.
+    """int64[joints]: for each joint, itself if it rests, or the nearest resting joint above it.
 
     Args:
-        work: the face; new joints count where their parents are chosen.
+        work: the face. New joints are included if their parents are chosen.
     """
     own = set(resting(work).tolist())
     parents = [*(int(p) for p in work.source.joint_parents), *work.parents]
@@ -278,12 +282,13 @@ def carriers(work: Work) -> Ints:
 
 
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V, resting]: how much of each vertex the resting joints carry, by themselves and by
-    moving joints below them; rows with sum 1.
+    """float64[V, resting]: each vertex' weights, summed by carrying resting joint (carriers()).
+
+    Rows have the sum 1.
 
     Args:
         work: the face.
-        mesh: one of its own, or with its skin.
+        mesh: a mesh of the source, or with weights on the source's joints.
     """
     count = len(work.source.joint_names)
     weights = sk.dense_weights(mesh, count)
@@ -292,17 +297,18 @@ def carried_shares(work: Work, mesh: Mesh) -> Doubles:
 
 
 def carried_shift(work: Work) -> float:
-    """How far what a resting joint carries is shifted with it, in the file's unit: what a neck that
-    is turned by hand does, as an expression would."""
+    """CARRIED_MM in the file's unit: the shift of resting joints in carried_shifts()."""
     return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
-    """float64[n, joints, 3]: all that hangs on each of these resting joints, shifted with it.
+    """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
+
+    These count as additional expressions, so that vertices keep their joint of neck and head.
 
     Args:
-        work: the face, parents of new joints chosen.
-        joints: resting ones.
+        work: the face; the parents of new joints are chosen.
+        joints: n resting joints.
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
     out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])
@@ -310,39 +316,39 @@ def carried_shifts(work: Work, joints: Ints) -> Doubles:
 
 
 def joined_positions(work: Work, meshes: Sequence[int]) -> Doubles:
-    """float64[V, 3]: the vertices of some of the source's meshes, one after the other.
+    """float64[V, 3]: the concatenated vertices of some meshes of the source.
 
     Args:
         work: the face.
-        meshes: which.
+        meshes: indices of the meshes.
     """
     return np.concatenate([np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes])
 
 
 def new_weights(work: Work, meshes: Sequence[int], weights: dict[int, Doubles]) -> Doubles:
-    """float64[V, new joints]: what new joints hold of these vertices.
+    """float64[V, new joints]: the weights of the new joints on the vertices of some meshes.
 
     Args:
         work: the face.
-        meshes: which.
-        weights: float64[V, joints] of each mesh.
+        meshes: indices of the meshes.
+        weights: mesh -> float64[V, joints].
     """
     return np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes])
 
 
 def given(work: Work) -> Ints:
-    """The head, and the joints that controls move."""
+    """Indices of the head and of the source's joints that controls move."""
     still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(0, 2, 3))
     return np.array([work.head, *np.flatnonzero(~still)])
 
 
 def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
-    """float64[V, joints]: the weights of a fit.
+    """float64[V, joints]: the weights of a fit as a dense matrix.
 
     Args:
-        fit: has them, by its own joints.
-        place: of each of these, the joint's index.
-        joints: how many there are.
+        fit: the fit.
+        place: index in the rig of each joint of the fit.
+        joints: number of the rig's joints.
     """
     out = np.zeros((len(fit.weights), joints))
     rows = np.arange(len(out))[:, None]
@@ -351,7 +357,7 @@ def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
 
 
 def listed_meshes(dna: Dna, lod: int) -> list[int]:
-    """The meshes of a level; all where the file does not say.
+    """Indices of the meshes of a level; all meshes if the file does not list the level.
 
     Args:
         dna: the face.

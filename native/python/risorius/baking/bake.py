@@ -41,12 +41,12 @@ def bake(
     """Evaluate every frame in bounded memory, and write the requested files atomically.
 
     Args:
-        clip: already resampled and cut, see `prepared`.
-        face, lod: the character and its LOD.
-        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty for the facts only. Hidden
-            files of killed processes in these folders stay, see fileio.sweep.
-        parts: from PARTS, the content of the files.
-        compress: make the .npz smaller; several times slower.
+        clip: clip that is already resampled and cut, see `prepared`.
+        face, lod: the character, and the LOD from 0.
+        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to compute only the facts.
+            Hidden files of killed processes in these folders stay, see fileio.sweep.
+        parts: parts of the poses to write, from PARTS.
+        compress: True: the .npz is smaller, and takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.
 

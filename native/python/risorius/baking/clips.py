@@ -38,10 +38,11 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
     Args:
         path: a .rzc file, or a file that risorius.importing reads.
         face: its raw controls are used directly, and its table converts GUI controls.
-        mapping: a built-in one or a TOML file; None: the fitting one, or none for .rzc.
+        mapping: name of a built-in mapping, or a TOML file; None: the best fit, or none for .rzc.
 
     Raises:
-        OSError, ValueError: not animation, or no mapping fits; the error names the file.
+        OSError, ValueError: the file is no animation, or no mapping fits it; the error names the
+            file.
     """
     if path.suffix.lower() == SUFFIX:
         clip = risorius.Clip.load(path)
@@ -57,7 +58,7 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         others = tuple(name for name in found.clip.names if name not in own)
         return Performance(found.clip.selected(own), "", others)
     clip, report = found.apply(mapping, rig=face.rig)
-    # A mapping knows names of faces; a rig may have further controls, such as a neck's rotation.
+    # A mapping contains controls of faces; a rig may have others, such as the neck's rotation.
     own = [name for name in own if name in report.unmapped and name not in clip]
     if own:
         curves = np.concatenate([clip.curves, found.clip.selected(own).curves])

@@ -33,35 +33,35 @@ FIELDS = {
 }
 """The users' names for parts of a Pose -> its fields."""
 _LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
-# Bytes of poses per chunk: poses that stay in a processor's cache are several times faster to use.
+# Bytes of poses per chunk, because processing is several times faster inside the processor's cache.
 _CHUNK_BYTES = 8 << 20
 
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character with the names of all parts of its poses."""
+    """A compiled character, and unique names for all parts of its poses."""
 
     name: str
     rig: risorius.Rig
     names: dict[str, list[str]]
-    """By part: a unique name for each joint, channel, map and control."""
+    """Part -> a unique name for each of its joints, channels, maps or controls."""
     translation_unit: str
     rotation_unit: str
     psd_range: tuple[int, int]
-    """Range of the correctives among the controls: first, end."""
+    """Index range of the correctives among the controls: first, end (exclusive)."""
     turning: tuple[JointControl, ...] = ()
-    """Joints whose rotation is held by raw controls."""
+    """Joints whose rotation is set by raw controls."""
     shares: Mapping[int, tuple[str, float]] = field(default_factory=dict)
-    """Joints that turn with neck and head, see turned_joints."""
+    """Joint -> (bone, share): joints that rotate with the neck or head, see turned_joints."""
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of a joint's numbers."""
+        """The names of the numbers of a joint: translation, rotation, scale."""
         turn = ("qx", "qy", "qz", "qw") if self.rig.rotation == "quaternion" else ("rx", "ry", "rz")
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """The rest values of a part: float32[joints, columns] or [count]."""
+        """The rest values of a part: float32[joints, columns], for other parts float32[count]."""
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
             return np.tile(joint, (self.rig.joint_count, 1))
@@ -106,8 +106,10 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 
 
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
-    """Unique names of all objects of a kind; one without a name, or with a repeated one, gets its
-    index."""
+    """A unique name for each element of a kind.
+
+    An element without a name is called by its kind and index; repeated names get the index.
+    """
     out: list[str] = []
     seen: set[str] = set()
     for index in range(count):
@@ -124,11 +126,11 @@ def prepared(
     rate: float | None = None,
     frames: tuple[int | None, int | None] = (None, None),
 ) -> risorius.Clip:
-    """The requested frames of a clip, for a face that turns its head.
+    """Resample and cut a clip, and convert its neck and head curves for a face.
 
     Args:
         clip: any clip.
-        face: the character, see with_head_turns.
+        face: the character, for with_head_turns.
         rate: resample to this number of frames per second; None: do not resample.
         frames: first and end (exclusive), counted from 0 after resampling; frames beyond the clip's
             end are ignored.
@@ -153,14 +155,14 @@ def prepared(
 
 
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
-    """A clip whose neck and head curves also set the raw controls for rotations of joints.
+    """Add curves of the raw controls that rotate the neck and head joints of a face.
 
     Args:
-        clip: with or without curves of ANGLES. Existing curves of these raw controls stay.
+        clip: a clip with or without curves of ANGLES. Existing curves of these raw controls stay.
         face: the character.
 
     Returns:
-        The clip with four additional curves for each joint.
+        The clip with additional curves for each joint, one per component of its quaternion.
     """
     raw = face.rig.raw_control_names
     given = dict(zip(clip.names, clip.curves, strict=True))
@@ -178,7 +180,7 @@ def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
 
 
 class Chunk(NamedTuple):
-    """Consecutive frames."""
+    """Poses of consecutive frames."""
 
     first: int
     pose: risorius.Pose
@@ -186,8 +188,10 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of the clip's curves that move nothing, because the face has no such raw
-    control."""
+    """The names of the clip's curves that move nothing.
+
+    The face has no such raw control.
+    """
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))
@@ -197,7 +201,8 @@ def missing(clip: risorius.Clip, face: Face) -> list[str]:
 def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
     """The poses of all frames, in chunks whose size depends only on the character.
 
-    Controls without a curve rest. Each frame equals Rig.evaluate of its controls, bit for bit.
+    Controls without a curve are at rest. Each frame equals Rig.evaluate of its controls, bit for
+    bit.
 
     Args:
         clip: curves of raw controls; unknown ones are ignored.
@@ -218,7 +223,7 @@ def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Itera
 
 
 def chunk_frames(face: Face) -> int:
-    """Frames that one thread evaluates at a time."""
+    """Number of frames that one thread evaluates at a time."""
     numbers = face.rig.joint_count * len(face.columns) + face.rig.control_count
     numbers += face.rig.blend_shape_count + face.rig.animated_map_count
     return int(np.clip(_CHUNK_BYTES // (4 * max(1, numbers)), 16, 1024))

@@ -36,10 +36,10 @@ class Measure:
         self._fired |= (chunk.pose.controls[:, self._psds] != 0).any(axis=0)
 
     def finish(self) -> None:
-        """Nothing remains to be done."""
+        """Do nothing; part of the Sink protocol."""
 
     def facts(self) -> dict[str, Any]:
-        """Plain values: docs/batch.md describes each."""
+        """The results as plain values; docs/batch.md describes each."""
         driven = set(self.face.rig.raw_control_names)
         rows = [i for i, name in enumerate(self.clip.names) if name in driven]
         curves = self.clip.curves[rows]
@@ -65,7 +65,7 @@ class Measure:
         }
 
     def _turns(self) -> set[str]:
-        """Controls that are a number of a quaternion, whose range is -1..1."""
+        """Raw controls that are components of a quaternion, whose range is -1 to 1."""
         names = self.face.rig.raw_control_names
         rests = np.flatnonzero(self.face.rig.initial_raw_controls)
         bases = {names[i].rpartition(".")[0] for i in rests}
@@ -73,7 +73,7 @@ class Measure:
 
 
 def _ranges(names: list[str], curves: Floats) -> dict[str, tuple[float, float]]:
-    """Smallest and largest finite number of each curve, 0 if there is none."""
+    """Smallest and largest finite number of each curve, 0 if it has none."""
     finite = np.where(np.isfinite(curves), curves, np.float32(np.nan))
     low = np.nan_to_num(np.fmin.reduce(finite, axis=1))
     high = np.nan_to_num(np.fmax.reduce(finite, axis=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Progress of long work, on a terminal or in a log."""
+"""Shows progress of long work, on a terminal or in a log."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _LINE_SECONDS = 10.0
 
 
 class Progress:
-    """A bar that is redrawn on a terminal, otherwise a line now and then.
+    """A progress bar on a terminal, otherwise a line of text at intervals.
 
     Nothing is shown before the first interval has passed, because quick work needs no bar.
     """
@@ -21,8 +21,11 @@ class Progress:
     def __init__(
         self, total: int, noun: str, *, before: int = 0, stream: TextIO | None = None
     ) -> None:
-        """Args: total: number of items. noun: their name, e.g. "jobs". before: items that were done
-        earlier. stream: default is stderr."""
+        """Start at `before` of `total` items.
+
+        Args: total: number of items. noun: name of the items, e.g. "jobs". before: number of items
+        done by an earlier run. stream: default is stderr.
+        """
         self.total, self.noun = total, noun
         self.done = self._before = before
         self.frames = 0
@@ -32,11 +35,11 @@ class Progress:
         self._drawn = False
 
     def update(self, done: int, frames: int = 0, note: str = "") -> None:
-        """Report the state; it is drawn only now and then.
+        """Set the state; it is drawn at intervals only.
 
         Args:
             done: number of finished items.
-            frames: number of frames so far; 0: show no speed.
+            frames: number of frames so far; 0 to show no speed.
             note: text at the end of the line.
         """
         self.done, self.frames = done, frames
@@ -49,8 +52,8 @@ class Progress:
         """The line, e.g. "[####......] 40 of 100 jobs, 2,100 frames/s, 1:12 left".
 
         Args:
-            elapsed: seconds since the beginning.
-            note: text at its end.
+            elapsed: seconds since the start.
+            note: text at the end of the line.
         """
         part = self.done / self.total if self.total else 1.0
         words = [f"{self.done:,} of {self.total:,} {self.noun}"]
@@ -74,7 +77,7 @@ class Progress:
         self._stream.flush()
 
     def say(self, text: str) -> None:
-        """Print a permanent line."""
+        """Remove the bar and print a permanent line."""
         self.close()
         self._stream.write(f"risorius: {text}\n")
         self._stream.flush()
@@ -89,7 +92,7 @@ class Progress:
 
 
 def clock(seconds: float) -> str:
-    """E.g. 0:07, 12:40, 3:05:09."""
+    """A time as text, e.g. 0:07, 12:40, 3:05:09."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

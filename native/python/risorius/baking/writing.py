@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes baked animation as .npz and .csv during the computation."""
+"""Writes baked animation as .npz and .csv while it is computed."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _SPOOL_BYTES = 32 << 20
 
 
 class NpzWriter:
-    """Writes arrays of all frames, one directly and the others after it.
+    """Writes an .npz: the largest array directly, the others after it.
 
-    A zip archive takes one member at a time. The largest array goes straight into it; arrays that
-    are too large for memory wait in an anonymous temporary file.
+    A zip archive is written one member at a time. So the largest array is written at once, and the
+    others are kept in memory or, if large, in temporary files.
     """
 
     def __init__(
@@ -38,8 +38,11 @@ class NpzWriter:
         parts: Sequence[str],
         compress: bool,
     ) -> None:
-        """Args: file; beside: arrays that do not depend on frames, see about(); face; parts;
-        compress."""
+        """Open the archive.
+
+        Args: file: binary file; beside: arrays that do not depend on frames, see about(); face: the
+        character; parts: parts to write; compress: True for a smaller file.
+        """
         self._beside = beside
         frames = len(beside["times"])
         self._method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
@@ -63,18 +66,18 @@ class NpzWriter:
         try:
             if self._first is not None:
                 self._first.close()
-        finally:  # closing fails on a full disk; the other files are closed nevertheless
+        finally:  # closing fails on a full disk, but the temporary files must be closed
             self._stack.close()
 
     def _member(self, part: str) -> IO[bytes]:
-        """The array of a part, opened after its header."""
+        """Open the member for the array of a part, and write its header."""
         member = self._open(FIELDS[part])
         about = {"descr": "<f4", "fortran_order": False, "shape": self._shapes[part]}
         np.lib.format.write_array_header_1_0(member, about)  # type: ignore[no-untyped-call]
         return member
 
     def _open(self, name: str) -> IO[bytes]:
-        # Dated 1980, so that the same animation gives the same bytes.
+        # A fixed date (1980), so that the same animation gives the same bytes.
         info = zipfile.ZipInfo(f"{name}.npy")
         info.compress_type = self._method
         return self._zip.open(info, "w", force_zip64=True)
@@ -87,12 +90,12 @@ class NpzWriter:
             try:
                 file.write(values.data.cast("B") if values.size else b"")
             except OSError as error:
-                if error.filename is None:  # a temporary file, whose name means nothing to a user
+                if error.filename is None:  # a temporary file, whose name the user does not know
                     raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
                 raise
 
     def finish(self) -> None:
-        """Write the waiting arrays, and those that do not depend on frames."""
+        """Write the other parts, and the arrays that do not depend on frames."""
         if self._first is not None:
             self._first.close()
             self._first = None
@@ -114,12 +117,12 @@ def about(
 
     Args:
         clip: the baked clip.
-        face: from `load_face`.
+        face: the character, from `load_face`.
         lod: the baked LOD, from 0.
         parts: baked parts, from PARTS; their names are included.
 
     Returns:
-        Name in the .npz -> array; times are seconds.
+        Name in the .npz -> array; times are in seconds.
     """
     out: dict[str, Any] = {
         "times": clip.frame_times(),
@@ -150,15 +153,15 @@ def about(
 
 
 def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> dict[str, Any]:
-    """Part -> the flat indices of its numbers that leave their rest value in some frame.
+    """Find the numbers of each part that leave their rest value in some frame.
 
     Args:
-        face: from `load_face`.
-        chunks: all frames.
-        parts: from PARTS.
+        face: the character, from `load_face`.
+        chunks: poses of all frames.
+        parts: parts to examine, from PARTS.
 
     Returns:
-        int64[moving] for each part.
+        Part -> int64[moving], flat indices of these numbers.
     """
     rests = {part: face.rest(part) for part in parts}
     moving = {part: np.zeros(rest.shape, bool) for part, rest in rests.items()}
@@ -172,9 +175,9 @@ class CsvWriter:
     """Writes a row per frame: its time and the moving numbers.
 
     Args:
-        file: open for writing bytes.
-        times: float64[frames].
-        moving: from find_moving.
+        file: binary file, open for writing.
+        times: float64[frames], seconds.
+        moving: result of find_moving.
     """
 
     def __init__(
@@ -186,7 +189,7 @@ class CsvWriter:
         for part, indices in moving.items():
             header += _headings(face, part, indices)
         csv.writer(self._text, lineterminator="\n").writerow(header)
-        # Nine digits restore every float32, and a format is three times as fast as the shortest
+        # Nine digits restore every float32, and "%.9g" is three times as fast as the shortest
         # digits.
         self._row = ",%.9g" * (len(header) - 1) + "\n"
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Tools that every room uses: errors, budgets, filters, TOML. Imports no other room."""
+"""Tools that all packages use: errors, budgets, filters, TOML. Imports no other package."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Limits on memory and work for reading a file, in proportion to its size.
 
-A few bytes of a file may demand gigabytes: arrays that unfold a thousand times, a thousand curves
-that share one array, two frames a year apart. Therefore each reader counts bytes and steps before
-it takes them. No clock is involved, so that the same file gives the same result on every machine.
+A few bytes of a file may demand gigabytes: compressed arrays, a thousand curves that share one
+array, two frames a year apart. Therefore each reader takes bytes and steps from the budget before
+it uses them. The budget does not depend on time, so the same file gives the same result on every
+machine.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from .errors import RisoriusError
 
 BASE_BYTES = 256 << 20
-"""Limit for any file, even a tiny one: enough for an hour of a face's curves."""
+"""Budget in bytes for a file of size 0: enough for an hour of a face's curves."""
 BYTES_PER_BYTE = 32
 BASE_STEPS = 20_000_000
 STEPS_PER_BYTE = 64
@@ -24,12 +25,12 @@ class BudgetError(RisoriusError):
 
 
 class Budget:
-    """The bytes and steps that are left while one file is read.
+    """The bytes and steps that remain while one file is read.
 
     Args:
-        bytes_: largest number of bytes that may be held in total.
-        steps: largest number of steps, about one per number that is read (some nanoseconds).
-        name: name of the file, which begins error messages; "": the caller adds it.
+        bytes_: largest number of bytes to allocate in total.
+        steps: largest number of steps; a step is about one number that is read, some nanoseconds.
+        name: name of the file, with which error messages begin; "": the caller adds it.
     """
 
     def __init__(self, bytes_: int, steps: int, name: str = "") -> None:
@@ -43,28 +44,28 @@ class Budget:
         return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size, name)
 
     def hold(self, count: float, place: str) -> None:
-        """Take `count` bytes of the budget, before they are held.
+        """Take `count` bytes from the budget, before they are allocated.
 
         Args:
-            count: bytes.
+            count: number of bytes.
             place: the object that needs the bytes, for the error.
 
         Raises:
-            BudgetError: fewer are left.
+            BudgetError: fewer bytes remain.
         """
         self.bytes = _left(
             self.bytes, self._bytes, count, f"{self._name}{place}: {_amount(count)} bytes", "taken"
         )
 
     def work(self, count: float, place: str) -> None:
-        """Take `count` steps of the budget, before they are done.
+        """Take `count` steps from the budget, before they are done.
 
         Args:
-            count: steps, about one per number that is looked at.
+            count: number of steps, about one per number that is read.
             place: the object that needs the steps, for the error.
 
         Raises:
-            BudgetError: fewer are left.
+            BudgetError: fewer steps remain.
         """
         self.steps = _left(
             self.steps, self._steps, count, f"{self._name}{place}: {_amount(count)} steps", "done"
@@ -72,13 +73,13 @@ class Budget:
 
 
 def _amount(count: float) -> str:
-    """The amount as text; a file may state integers beyond float."""
+    """The amount as text; limited, because a file may contain integers beyond float."""
     return f"{min(count, 1 << 80) if isinstance(count, int) else count:,.0f}"
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
-    """The rest after `count` is taken. Raises: BudgetError: less is left."""
-    if not count <= left:  # also of NaN
+    """`left` after `count` is taken. Raises: BudgetError: less than `count` is left."""
+    if not count <= left:  # True for NaN too
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "
             f"at most {most:,} in total were expected for this size"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[Any]  # NumPy's stubs lose the type in arithmetic
+Floats = npt.NDArray[Any]  # Any, because NumPy's stubs lose the type in arithmetic
 
 
 def smooth_step(x: Floats) -> Floats:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The base class of this package's errors, and one way to describe any error."""
+"""The base class of this package's errors, and the text of any error for users."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from __future__ import annotations
 class RisoriusError(ValueError):
     """An error that the user can mend; its text is one sentence with the cause and the place.
 
-    A ValueError of another class is a fault in the calling program or in this one.
+    A ValueError of another class is a fault of the calling program or of this package.
     """
 
     code: str = "invalid"
-    """The kind of error, for programs, e.g. "truncated"."""
+    """The kind of error as a word for programs, e.g. "truncated"."""
     where: str = ""
-    """The file, field or argument; empty if the sentence names it."""
+    """The file, field or argument; "" if the sentence names it."""
     offset: int | None = None
     """Byte offset in the file."""
 

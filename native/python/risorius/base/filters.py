@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Filters against noise: for whole curves, and for values that arrive live."""
+"""Filters against noise, for complete curves and for live values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Doubles = npt.NDArray[np.float64]
 
 
 def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) -> Doubles:
-    """A mean around each frame, weighted by a Gaussian over time; it causes no delay.
+    """Smooth curves with a mean around each frame, weighted by a Gaussian over time; without delay.
 
     At the ends the mean uses only the existing frames.
 
@@ -20,7 +20,7 @@ def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) ->
         curves: [..., N] values at N frames.
         times: float64[N] seconds, ascending.
         width: standard deviation of the Gaussian in seconds, above 0.
-        reach: number of frames before and after each frame that count.
+        reach: number of frames before and after each frame that are included.
 
     Returns:
         float64[..., N].
@@ -45,9 +45,9 @@ class OneEuro:
     From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
 
     Attributes:
-        cutoff: Hz at rest; may be changed between frames.
-        beta: additional Hz per unit per second of speed.
-        speed_cutoff: cutoff in Hz for the speed itself.
+        cutoff: cutoff frequency at rest in Hz; may be changed between frames.
+        beta: growth of the cutoff: Hz per (unit per second) of speed.
+        speed_cutoff: cutoff frequency for the speed in Hz.
         longest_gap: seconds; after a longer gap, or a step back in time, the filter restarts.
     """
 
@@ -58,14 +58,14 @@ class OneEuro:
         speed_cutoff: float = 1.0,
         longest_gap: float | None = None,
     ) -> None:
-        """Start without earlier values.
+        """Start without previous values.
 
         Args:
-            cutoff: see the class, as the others; above 0.
-            beta: 0 or more.
-            speed_cutoff: above 0.
-            longest_gap: None: the filter never restarts, and a frame that is not later than the
-                last counts as the last.
+            cutoff: cutoff at rest in Hz, above 0.
+            beta: growth of the cutoff with speed, 0 or more.
+            speed_cutoff: cutoff for the speed in Hz, above 0.
+            longest_gap: seconds; None: the filter never restarts, and a frame that is not later
+                than the last one returns the last values.
 
         Raises:
             ArgumentError: a number outside of these ranges.
@@ -82,7 +82,8 @@ class OneEuro:
         """Filtered values of a frame.
 
         Args:
-            time: seconds; an unchanged time returns the last values again.
+            time: time in seconds; a time that is not later returns the last values or restarts the
+                filter, see longest_gap.
             values: [controls]; a different number of controls restarts the filter.
 
         Returns:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Checks of numbers and texts from users and files, at the point where they enter.
+"""Checks of numbers and texts from users and files, where they enter the program.
 
-TOML and JSON allow integers of any length, and Python alone accepts some spellings of digits. A
-value passes through here once and is in range from then on.
+TOML and JSON allow integers of any length, and Python accepts spellings of digits that other
+programs do not. A value is checked here once and is in range from then on.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LARGEST = 3.4028234663852886e38
 MOST = (1 << 53) - 1
 """The largest integer that a float64 and every JSON reader keep exactly."""
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
-_SHOWN = 40  # characters of a value that an error shows
+_SHOWN = 40  # most characters of a value in an error message
 
 
 class GivenError(ArgumentError):
@@ -34,7 +34,7 @@ class GivenError(ArgumentError):
 
 
 def whole(value: object, low: int, high: int = MOST) -> int:
-    """An integer from a file or a caller.
+    """Check an integer from a file or a caller.
 
     Args:
         value: a value of any type; true and false do not count as numbers.
@@ -55,13 +55,13 @@ def whole(value: object, low: int, high: int = MOST) -> int:
 def finite(
     value: object, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
 ) -> float:
-    """A finite number from a file or a caller.
+    """Check a finite number from a file or a caller.
 
     Args:
         value: a value of any type; true and false do not count as numbers.
         low: smallest allowed value.
         high: largest allowed value.
-        above: exclude low itself.
+        above: True: `low` itself is not allowed.
 
     Raises:
         GivenError: not a finite number, or out of range.
@@ -73,7 +73,7 @@ def finite(
 
 
 def whole_text(typed: str, low: int, high: int = MOST) -> int:
-    """An integer that a user typed, in the digits 0 to 9.
+    """Convert the text of an integer that a user typed, with the digits 0 to 9.
 
     Args:
         typed: the text.
@@ -91,13 +91,13 @@ def whole_text(typed: str, low: int, high: int = MOST) -> int:
 def finite_text(
     typed: str, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
 ) -> float:
-    """A finite number that a user typed.
+    """Convert the text of a finite number that a user typed.
 
     Args:
         typed: the text.
         low: smallest allowed value.
         high: largest allowed value.
-        above: exclude low itself.
+        above: True: `low` itself is not allowed.
 
     Raises:
         GivenError: not a finite number, or out of range.
@@ -110,13 +110,13 @@ def finite_text(
 
 
 def text(value: object) -> str:
-    """A text from a file.
+    """Check a text from a file.
 
     Args:
         value: a value of any type.
 
     Raises:
-        GivenError: not a text, or empty, or with a zero byte, which no name may have.
+        GivenError: not a text, empty, or with a zero byte, which no name may contain.
     """
     if not isinstance(value, str) or not value or "\0" in value:
         raise GivenError(f"text was expected, found {shown(value)}")
@@ -124,7 +124,7 @@ def text(value: object) -> str:
 
 
 def flag(value: object) -> bool:
-    """A truth value from a file.
+    """Check a truth value from a file.
 
     Args:
         value: a value of any type.
@@ -138,14 +138,14 @@ def flag(value: object) -> bool:
 
 
 def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
-    """A list from a file.
+    """Check a list from a file.
 
     Args:
         value: a value of any type.
-        of: checks and returns one item.
+        of: function that checks and returns one item.
 
     Raises:
-        GivenError: not a list; also as `of` raises.
+        GivenError: not a list, or an item is invalid.
     """
     if not isinstance(value, list):
         raise GivenError(f"a list was expected, found {shown(value)}")
@@ -153,7 +153,7 @@ def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
 
 
 def checked(name: str, check: Callable[..., T], value: object, low: float, high: float) -> T:
-    """An argument of a function, checked by `whole` or `finite`.
+    """Check an argument of a function with `whole` or `finite`.
 
     Args:
         name: name of the argument.
@@ -172,21 +172,21 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
 
 
 def shown(value: object) -> str:
-    """A value as errors show it, shortened if it is long.
+    """A value as text for errors, shortened if it is long.
 
     Args:
         value: a value of any type.
     """
     if isinstance(value, list | tuple | dict):
         return "a table" if isinstance(value, dict) else "a list"
-    if isinstance(value, int) and value.bit_length() > 128:  # Python spells no 4,301 digits
+    if isinstance(value, int) and value.bit_length() > 128:  # Python refuses to print it
         return f"a number of {int(value.bit_length() * math.log10(2)) + 1:,} digits"
     spelled = repr(value)
     return spelled if len(spelled) <= _SHOWN else f"{spelled[: _SHOWN - 3]}..."
 
 
 def _inside(value: float, found: object, low: float, high: float, *, above: bool) -> float:
-    """Return value if it is in range. Raises: GivenError that shows `found`."""
+    """Return `value` if it is in range. Raises: GivenError with `found` in its text."""
     if isinstance(value, float) and not math.isfinite(value):
         known = low > -LARGEST and high < LARGEST
         expected = f"{low:g} to {high:g}" if known else "a finite number"
@@ -197,7 +197,7 @@ def _inside(value: float, found: object, low: float, high: float, *, above: bool
 
 
 def _range(value: float, low: float, high: float, above: bool = False) -> str:
-    """The expected range, in words."""
+    """The expected range as text."""
     bounded = high < (MOST if isinstance(high, int) else LARGEST)
     if above and low == 0:
         return "more than 0" + (f", at most {_plain(high)}" if bounded else "")

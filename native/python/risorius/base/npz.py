@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The errors that NumPy raises for a damaged .npz, and a limit for the size of its arrays.
+"""The errors of NumPy for a damaged .npz, and a limit on the size of its arrays.
 
-NumPy documents no errors: those of zip, zlib, struct and, from 3.12 on, Python's tokenizer pass
-through. An offset beyond the file raises OSError, like a missing file: open the file first.
+NumPy does not document its errors: errors of zip, zlib, struct and, from Python 3.12 on, the
+tokenizer pass through. An offset beyond the file raises OSError, like a missing file; so open the
+file first.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def hold_arrays(file: BinaryIO) -> None:
     """Check the sizes of an .npz's arrays before NumPy unpacks them.
 
     Args:
-        file: open for reading; NumPy reads it from the beginning afterwards.
+        file: file open for reading; its position is at the start afterwards.
 
     Raises:
         BudgetError: the arrays are too large in proportion to the file.

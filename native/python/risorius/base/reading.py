@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads whole files and streams whose size is checked before reading."""
+"""Reads files and streams completely, with a limit on their size."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from typing import BinaryIO
 from .errors import RisoriusError
 
 TEXT = 16 << 20
-"""Largest text file that a person writes: specs, mappings, jobs, transcripts."""
+"""Largest size in bytes of text files that people write: specs, mappings, jobs, transcripts."""
 MESH = 1 << 29
-"""Largest file of a mesh or a take."""
+"""Largest size in bytes of a file with a mesh or a take."""
 FACE = 4 << 30
-"""Largest DNA file that the format allows, also as JSON."""
+"""Largest size in bytes of a DNA file, also as JSON; the format allows no more."""
 _PIECE = 1 << 20
 
 
 class ReadingError(RisoriusError):
-    """A file that is larger than its kind may be, or that has no end.
+    """A file that exceeds the size limit, or a device, which has no end.
 
     Attributes:
         name: name of the file.
-        what: the expected and the found value.
+        what: text with the expected and the found value.
     """
 
     code = "reading"
@@ -35,17 +35,17 @@ class ReadingError(RisoriusError):
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, found: bool = False) -> bytes:
-    """The bytes of a file, after a check of its size.
+    """Read a file after a check of its size.
 
     Args:
         path: path of the file.
-        most: largest number of bytes.
-        found: the name comes from another file or a folder, not from a user; then a pipe is
-            refused, because reading it could wait for ever.
+        most: largest number of bytes to accept.
+        found: True: the name comes from another file or a folder and not from a user; then a pipe
+            is refused, because reading it might wait for ever.
 
     Raises:
-        ReadingError: the file is larger, a device, or a pipe with `found`.
-        OSError: it cannot be read.
+        ReadingError: the file is larger, is a device, or is a pipe while `found` is True.
+        OSError: the file cannot be read.
     """
     name = os.fspath(path)
     if found:
@@ -64,8 +64,8 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
         path: path of the file.
 
     Raises:
-        ReadingError: a device, which has no end.
-        OSError: it cannot be read.
+        ReadingError: the file is a device, which has no end.
+        OSError: the file cannot be read.
     """
     file = open(path, "rb")  # noqa: SIM115  the caller closes it
     if stat.S_ISCHR(os.fstat(file.fileno()).st_mode) and not file.isatty():
@@ -75,16 +75,16 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
 
 
 def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
-    """The rest of a stream, read in pieces.
+    """Read the rest of a stream, in pieces.
 
     Args:
-        file: open for reading.
-        most: largest number of bytes left.
-        name: name of the stream, for the error.
+        file: stream open for reading.
+        most: largest number of bytes to accept.
+        name: name of the stream for the error.
 
     Raises:
-        ReadingError: more are left.
-        OSError: it cannot be read.
+        ReadingError: more bytes remain.
+        OSError: the stream cannot be read.
     """
     pieces: list[bytes] = []
     left = most + 1
@@ -97,14 +97,14 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
 
 
 def require_regular(path: str | os.PathLike[str]) -> None:
-    """Raise an error if a name found among files is not a file.
+    """Raise an error if a path that was found in a folder or file is not a regular file.
 
     Raises:
-        ReadingError: a pipe, a socket, a device.
+        ReadingError: the path is a pipe, a socket or a device.
         OSError: the file does not exist, or links to itself.
     """
     mode = os.stat(path).st_mode
-    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a folder is an OSError
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a folder raises OSError
         raise ReadingError(os.fspath(path), "a file was expected, found a pipe or a device")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recognises the kind of an unexpected file by its bytes, independent of its name."""
+"""Recognises the kind of a file by its bytes, independent of its name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from .errors import RisoriusError
 
-_PART = 1 << 16  # bytes at the beginning and at the end that are looked at
+_PART = 1 << 16  # number of bytes at the start and at the end that are examined
 _TEXT = 512
 
 
@@ -75,7 +75,7 @@ _BYTES = (
     (b"RZC\x1a", 0,
      Kind("rzc", "a clip of Risorius (.rzc)", "if its name ends otherwise, rename it")),
 )  # fmt: skip
-# Names of files inside archives that are documents.
+# Names inside ZIP archives that identify documents.
 _INSIDE = (
     (b"xl/workbook", _EXCEL),
     (b"word/document", _WORD),
@@ -105,10 +105,10 @@ _TEXTS = (
 
 
 def kind_of(data: bytes) -> Kind | None:
-    """The kind of a file by its bytes, or None if they do not show it.
+    """The kind of a file by its bytes, or None if they do not identify it.
 
     Args:
-        data: the file, or the result of `ends_of`.
+        data: bytes of the file, or the result of `ends_of`.
     """
     for start, at, kind in _BYTES:
         if data[at : at + len(start)] == start:
@@ -125,17 +125,17 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
     """The kind of a file, unless the reader accepts that kind.
 
     Args:
-        data: as of `kind_of`.
-        own: codes of the accepted kinds.
+        data: bytes as for `kind_of`.
+        own: codes of the kinds that the reader accepts.
     """
     kind = kind_of(data)
     return None if kind is None or kind.code in own else kind
 
 
 def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
-    """The beginning and the end of a file, enough for `kind_of`; empty if it is not a plain file.
+    """The start and the end of a file, enough for `kind_of`; empty if the path is no regular file.
 
-    A pipe can be read only once, and opening it may wait for ever.
+    Pipes are not opened: they can be read only once, and opening one might wait for ever.
     """
     if isinstance(source, bytes | bytearray | memoryview):
         return bytes(source[:_PART]) + bytes(source[-_PART:])
@@ -151,11 +151,11 @@ def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
 
 
 def named(error: RisoriusError, source: str | os.PathLike[str] | bytes) -> RisoriusError:
-    """An error about a file; if its bytes show another kind of file, the error names that kind.
+    """An error about a file; if its bytes show another kind of file, the error names this kind.
 
     Args:
         error: error of the native module; its text ends with its place in brackets.
-        source: the file.
+        source: path or bytes of the file.
     """
     kind = kind_of(ends_of(source))
     if kind is None:

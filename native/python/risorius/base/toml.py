@@ -13,21 +13,21 @@ from .errors import ArgumentError, RisoriusError
 
 MOST_BYTES = reading.TEXT
 DEEPEST = 64
-# Limits the parts of a dotted key: the parser's time grows with the square of their number.
+# Limits the parts of a dotted key, because the parser's time grows with the square of their number.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 
 class TomlError(RisoriusError):
-    """Invalid or excessive TOML; the text has the line if it is known."""
+    """Invalid or too large TOML; the text has the line if it is known."""
 
     code = "toml"
 
 
 def parse(text: str) -> dict[str, Any]:
-    """The tables of a TOML text.
+    """Parse a TOML text into a table.
 
     Raises:
-        TomlError: not TOML, larger than MOST_BYTES, or nested deeper than DEEPEST.
+        TomlError: not TOML, longer than MOST_BYTES, or nested deeper than DEEPEST.
     """
     if len(text) > MOST_BYTES:
         raise TomlError(f"at most {MOST_BYTES:,} letters were expected, found {len(text):,}")
@@ -38,7 +38,7 @@ def parse(text: str) -> dict[str, Any]:
         table = tomllib.loads(text)
     except RecursionError:
         raise TomlError(f"values {deep}") from None
-    except ValueError as error:  # TOMLDecodeError, and a number of thousands of digits
+    except ValueError as error:  # TOMLDecodeError, or an integer with thousands of digits
         raise TomlError(str(error)) from error
     if _is_deep(table):
         raise TomlError(f"values {deep}")
@@ -46,7 +46,7 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The tables of a TOML file. Raises: ValueError with the file's name; OSError."""
+    """Read a TOML file into a table. Raises: ValueError with the file's name; OSError."""
     try:
         return parse(text_of(path))
     except TomlError as error:
@@ -57,9 +57,9 @@ def text_of(path: str | os.PathLike[str]) -> str:
     """The text of a TOML file, with or without a byte order mark.
 
     Raises:
-        TomlError: not UTF-8; without the file's name.
-        ReadingError: larger than MOST_BYTES, or a device.
-        OSError: it cannot be read.
+        TomlError: the file is not UTF-8; its name is not in the text.
+        ReadingError: the file is larger than MOST_BYTES, or a device.
+        OSError: the file cannot be read.
     """
     try:
         return reading.read_file(path, MOST_BYTES).decode("utf-8-sig")

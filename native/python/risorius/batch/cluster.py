@@ -21,14 +21,14 @@ _CONNECT_SECONDS = 10.0
 class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
-    Every worker must see the files under the same paths and have this version of Risorius. If a
-    worker dies, its job goes to another one; Dask gives it up after the scheduler's
-    `distributed.scheduler.allowed-failures` (3) more deaths. Other jobs at a dead worker may be
-    blamed as well, so that a job that was given up is tried once more with nothing beside it.
+    Every worker must find the files under the same paths and have this version of Risorius. If a
+    worker dies, its job goes to another one; Dask gives it up after more than
+    `distributed.scheduler.allowed-failures` (3) deaths. Dask may blame other jobs of a dead worker
+    as well. So a job that was given up is tried once more alone.
 
     Args:
         address: e.g. tcp://10.0.0.5:8786.
-        work: a function that workers can import, or a partial of one.
+        work: function that runs a job; workers must be able to import it, or a partial of one.
 
     Raises:
         PoolError: the package `distributed` is missing, or no scheduler answers.
@@ -54,7 +54,10 @@ class Cluster:
         self._run = uuid.uuid4().hex[:8]
 
     def workers(self) -> dict[str, int]:
-        """Address of each worker -> number of jobs that it runs at a time. Raises: PoolError."""
+        """Address of each worker -> number of jobs that it runs at the same time.
+
+        Raises: PoolError.
+        """
         try:
             return dict(self._client.nthreads())
         except (OSError, ValueError) as error:
@@ -67,7 +70,7 @@ class Cluster:
         """Outcomes as they arrive. Closing the iterator early cancels jobs that have not begun.
 
         Raises:
-            PoolError: the scheduler is gone.
+            PoolError: the scheduler does not answer.
         """
         suspects: list[Job] = []
         try:
@@ -78,11 +81,11 @@ class Cluster:
                 for _ in again:
                     yield Outcome(job.name, "given up: it ends every worker that it is given to")
         finally:
-            with contextlib.suppress(Exception):  # the scheduler may be the cause
+            with contextlib.suppress(Exception):  # the scheduler itself may have failed
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs; a few more than the workers take are submitted at a time."""
+        """Run jobs, with a few more submitted than the workers can run."""
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:
@@ -94,7 +97,7 @@ class Cluster:
                     running[future] = job
                     finished.add(future)
                 future = next(finished)
-                if future.status == "lost":  # lost with its worker; Dask runs it again
+                if future.status == "lost":  # the worker died; Dask runs the job again
                     finished.add(future)
                     continue
                 job = running.pop(future)

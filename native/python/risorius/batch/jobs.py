@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads and checks JOBS.toml, and expands it to a list of jobs."""
+"""Reads and checks a JOBS.toml, and expands it to a list of jobs."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ MAX_JOBS = 200_000
 
 
 class JobsError(RisoriusError):
-    """An unusable JOBS.toml; the text has file, field, found and expected value."""
+    """An unusable JOBS.toml; the text has the file, the field, and the found and expected value."""
 
     code = "jobs"
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options that change the content of an output."""
+    """Options that change the content of the outputs."""
 
     parts: tuple[str, ...] = DEFAULT_PARTS
     rate: float | None = None
@@ -47,33 +47,32 @@ class Options:
     quaternions: bool = False
     compress: bool = False
     mapping: str | None = None
-    """The name of a built-in mapping or the absolute path of a TOML file; None for the fitting
-    one."""
+    """Name of a built-in mapping, or absolute path of a TOML file; None for the best fit."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A clip on a character at a LOD."""
+    """A clip to evaluate on a character at a LOD."""
 
     name: str
-    """Name of its outputs, below the output folder and without suffix; unique."""
+    """Path of its outputs below the output folder, without suffix; unique."""
     clip: Path
     character: Path
     lod: int
     outputs: tuple[tuple[str, Path], ...]
-    """Kind and path of each file; empty if only the facts are wanted."""
+    """Kind and path of each output; empty if only the facts are wanted."""
     options: Options
 
 
 @dataclass(frozen=True)
 class Plan:
-    """An expanded JOBS.toml."""
+    """The content of a JOBS.toml, expanded to jobs."""
 
     source: Path
     output: Path
     summary: tuple[Path, ...]
     jobs: tuple[Job, ...]
-    """By table, character, clip and LOD: the same files give the same list."""
+    """Sorted by table, character, clip and LOD, so that the same files give the same list."""
 
     @property
     def journal(self) -> Path:
@@ -83,11 +82,11 @@ class Plan:
 class _Found(NamedTuple):
     path: Path
     folder: str
-    """Path below the fixed part of the pattern, with slashes; "" for the fixed part itself."""
+    """Path below the pattern's folder without wildcards, with slashes; "" for this folder."""
 
 
 class _Table:
-    """A table of a TOML file, whose errors name the file and the field."""
+    """A table of a JOBS.toml; its errors name the file and the field."""
 
     def __init__(self, source: Path, where: str, values: dict[str, Any], keys: tuple[str, ...]):
         self._source, self._where, self._values = source, where, values
@@ -99,7 +98,7 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """A value; default replaces a missing one, None: the value is required."""
+        """The value of a key; `default` replaces a missing value, None makes it required."""
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -110,7 +109,7 @@ class _Table:
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
-        """A list of strings; a single string is a list of one."""
+        """A list of strings; a single string counts as a list of one."""
         value = self.take(
             key, "a string or a list of strings",
             lambda v: isinstance(v, str) or _all_of(v, str), default,
@@ -126,7 +125,7 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """Some of the choices, in their order."""
+        """The chosen ones of `choices`, in the order of `choices`."""
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -147,8 +146,8 @@ def read_jobs(source: Path) -> Plan:
     """Read a JOBS.toml and find its files.
 
     Raises:
-        JobsError: the file cannot be read, has an invalid key or value, a pattern matches nothing,
-            or two jobs would write one file.
+        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing, or
+            two jobs would write one file.
     """
     try:
         values = toml.parse(toml.text_of(source))
@@ -240,7 +239,7 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files that match patterns, by path; a pattern without a match is an error."""
+    """The files that match the patterns, sorted by path. Raises: JobsError: one has no match."""
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):
         root = _root(base, pattern)
@@ -265,7 +264,7 @@ def _glob(base: Path, pattern: str) -> list[Path]:
 
 
 def _root(base: Path, pattern: str) -> Path:
-    """The folder of a pattern up to its first * or ?."""
+    """The folder of a pattern, up to its first part with a wildcard."""
     root = base
     for part in Path(pattern).parts[:-1]:
         if glob.has_magic(part):
@@ -275,7 +274,7 @@ def _root(base: Path, pattern: str) -> Path:
 
 
 def _check_pattern(table: _Table, pattern: str) -> None:
-    """Allow only plain field names, because a format string could reach into objects."""
+    """Accept only plain field names, because a format string could access attributes of objects."""
     expected = f"a pattern of {', '.join(f'{{{field}}}' for field in FIELDS)} was expected, "
     try:
         pieces = list(string.Formatter().parse(pattern))
@@ -287,7 +286,7 @@ def _check_pattern(table: _Table, pattern: str) -> None:
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
-    """The name of a job. Names of found files and folders are made safe, without separators."""
+    """The name of a job. Names of files and folders are made safe and without separators."""
     return pattern.format(
         clip=file_name(clip.path.stem),
         character=file_name(character.path.stem),
@@ -302,7 +301,7 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. An empty field leaves no folder."""
+    """A path below the output folder. Empty parts of the name are dropped."""
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:
@@ -318,8 +317,11 @@ def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
 
 
 def _refuse_collisions(plan: Plan) -> None:
-    """Check that each file is written by one job and read by none. Names that differ only in case
-    or in the spelling of an accent are one file on some systems."""
+    """Check that each file is written by one job and is no input.
+
+    Names that differ only in case or in the spelling of an accent are the same file on some
+    systems.
+    """
     taken = {_folded(path): "the summary" for path in plan.summary}
     if len(taken) < len(plan.summary):
         raise JobsError(f"{plan.source}: summary: different files were expected, found one twice")

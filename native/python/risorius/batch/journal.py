@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The journal of finished jobs: a line for each, added when its files are complete."""
+"""The journal of finished jobs: one line per job, added when its files are complete."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """The conditions under which a job counts as finished, and the position of its facts."""
+    """The line of a finished job: stamp and files to compare, and its place in the journal."""
 
     stamp: str
     files: list[list[Any]]
@@ -28,11 +28,11 @@ class _Record(NamedTuple):
 
 
 class Journal:
-    """A file of JSON lines beside the outputs.
+    """A file of JSON lines next to the outputs.
 
-    A job in it is finished if its inputs have not changed and its files still have the size and
-    time with which it wrote them. The facts stay in the file, because thousands of jobs with the
-    range of every control would take too much memory.
+    A job counts as finished if its inputs have not changed and its files still have the recorded
+    size and time. The facts are read from the file when needed, because the control ranges of
+    thousands of jobs would take too much memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -63,7 +63,7 @@ class Journal:
         )
 
     def is_done(self, job: Job) -> bool:
-        """Whether the job is finished."""
+        """Whether a job is finished, and its inputs and outputs are unchanged."""
         record = self._records.get(job.name)
         try:
             return record is not None and record[:2] == (stamp(job), _files(job))
@@ -71,15 +71,17 @@ class Journal:
             return False
 
     def facts(self, name: str) -> dict[str, Any]:
-        """The facts of a finished job. Raises: OSError, KeyError; JobsError: its line is
-        missing."""
+        """The facts of a finished job.
+
+        Raises: OSError, KeyError; JobsError: its line is missing.
+        """
         record = _parsed(self._line_of(name))
         if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):
             raise JobsError(f"{self.path}: somebody else has changed it while this batch ran")
         return dict(record["facts"])
 
     def begin(self, kept: Iterable[str]) -> None:
-        """Start a new file with the lines of these jobs. Raises: OSError."""
+        """Start a new journal with the lines of the jobs in `kept`. Raises: OSError."""
         records: dict[str, _Record] = {}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(self.path) as file:
@@ -97,14 +99,14 @@ class Journal:
             return file.read(record.size)
 
     def add(self, job: Job, outcome: Outcome) -> None:
-        """Record a finished job; its line is on the disk when this returns.
+        """Record a finished job; its line is on disk when this returns.
 
         Args:
-            job: its files are complete.
-            outcome: its stamp and facts are recorded.
+            job: job whose files are complete.
+            outcome: outcome with the stamp and facts to record.
 
         Raises:
-            OSError: the journal cannot be written; the error names it.
+            OSError: the journal cannot be written; the error names the journal.
         """
         files = _files(job)
         line = _line(
@@ -118,7 +120,7 @@ class Journal:
                     rest = rest[file.write(rest) :]
                 os.fsync(file.fileno())
             except OSError as error:
-                with contextlib.suppress(OSError):  # half a line would make the next one unreadable
+                with contextlib.suppress(OSError):  # half a line would damage the next one
                     file.truncate(offset)
                 raise OSError(error.errno, error.strerror, str(self.path)) from None
         self._records[job.name] = _Record(outcome.stamp, files, offset, len(line))
@@ -136,7 +138,7 @@ def _line(record: dict[str, Any]) -> bytes:
 
 
 def _files(job: Job) -> list[list[Any]]:
-    """Kind, size and time of each output. Raises: OSError: one is missing."""
+    """Kind, size and modification time of each output. Raises: OSError: an output is missing."""
     out: list[list[Any]] = []
     for kind, path in job.outputs:
         about = path.stat()

@@ -9,14 +9,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished job, or one that failed and will not be tried again.
+    """The result of a job that succeeded, or that failed and will not be tried again.
 
     Attributes:
         name: name of the job.
         error: the reason of the failure; "" if it succeeded.
-        stamp: hash of its inputs, see stamp().
-        facts: of Measure, and the seconds for reading, evaluating and writing.
-        attempts: number of workers that tried it.
+        stamp: hash of the job's inputs, see stamp().
+        facts: facts of Measure, and the seconds for reading, evaluating and writing.
+        attempts: number of workers that ran the job.
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Worker processes on this machine, any of which may die."""
+"""Runs jobs in worker processes on this machine, and survives the death of a worker."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _STOP_SECONDS = 5.0
 
 
 class PoolError(RisoriusError, RuntimeError):
-    """Workers cannot be started, or a cluster is gone."""
+    """Workers cannot be started, or a cluster does not answer."""
 
     code = "pool"
 
@@ -51,7 +51,7 @@ def _serve(connection: Connection[object, object], work: Work) -> None:
 
 @contextlib.contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
-    """Processes started in this context ignore Ctrl-C from their first moment on."""
+    """Processes that start in this context ignore Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -63,7 +63,7 @@ def _ignoring_interrupts() -> Iterator[None]:
 
 
 class _Worker:
-    """A process and its present job."""
+    """A worker process and its current job."""
 
     def __init__(self, work: Work) -> None:
         context = multiprocessing.get_context("spawn")  # the same method on every system
@@ -80,12 +80,12 @@ class _Worker:
 
     def give(self, job: Job) -> None:
         self.job = self.last = job
-        # The worker has died; the code that waits for it notices.
+        # A send fails if the worker has died, which _step notices.
         with contextlib.suppress(OSError):
             self.connection.send(job)
 
     def end(self) -> str:
-        """Wait for a dead process; returns how it ended."""
+        """Wait for the end of a dead process. Returns its signal or exit code as text."""
         self.process.join()
         self.connection.close()
         code = self.process.exitcode or 0
@@ -97,7 +97,7 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Jobs by face and clip, so that a worker keeps its loaded files as long as possible."""
+    """Waiting jobs by face and clip, so that a worker can keep its files for its next job."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}
@@ -111,7 +111,7 @@ class _Queue:
         self._lengths[_face_of(job)] += 1
 
     def take(self, last: Job | None) -> Job | None:
-        """The next job for a worker, given its last one."""
+        """Remove and return the next job for a worker, if possible of its last face and clip."""
         face = _face_of(last) if last else None
         if face is None or not self._lengths[face]:
             face, length = max(self._lengths.items(), key=lambda item: item[1])
@@ -121,7 +121,7 @@ class _Queue:
         clip = last.clip if last and last.clip in line else next(iter(line))
         job = line[clip].popleft()
         self._lengths[face] -= 1
-        line.move_to_end(clip)  # the next worker begins with another clip
+        line.move_to_end(clip)  # the next worker starts with another clip
         if not line[clip]:
             del line[clip]
         return job
@@ -131,9 +131,9 @@ class Pool:
     """Runs jobs in processes of this machine.
 
     Args:
-        work: runs a job; a function that can be imported, or a partial of one.
+        work: function that runs a job; it can be imported, or is a partial of one that can.
         workers: number of processes.
-        attempts: number of workers that a job may kill before it is given up.
+        attempts: number of workers that a job may kill before it counts as failed.
     """
 
     def __init__(self, work: Work, workers: int, attempts: int = 3) -> None:
@@ -143,8 +143,9 @@ class Pool:
         self._false_starts = 0
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """Outcomes as they arrive. Closing the iterator early, even by an exception, stops the
-        workers.
+        """Outcomes as they arrive.
+
+        Closing the iterator early, even by an exception, stops the workers.
 
         Raises:
             PoolError: no worker can be started.
@@ -160,7 +161,7 @@ class Pool:
             self._stop()
 
     def _step(self, queue: _Queue) -> Iterator[Outcome]:
-        """Wait for an event and handle it."""
+        """Wait for messages or deaths of workers and handle them."""
         places = {id(w.connection): w for w in self._workers}
         ready = multiprocessing.connection.wait([w.connection for w in self._workers])
         for connection in ready:
@@ -182,7 +183,7 @@ class Pool:
             worker.give(job)
 
     def _replace(self, worker: _Worker, queue: _Queue) -> Iterator[Outcome]:
-        """Replace a dead worker, and retry or fail its job."""
+        """Replace a dead worker; its job is queued again, or fails after too many deaths."""
         how = worker.end()
         self._workers.remove(worker)
         self._false_starts = 0 if worker.ready else self._false_starts + 1
@@ -200,7 +201,7 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """End every worker, at once if it has a job; the caller deletes partial files."""
+        """Stop all workers, immediately if they have jobs; the caller deletes partial files."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:
@@ -214,7 +215,7 @@ class Pool:
 
 
 def default_workers() -> int:
-    """The cores that this process may use."""
+    """The number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return os.cpu_count() or 1

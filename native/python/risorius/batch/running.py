@@ -36,12 +36,12 @@ class Report:
     frames: int = 0
 
     def failed(self) -> list[Outcome]:
-        """Failed jobs in the plan's order."""
+        """Outcomes of failed jobs, in the plan's order."""
         out = [self.outcomes.get(job.name) for job in self.plan.jobs]
         return [outcome for outcome in out if outcome and outcome.error]
 
     def facts(self) -> dict[str, Any]:
-        """Plain values for programs."""
+        """The result as plain values, for JSON."""
         failed = self.failed()
         return {
             "jobs": len(self.plan.jobs),
@@ -56,12 +56,12 @@ class Report:
 
 
 def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
-    """The jobs that remain to be done.
+    """The jobs of a plan that are not finished.
 
     Args:
         plan: all jobs.
         journal: journal of earlier runs.
-        report: receives the finished ones.
+        report: report that receives the finished jobs.
     """
     out = []
     for job in plan.jobs:
@@ -74,12 +74,12 @@ def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
 
 
 def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool) -> Report:
-    """Run all unfinished jobs of a plan.
+    """Run all unfinished jobs of a plan and write the summary.
 
     Args:
-        workers: number of processes; None: one per core.
-        scheduler: address of a Dask scheduler to use instead.
-        restart: run all jobs again.
+        workers: number of processes; None for one per core.
+        scheduler: address of a Dask scheduler to use instead of processes; None for none.
+        restart: True: run finished jobs again.
 
     Raises:
         LockedError: another batch works in the output folder.
@@ -124,7 +124,7 @@ def _results(
         return
     if scheduler is None:
         count = workers or default_workers()
-        threads = max(1, count // len(jobs))  # with fewer jobs than cores, a job gets several
+        threads = max(1, count // len(jobs))  # few jobs get several threads
         yield from Pool(functools.partial(run_job, threads=threads), count).results(jobs)
         return
     cluster = Cluster(scheduler, functools.partial(run_job, version=risorius.__version__))
@@ -147,7 +147,7 @@ def _gather(
             failed += 1
             progress.say(f"{outcome.name}: {outcome.error}")
         else:
-            # The journal is written first, so that after Ctrl-C it holds all that the report has.
+            # The journal is written first, so that after Ctrl-C it contains all jobs of the report.
             journal.add(by_name[outcome.name], outcome)
             report.frames += int(outcome.facts.get("frames", 0))
         report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})
@@ -156,7 +156,7 @@ def _gather(
 
 
 def closing_line(report: Report) -> str:
-    """E.g. "120 jobs: 100 done, 19 kept, 1 failed; 36,000 frames in 0:12, 3,000 frames/s"."""
+    """The last line of a batch, e.g. "120 jobs: 100 done, 19 done before, 1 failed; ..."."""
     facts = report.facts()
     words = [f"{facts['done']:,} done"]
     words += [f"{facts['kept']:,} done before"] if facts["kept"] else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The table of all jobs."""
+"""The summary of a batch: a table with a row per job, as .csv or .json."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ Rows = Iterator[dict[str, Any]]
 
 
 def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal: Journal) -> Rows:
-    """A row per job, in the plan's order: done, kept (from an earlier run), failed or not done.
+    """A row per job in the plan's order; its state is done, kept, failed or not done.
 
     Args:
         plan: all jobs.
         outcomes: name of a job -> its result.
-        reused: names of the jobs finished by an earlier run.
-        journal: has the facts of finished jobs.
+        reused: names of the jobs that an earlier run finished ("kept").
+        journal: journal with the facts of finished jobs.
     """
     for job in plan.jobs:
         outcome = outcomes.get(job.name)
@@ -57,8 +57,8 @@ def write(plan: Plan, table: Callable[[], Rows]) -> None:
     """Write the summary in each requested form, row by row.
 
     Args:
-        plan: has the paths.
-        table: returns the rows from the beginning; called once per file.
+        plan: plan with the paths of the summary.
+        table: function that returns the rows from the first one on; called once per file.
 
     Raises:
         OSError: a file cannot be written.
@@ -72,7 +72,7 @@ def write(plan: Plan, table: Callable[[], Rows]) -> None:
 
 
 def _write_csv(file: TextIO, table: Rows) -> None:
-    """Lists of names appear as their length; the JSON has the names."""
+    """Write the rows as .csv. A list of names is written as its length; the .json has the names."""
     keys = ["job", "state", "clip", "character", "lod", "error", "attempts", *_COLUMNS]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(keys)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The work of a worker: one job after the other, with recent faces and clips kept loaded."""
+"""Runs one job after the other in a worker, with recent faces and clips kept in memory."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _Value = TypeVar("_Value")
 
 
 class Kept(Generic[_Value]):
-    """Keeps the last few objects made from files, by the files' content.
+    """A cache of the last few objects made from files; keys depend on the files' content.
 
-    Thread-safe, because a cluster's worker runs several jobs at once. An object that two of them
-    need at the same time is made once.
+    Thread-safe, because a cluster's worker runs several jobs at the same time. An object that two
+    jobs need at the same time is made once.
     """
 
     def __init__(self, count: int) -> None:
@@ -41,11 +41,11 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; if it is not kept, it is made while other threads wait.
+        """The value of a key; if the cache lacks it, it is made while other threads wait.
 
         Args:
-            key: hashable.
-            make: makes the value; its exceptions pass through.
+            key: key of the value; hashable.
+            make: function that makes the value; its exceptions pass through.
         """
         with self._lock:
             if key not in self._values:
@@ -62,7 +62,7 @@ _digests: Kept[str] = Kept(4096)
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file, cached by its size and time. Raises: OSError."""
+    """SHA-256 of a file, cached by path, size and modification time. Raises: OSError."""
     about = path.stat()
     return _digests.get((path, about.st_size, about.st_mtime_ns), lambda: _digest(path))
 
@@ -85,7 +85,7 @@ def stamp(job: Job) -> str:
         "compile": compile_version(),
         "clip": file_digest(job.clip),
         "character": file_digest(job.character),
-        "names": [job.clip.stem, job.character.stem],  # an .npz contains them
+        "names": [job.clip.stem, job.character.stem],  # an .npz contains these names
         "lod": job.lod,
         "kinds": [kind for kind, _ in job.outputs],
         "options": asdict(job.options) | {"mapping": _mapping_digest(job)},
@@ -94,7 +94,7 @@ def stamp(job: Job) -> str:
 
 
 def _mapping_digest(job: Job) -> str | None:
-    """The digest of a mapping's file, or the name of a built-in one."""
+    """The digest of the mapping's file, or the name of a built-in mapping; None for no mapping."""
     name = job.options.mapping
     return file_digest(Path(name)) if name and os.path.isabs(name) else name
 
@@ -112,12 +112,12 @@ def _performance(job: Job) -> Performance:
 
 
 def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
-    """Run a job.
+    """Run a job; errors about its files become an Outcome.
 
     Args:
-        job: its paths must exist on the machine that runs this.
+        job: job whose paths exist on this machine.
         threads: number of threads for the evaluation.
-        version: version of the Risorius that sent the job, if it may differ.
+        version: version of the Risorius that sent the job; None to skip the check.
     """
     if version not in (None, risorius.__version__):
         return Outcome(

@@ -40,13 +40,16 @@ INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command. Args: the arguments, or None for the arguments of the process. Returns: the
-    exit code."""
+    """Run a command. Returns the exit code.
+
+    Args: arguments  words of the command line; None for those of the process.
+    """
     for stream in (sys.stdout, sys.stderr):
         # Names may contain text that a terminal cannot show.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    # Code that computes refuses values out of range; NumPy's warnings name our lines and no file.
+    # The calculation modules check the range of values themselves; NumPy's warnings would name a
+    # line of our code and no file.
     with obeyed_by_nobody(), np.errstate(all="ignore"):
         return _run(arguments)
 
@@ -64,7 +67,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except (RisoriusError, OSError, MemoryError) as error:
         place = ""
         if isinstance(error, OSError) and error.filename is None and error.errno == errno.ENOSPC:
-            place = "<stdout>: "  # other errors already name their file
+            place = "<stdout>: "  # other errors already contain the name of their file
             _drop_output()
         return _say(place + sentence(error), 2 if isinstance(error, CommandLineError) else 1)
     return code
@@ -77,13 +80,13 @@ def _say(text: str, code: int) -> int:
 
 
 def _drop_output() -> None:
-    """Drop buffered output, so that nothing fails again when the interpreter ends."""
+    """Discard buffered output, so that no second error follows when the interpreter ends."""
     with contextlib.suppress(OSError, ValueError):  # sys.stdout may have no file descriptor
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that passes wrong option values to `main`."""
+    """A parser that raises CommandLineError for invalid option values, for `main`."""
 
     def error(self, message: str) -> NoReturn:
         if message.startswith("argument "):
@@ -92,11 +95,11 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """The parsed command line; `func` is the command.
+    """Parse the command line; `func` of the result is the function of the command.
 
     Raises:
         CommandLineError: an option has an invalid value.
-        SystemExit: the command line is invalid as a whole; the usage was printed.
+        SystemExit: the command line as a whole is invalid; the usage was printed.
     """
     parser = _Parser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
@@ -123,7 +126,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     for command in commands:
         command.add_parser(subparsers)
     args, rest = parser.parse_known_args(arguments)
-    # argparse ends a list of operands at the first option: FILE --json NAME=1.
+    # argparse ends a list of operands at the first option, as in FILE --json NAME=1.
     operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
     if any(text.startswith("-") for text in rest) or (rest and operands is None):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")

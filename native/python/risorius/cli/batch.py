@@ -74,8 +74,8 @@ def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
 
     Args:
         plan: all jobs.
-        restart: treat no job as done.
-        as_json: print JSON.
+        restart: True: list finished jobs as not done.
+        as_json: True: print JSON.
     """
     report, journal = Report(plan), Journal(plan.journal)
     if not restart:
@@ -106,7 +106,7 @@ def tell(report: Report, *, as_json: bool) -> int:
 
     Args:
         report: report of the batch.
-        as_json: print JSON.
+        as_json: True: print JSON.
     """
     failed = report.failed()
     if as_json:
@@ -125,7 +125,7 @@ def tell(report: Report, *, as_json: bool) -> int:
 
 @contextlib.contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """SIGTERM stops a batch as cleanly as Ctrl-C."""
+    """Make SIGTERM stop a batch as cleanly as Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -61,36 +61,36 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def program() -> Path | None:
-    """The benchmark program, in this Python's scripts folder or on PATH; no wheel contains it."""
+    """The benchmark program in this Python's scripts folder or on PATH, or None; wheels lack it."""
     places = [sysconfig.get_path("scripts"), *os.get_exec_path()]
     found = shutil.which("rig_bench", path=os.pathsep.join(places))
     return Path(found) if found else None
 
 
 def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
-    """Write the frames of an .npz as files for the benchmark.
+    """Write the frames of an .npz as files for the benchmark program.
 
     Args:
-        source: the .npz.
+        source: path of the .npz.
         raw_count: number of raw controls of the face, and of columns of the frames.
-        folder: folder of the files.
+        folder: folder for the files.
 
     Returns:
         The names of the files, in the order of FRAMES.
 
     Raises:
-        InputError: no .npz, or an array is missing or has a wrong shape.
+        InputError: not an .npz, or an array is missing or has a wrong shape.
     """
     try:
         return _export_frames(source, raw_count, folder)
     except (RisoriusError, OSError):
         raise
-    except DAMAGED as error:  # raised by NumPy
+    except DAMAGED as error:  # an error of NumPy
         raise InputError(f"{source}: an .npz of arrays was expected: {error}") from error
 
 
 def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
-    opened = io.BytesIO(read_file(source, MESH))  # a pipe cannot seek to the directory
+    opened = io.BytesIO(read_file(source, MESH))  # a pipe cannot seek
     hold_arrays(opened)
     return _write_frames(source, opened, raw_count, folder)
 

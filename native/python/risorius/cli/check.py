@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius check: everything wrong or odd in files."""
+"""risorius check: prints all errors and warnings about files."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Finding:
-    """The error that stopped the reading, without the file's name, which is printed before it."""
+    """A finding for the error that stopped reading, without the file's name."""
     text = str(error).removeprefix(f"{name}: ")
     where, offset = getattr(error, "where", ""), getattr(error, "offset", None)
     text = text.removesuffix(f" (byte {offset})").removesuffix(f" [{where}]")
@@ -44,7 +44,7 @@ def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Findi
 
 
 def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """The Dna of a JSON file, or None, and its findings."""
+    """Read a JSON file. Returns its Dna, or None after an error, and the findings."""
     try:
         dna = from_json(name)
     except InputError as error:
@@ -58,7 +58,7 @@ def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """The Dna's definition, or None, and the file's findings."""
+    """Check a DNA file. Returns its definition, or None after an error, and the findings."""
     try:
         found = risorius.check(name)
         if any(finding.is_error for finding in found):
@@ -70,7 +70,7 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
-    """Warnings about raw controls that hold rotations of joints but that nothing can fill."""
+    """Warnings about raw controls for rotations of joints that no GUI control or solver sets."""
     where = "definition.raw_control_names"
     return [
         risorius.Finding(False, "invalid_value", where, None, text)
@@ -79,11 +79,11 @@ def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
 
 
 def examine(name: str, strict: bool) -> dict[str, Any]:
-    """All results for one file as plain values.
+    """All results for one file, as plain values.
 
     Args:
-        name: name of the file; *.json is read as JSON, others as DNA.
-        strict: a warning makes the file not ok.
+        name: name of the file; *.json is read as JSON, other names as DNA.
+        strict: True: a file with warnings is not ok.
     """
     dna, found = (check_json if name.lower().endswith(".json") else check_dna)(name)
     errors = sum(finding.is_error for finding in found)
@@ -118,7 +118,7 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each sound file whether it can be mixed with the first one."""
+    """Add to each valid file whether it can be mixed with the first valid one."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip: convert, inspect and map animation of other software."""
+"""risorius clip: converts, inspects and maps animation from other programs."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_meaning(parser: argparse.ArgumentParser) -> None:
-    """Add the options that interpret the values of IN."""
+    """Add the options that define the meaning of the values of IN."""
     parser.add_argument("--mapping", metavar="M", help=_MAPPING)
     parser.add_argument(
         "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
@@ -92,7 +92,7 @@ def _add_meaning(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_steps(parser: argparse.ArgumentParser) -> None:
-    """Add the options that change the clip, in the order of their effect, and the report."""
+    """Add the options that change the clip, in the order of their application, and the report."""
     parser.add_argument(
         "--neutral",
         metavar="A[:B]",
@@ -197,7 +197,7 @@ def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def load(args: argparse.Namespace) -> importing.Imported:
-    """Read IN; a clip of Risorius already has raw controls."""
+    """Read IN; the curves of a .rzc file are raw controls already."""
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(
@@ -211,7 +211,7 @@ def load(args: argparse.Namespace) -> importing.Imported:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for wrong arguments, before any file is read."""
+    """Check the arguments before any file is read. Raises: CommandLineError."""
     if args.full_value is not None and not 0.0 < args.full_value < 1e9:
         raise CommandLineError(f"--full-value: above 0 was expected, found {args.full_value:g}")
     if args.output.suffix.lower() not in OUTPUTS:
@@ -251,7 +251,7 @@ def run_convert(args: argparse.Namespace) -> int:
 
 
 def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
-    """The steps after the mapping, in order.
+    """The steps after the mapping, in the order in which they are applied.
 
     Raises:
         CommandLineError: an option has an invalid value.
@@ -312,7 +312,10 @@ def _pair(text: str, option: str, number: Callable[[str, int], float]) -> tuple[
 
 
 def _save(clip: Clip, path: Path, *, as_table: bool = False) -> None:
-    """Save in the format of the suffix; as_table: as a curve table of Unreal."""
+    """Save a clip in the format of the path's suffix.
+
+    Args: as_table  True: a curve table of Unreal.
+    """
     suffix = path.suffix.lower()
     if as_table:
         text = importing.curve_table_text(clip, is_json=suffix == ".json")

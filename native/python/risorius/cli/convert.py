@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius convert: a DNA file to JSON and back, with another version, fewer layers, other axes."""
+"""risorius convert: DNA to JSON and back, with another version, fewer layers or other axes."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for wrong options, before the file is opened."""
+    """Check the options before the file is opened. Raises: CommandLineError."""
     if args.indent is not None and args.output_kind != "json":
         raise CommandLineError("--indent: only JSON is indented")
     if not args.force:
@@ -114,10 +114,10 @@ def warnings_as_lines(name: str) -> Iterator[None]:
 
 
 def cut(dna: risorius.Dna, args: argparse.Namespace) -> risorius.Dna:
-    """`dna` reduced to the layers and LODs in args.
+    """Reduce `dna` to the layers and LODs that the options in `args` name.
 
     Raises:
-        DnaError: the remaining layers make no file.
+        DnaError: a file cannot consist of the remaining layers.
         CommandLineError: a layer or LOD does not exist.
     """
     if args.layers is not None or args.unknown_layers == "ignore":
@@ -144,12 +144,12 @@ def _writable(minor: int) -> int:
 
 
 def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
-    """The version to write if no option names one; prints a line if it differs from the source's.
+    """The version to write without an option; it is printed if it differs from the source's.
 
     Args:
         source: the file that was read.
-        result: the Dna to write.
-        turned: whether its axes or units changed.
+        result: the face to write.
+        turned: True: axes or units were changed.
     """
     minor = _writable(result.version)
     signed = result.rotation_sequence != "xyz" or -1 in result.rotation_signs
@@ -162,11 +162,11 @@ def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
 
 
 def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dna, bytes]:
-    """The result as it is after reading back, and its bytes as a DNA file.
+    """Convert a face. Returns the result as read back from its bytes, and these bytes.
 
     Args:
         source: the file that was read.
-        args: the options of the command.
+        args: options of the command.
 
     Raises:
         InputError: the result cannot be read back.
@@ -188,11 +188,13 @@ def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dn
 
 
 def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
-    """Dna as JSON in UTF-8, indented by `indent` spaces per level; None: the format of Dna.to_json.
+    """A face as JSON in UTF-8.
+
+    With `indent` None, the text has the format of Dna.to_json.
 
     Args:
-        dna: any.
-        indent: spaces per level, 0 or more.
+        dna: the face.
+        indent: spaces per level, 0 or more; or None.
     """
     text = dna.to_json()
     if indent is not None and indent != 1:
@@ -202,10 +204,10 @@ def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
 
 
 def write(name: str, data: bytes) -> None:
-    """Write a file whole or not at all; a device or a pipe gets the bytes directly.
+    """Write a file completely or not at all; a device or pipe receives the bytes directly.
 
     Args:
-        name: name of the file; "-": the standard output.
+        name: name of the file; "-" for the standard output.
         data: the bytes to write.
 
     Raises:

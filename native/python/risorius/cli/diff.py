@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius info --diff: differences between two files, in words."""
+"""risorius info --diff: the differences between two files, in words."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from ..base.words import counted
 from ..diff import Difference, compare
 from .files import CommandLineError, InputError, kind_of, read, summary
 
-_LINES = 8  # longest list of lines per field
+_LINES = 8  # most lines per field without --all
 
 
 def same_but_for(a: str, b: str) -> Difference | None:
-    """The first difference of two DNA files with equal content, in bytes that no layer reads; or
-    None.
+    """The first byte that differs in two DNA files with equal content, or None.
+
+    Such bytes are in parts that no layer reads.
 
     Args:
         a, b: names of the files.
@@ -34,11 +35,11 @@ def same_but_for(a: str, b: str) -> Difference | None:
 
 
 def page(found: list[Difference], everything: bool) -> str:
-    """The differences as text, by layer and field.
+    """The differences as text, grouped by layer and field.
 
     Args:
         found: result of `diff.compare`.
-        everything: do not shorten lists.
+        everything: True: lists are not shortened.
     """
     layers: dict[str, dict[str, list[str]]] = {}
     for layer, field, text in found:
@@ -55,12 +56,12 @@ def page(found: list[Difference], everything: bool) -> str:
 
 
 def run(a: str, b: str, *, everything: bool, as_json: bool) -> int:
-    """Print the differences. Returns the exit code: 0 for none, 1 for some.
+    """Print the differences. Returns the exit code: 0 if there are none, otherwise 1.
 
     Args:
         a, b: names of the files, .dna or .json.
-        everything: do not shorten lists.
-        as_json: print JSON.
+        everything: True: lists are not shortened.
+        as_json: True: print JSON.
 
     Raises:
         CommandLineError: a file cannot be read.
@@ -68,7 +69,7 @@ def run(a: str, b: str, *, everything: bool, as_json: bool) -> int:
     try:
         kinds = [kind_of(name, None, "another name") for name in (a, b)]
         rig_a, rig_b = read(a, kinds[0]), read(b, kinds[1])
-    except InputError as error:  # 1 means "they differ", as in diff
+    except InputError as error:  # exit code 2, because 1 means that the files differ
         raise CommandLineError(str(error)) from error
     found = compare(rig_a, rig_b, everything or as_json)
     if not found and kinds == ["dna", "dna"] and (bytes_differ := same_but_for(a, b)):

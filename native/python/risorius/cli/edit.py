@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""risorius edit: change a DNA file. regroup: rebuild its joint groups. lighten: fewer joints,
-correctives and LODs."""
+"""risorius edit: changes a DNA file.
+
+regroup rebuilds its joint groups; lighten removes joints, correctives and LODs.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,7 @@ other joints can replace, refits the skin weights over all expressions, and remo
 that move vertices least. Prints sizes, the time of an evaluation and the worst expressions;
 --report writes the error of every expression. See docs/authoring.md."""
 _REPORTS = (".json", ".csv")
-_WORST = 20  # number of expressions to print
+_WORST = 20  # number of printed expressions with the largest errors
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -149,10 +151,10 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """Parse one number, or three.
+    """Parse --threshold: one number, or MM,DEGREES,SCALE.
 
     Raises:
-        CommandLineError: not one or three numbers.
+        CommandLineError: not one or three numbers from 0.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -166,7 +168,7 @@ def parse_threshold(text: str) -> float | list[float]:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for wrong options, before the file is opened."""
+    """Check the options before the file is opened. Raises: CommandLineError."""
     if args.plot is not None and Path(args.plot).suffix.lower() not in _PLOTS:
         raise CommandLineError(
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
@@ -177,11 +179,13 @@ def complain(args: argparse.Namespace) -> None:
 
 
 def read_regions(name: str) -> edit.Regions:
-    """Joint names or indices of each region: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a
-    single key "regions", or without names [["FACIAL_L_Eye", ...], ...].
+    """Read the joint names or indices of each region from JSON or TOML.
+
+    Forms: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a single key "regions", or without
+    names [["FACIAL_L_Eye", ...], ...].
 
     Raises:
-        InputError: not JSON or TOML, or another structure.
+        InputError: not JSON or TOML, or a different structure.
     """
     data = read_bytes(name, TEXT)
     try:
@@ -189,7 +193,7 @@ def read_regions(name: str) -> edit.Regions:
         found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)
     except RecursionError as error:
         raise InputError(f"{label(name)}: not JSON that can be read: nested too deeply") from error
-    except ValueError as error:  # from UTF-8, JSON or TOML
+    except ValueError as error:  # error of the decoding, of JSON or of TOML
         raise InputError(f"{label(name)}: {error}") from error
     if isinstance(found, dict) and list(found) == ["regions"]:
         found = found["regions"]
@@ -209,7 +213,7 @@ def _sizes(sizes: edit.GroupSizes) -> dict[str, int]:
 
 
 def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
-    """All results of the command as plain values.
+    """All results of `regroup` as plain values.
 
     Args:
         report: report of the regrouping.
@@ -233,7 +237,7 @@ def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as text."""
+    """The results of `regroup` as text."""
     out = [f"{'':<22}{'before':>12}{'after':>12}"]
     titles = {"groups": "joint groups", "rows": "rows", "coefficients": "coefficients stored",
               "nonzero": "coefficients not 0"}  # fmt: skip
@@ -258,7 +262,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _plot(args: argparse.Namespace, before: risorius.Dna, after: bytes) -> None:
-    """Write the plot.
+    """Write a plot of the face before and after the change.
 
     Raises:
         InputError: Matplotlib is missing, or the file cannot be written.
@@ -360,11 +364,11 @@ def run_lighten(args: argparse.Namespace) -> int:
 
 
 def report_file(report: LightenReport, name: str) -> bytes:
-    """The report on all expressions as a file.
+    """The report of `lighten` on all expressions, as the bytes of a file.
 
     Args:
-        report: report of lighten.
-        name: name of the file: .csv has a row per expression, .json also the rest.
+        report: report of `lighten`.
+        name: name of the file: .csv has a row per expression, .json has all facts.
     """
     if not name.lower().endswith(".csv"):
         return (json.dumps(asdict(report), indent=2) + "\n").encode()
@@ -379,7 +383,7 @@ def report_file(report: LightenReport, name: str) -> bytes:
 
 
 def lighten_lines(report: LightenReport) -> list[str]:
-    """The report as text: sizes, and the expressions with the largest errors."""
+    """The report of `lighten` as text: sizes, and the expressions with the largest errors."""
     titles = {
         "joints": "joints", "correctives": "correctives", "levels": "levels of detail",
         "meshes": "meshes", "channels": "blend shape channels", "deltas": "deltas",
@@ -412,6 +416,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Control names without their prefix; a corrective of many controls shows its first four."""
+    """A control's name without prefix; of a corrective's controls, the first four."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

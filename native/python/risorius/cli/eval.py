@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius eval: the pose of some control values, or every frame of a clip."""
+"""risorius eval: prints the pose for control values, or writes every frame of a clip."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from . import eval_clip
 from .files import CommandLineError, whole_number
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
-_NOISE = 1e-9  # cm, m, degrees, radians or scale: too small to see
+_NOISE = 1e-9  # smaller values are not printed; in cm, m, degrees, radians or scale
 Floats = npt.NDArray[np.float32]
 
 
@@ -74,15 +74,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
-    """Control values from NAME=VALUE texts; abbreviated names are reported on stderr.
+    """Parse NAME=VALUE texts; stderr shows the full names of abbreviated ones.
 
     Args:
-        texts: as typed; the last one of a name wins.
+        texts: the texts as typed; for a repeated name the last value is used.
         names: names of all controls.
-        rest: float32[names], values of controls that `texts` does not name.
+        rest: float32[names], values of the controls that `texts` does not name.
 
     Returns:
-        float32[names].
+        float32[names], all values.
 
     Raises:
         CommandLineError: a text has another form, a name matches no control or several, or a value
@@ -111,12 +111,13 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """Raw controls from GUI controls, float32[raw controls]; controls outside the table keep their
-    initial value.
+    """Convert GUI controls to raw controls, float32[raw controls].
+
+    Raw controls that no GUI control drives keep their initial value.
 
     Args:
         dna: the face.
-        rig: the rig compiled from it.
+        rig: the rig compiled from `dna`.
         gui: float32[GUI controls].
     """
     raw = rig.gui_to_raw(gui)
@@ -131,7 +132,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
 
     Args:
         values: float32[n].
-        names: names of the values; a value beyond them is called "control" and its number.
+        names: names of the values; values without a name are called "control" and their number.
         first: control number of the first value.
     """
     return [
@@ -150,11 +151,11 @@ def shortest(value: np.float32) -> float:
 
 
 def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dict[str, Any]:
-    """All results of the command as plain values.
+    """All results for one pose, as plain values.
 
     Args:
         dna: the face.
-        rig: the rig compiled from it.
+        rig: the rig compiled from `dna`.
         raw: float32[raw controls].
         lod: the LOD, from 0.
     """
@@ -178,7 +179,7 @@ def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dic
 
 
 def _moved(value: float) -> bool:
-    return not abs(value) < _NOISE  # show NaN too
+    return not abs(value) < _NOISE  # True for NaN too
 
 
 def page(facts: dict[str, Any]) -> str:
@@ -210,7 +211,10 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Raises: CommandLineError: an option of poses was used with a clip, or the reverse."""
+    """Refuse options of poses with a clip, and options of clips without -o.
+
+    Raises: CommandLineError.
+    """
     if args.out is not None:
         for name, default in (("explain", False), ("gui", False), ("top", 10)):
             if getattr(args, name) != default:
@@ -229,7 +233,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_pose(args: argparse.Namespace) -> int:
-    """Raises: CommandLineError: the arguments do not fit the file."""
+    """Print the pose for the control values of the command line.
+
+    Raises: CommandLineError: the arguments do not fit the file.
+    """
     dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)
     if not 0 <= args.lod < max(1, rig.lod_count):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius eval CLIP DNA -o OUT: the animation of a face by a clip."""
+"""risorius eval CLIP DNA -o OUT: evaluates a face for every frame of a clip."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SUFFIXES = {".npz": "npz", ".csv": "csv"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of CLIP DNA -o OUT, except --lod and --json."""
+    """Add the options for CLIP DNA -o OUT, except --lod and --json."""
     group = parser.add_argument_group("every frame of a clip: CLIP DNA -o OUT")
     group.add_argument(
         "-o",
@@ -62,7 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def parse_frames(text: str) -> tuple[int | None, int | None]:
-    """ "A:B" -> (A, B). Raises: ValueError."""
+    """Parse a frame range "A:B" to (A, B); an empty side gives None. Raises: ValueError."""
     first, colon, end = text.partition(":")
     if not colon:
         raise ArgumentError(f"A:B was expected, e.g. 0:240, found {shown(text)}")
@@ -74,8 +74,10 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Parts in the order of PARTS. Raises: ValueError: a part is unknown or repeated, or there is
-    none."""
+    """Sort the names of parts in the order of PARTS.
+
+    Raises: ValueError: a part is unknown or repeated, or there is none.
+    """
     for text in texts:
         if text not in PARTS:
             raise ArgumentError(f"some of {', '.join(PARTS)} were expected, found {text!r}")
@@ -85,7 +87,7 @@ def parse_parts(texts: list[str]) -> tuple[str, ...]:
 
 
 def parse_rate(text: str) -> float:
-    """Frames per second. Raises: ValueError."""
+    """Parse a rate in frames per second. Raises: ValueError."""
     return finite_text(text, 0.01, 1e6)
 
 
@@ -99,7 +101,7 @@ def _option(name: str, parse: Any, text: str | None, default: Any) -> Any:
 
 
 def _target(args: argparse.Namespace) -> tuple[str, Path]:
-    """Kind and path of the output."""
+    """Kind and path of the output file. Raises: CommandLineError: invalid options."""
     kind = SUFFIXES.get(args.out.suffix.lower())
     if kind is None:
         raise CommandLineError(f"-o: a name ending in .npz or .csv was expected, found {args.out}")
@@ -116,7 +118,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as text, e.g. one line for a log."""
+    """The results as one line of text."""
     move = f"{facts['largest_move']:.4g} {facts['translation_unit']}"
     joint = facts["largest_move_joint"]
     where = f" ({joint}, frame {facts['largest_move_frame']})" if joint else ""
@@ -128,7 +130,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def complaints(facts: dict[str, Any]) -> list[str]:
-    """Warnings about the clip on this character, in sentences."""
+    """Warnings about the clip on this character, one sentence each."""
     out = []
     for key, kind, what in (
         ("unmapped_curves", "curve", "of the clip that is no control and not mapped"),
@@ -147,7 +149,7 @@ def complaints(facts: dict[str, Any]) -> list[str]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Raises: CommandLineError."""
+    """Evaluate a clip on a face and write the result. Raises: CommandLineError."""
     rate = _option("rate", parse_rate, args.rate, None)
     frames = _option("frames", parse_frames, args.frames, (None, None))
     parts = _option("what", lambda text: parse_parts(text.split(",")), args.what, DEFAULT_PARTS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tools shared by the commands that read .dna and .json files."""
+"""Code shared by the commands that read .dna and .json files."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ KINDS = ("dna", "json")
 
 
 class InputError(RisoriusError):
-    """Unusable input: one line with the file and the place.
+    """Unusable input; the text is one line with the file and the place.
 
-    offset: byte offset, if known and if no DnaError is the cause.
+    offset: byte offset of the fault, if known and if no DnaError is the cause.
     """
 
     code = "input"
@@ -36,11 +36,11 @@ class CommandLineError(RisoriusError):
 
 
 def whole_number(low: int, high: int = given.MOST) -> Callable[[str], int]:
-    """The `type` of an option that takes a whole number.
+    """Make the `type` of an option that accepts a whole number.
 
     Args:
-        low: smallest value.
-        high: largest value.
+        low: smallest allowed value.
+        high: largest allowed value.
 
     Raises:
         ArgumentTypeError: raised by the returned function for any other text.
@@ -58,12 +58,12 @@ def whole_number(low: int, high: int = given.MOST) -> Callable[[str], int]:
 def number(
     low: float = -given.LARGEST, high: float = given.LARGEST, *, above: bool = False
 ) -> Callable[[str], float]:
-    """The `type` of an option that takes a finite number.
+    """Make the `type` of an option that accepts a finite number.
 
     Args:
-        low: smallest value.
-        high: largest value.
-        above: exclude `low` itself.
+        low: smallest allowed value.
+        high: largest allowed value.
+        above: True: `low` itself is not allowed.
 
     Raises:
         ArgumentTypeError: raised by the returned function for any other text.
@@ -79,7 +79,7 @@ def number(
 
 
 def parse_lods(text: str) -> list[int]:
-    """LOD numbers from a text such as "0", "0-2" or "0,3,5".
+    """Parse LOD numbers from a text such as "0", "0-2" or "0,3,5".
 
     Raises:
         CommandLineError: the text has another form.
@@ -95,25 +95,25 @@ def parse_lods(text: str) -> list[int]:
 
 
 def label(name: str, standard: str = "<stdin>") -> str:
-    """A file's name for messages.
+    """The name of a file for messages.
 
     Args:
-        name: as the user typed it.
-        standard: the name to show for "-".
+        name: name as the user typed it.
+        standard: name to show for "-".
     """
     return standard if name == "-" else name
 
 
 def kind_of(name: str, asked: str | None, option: str) -> str:
-    """ "dna" or "json": the value of an option, else the suffix.
+    """The kind of a file, "dna" or "json": the value of an option, otherwise the suffix.
 
     Args:
         name: name of the file.
-        asked: value of the option; None: not given.
-        option: option that the error message suggests.
+        asked: value of the option; None if it was not used.
+        option: option that the error message proposes.
 
     Raises:
-        CommandLineError: neither is given.
+        CommandLineError: neither the option nor the suffix gives a kind.
     """
     suffix = Path(name).suffix.lower().removeprefix(".")
     if kind := asked or (suffix if suffix in KINDS else None):
@@ -127,10 +127,10 @@ def refuse_same_file(source: str, target: str, advice: str = "choose another nam
     Args:
         source: name of the input.
         target: name of the output.
-        advice: remedy for the message; name an option only if the command has it.
+        advice: end of the message; it may only name options of the command.
 
     Raises:
-        CommandLineError: both are one file.
+        CommandLineError: both names are the same file.
     """
     if "-" in (source, target):
         return
@@ -143,12 +143,12 @@ def refuse_same_file(source: str, target: str, advice: str = "choose another nam
 
 
 def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
-    """Refuse an output name with another suffix.
+    """Refuse an output name whose suffix is not allowed.
 
     Args:
         path: path of the output.
         kinds: allowed suffixes with their dots.
-        option: the option of the output.
+        option: name of the option for the output.
 
     Raises:
         CommandLineError: the path has another suffix.
@@ -162,11 +162,11 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
 
 
 def require_writable(*names: str | Path | None, parents: bool = False) -> None:
-    """Check before long work that the outputs can be written.
+    """Check before long work that all outputs can be written.
 
     Args:
         names: paths of outputs; "-" and None are skipped.
-        parents: missing folders will be created later.
+        parents: True: missing folders are allowed, because they will be made.
 
     Raises:
         InputError: a folder is missing or not writable.
@@ -181,15 +181,15 @@ def require_writable(*names: str | Path | None, parents: bool = False) -> None:
 
 
 def read_bytes(name: str, most: int = FACE) -> bytes:
-    """Bytes of a file, or of the standard input for "-".
+    """The bytes of a file, or of the standard input for "-".
 
     Args:
-        name: as the user typed it.
-        most: largest size in bytes.
+        name: name as the user typed it.
+        most: largest allowed size in bytes.
 
     Raises:
         InputError: the file cannot be read.
-        ReadingError: the file is larger, or a device.
+        ReadingError: the file is larger, or is a device.
     """
     try:
         if name == "-":
@@ -203,7 +203,7 @@ def from_json(name: str) -> risorius.Dna:
     """Read a Dna from a JSON file.
 
     Raises:
-        InputError: no UTF-8, no JSON or no Dna; with the place.
+        InputError: not UTF-8, not JSON or not a Dna; the text has the place.
     """
     data = read_bytes(name)
     kind = signatures.kind_of(data)
@@ -221,10 +221,10 @@ def from_json(name: str) -> risorius.Dna:
 
 
 def read(name: str, kind: str) -> risorius.Dna:
-    """Read a whole Dna.
+    """Read a complete face from a DNA or JSON file.
 
     Args:
-        name: name of the file; "-": the standard input.
+        name: name of the file; "-" for the standard input.
         kind: "dna" or "json".
 
     Raises:
@@ -235,12 +235,12 @@ def read(name: str, kind: str) -> risorius.Dna:
     try:
         return risorius.load(read_bytes(name) if name == "-" else name)
     except risorius.DnaError as error:
-        # load(path) already names the file
+        # the error of load(path) contains the name of the file
         raise InputError(f"{label(name)}: {error}" if name == "-" else str(error)) from error
 
 
 def summary(dna: risorius.Dna) -> str:
-    """Version and sizes, e.g. "2.4, 8 LODs, 870 joints"."""
+    """Version and sizes as text, e.g. "2.4, 8 LODs, 870 joints"."""
     return (
         f"{dna.generation}.{dna.version}, {counted(dna.lod_count, 'LOD')}, "
         f"{counted(len(dna.joint_names), 'joint')}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius info: the content of a DNA file, or the differences between two."""
+"""risorius info: prints the content of a DNA file, or the differences between two."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def describe(dna: risorius.Dna) -> dict[str, Any]:
-    """All results of the command as plain values."""
+    """All results of the command, as plain values."""
     lods = []
     for lod in range(dna.lod_count):
         rows = [int(g.lods[lod]) for g in dna.joint_groups if len(g.lods) > lod]
@@ -104,7 +104,7 @@ def _listed(mapping: risorius.LodMapping, lod: int) -> int:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """Rows with equal keys as columns of text, numbers aligned right."""
+    """Rows with equal keys as a text table; numbers are aligned right."""
     if not rows:
         return "  none"
     heads = [key.replace("_", " ") for key in rows[0]]
@@ -151,7 +151,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _mixes(first: str, others: list[str], *, as_json: bool) -> int:
-    """Print for each file whether it can be mixed with the first, or the reason."""
+    """Print whether each file can be mixed with the first one, or the reason why not."""
     face = risorius.load(first)
     found = {name: difference(face, risorius.load(name)) for name in others}
     if as_json:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius live: listen to a face-capture app, show its status, record it."""
+"""risorius live: receives faces from a capture app, shows the status, records."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for wrong options, before the program listens."""
+    """Check the options before the program listens. Raises: CommandLineError."""
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
-    """Write the take, and report left-out frames."""
+    """Write the take, and report frames and curves that were left out."""
     if not len(take):
         raise InputError(f"{path} was not written: no face came")
     if take.full:
@@ -123,7 +123,7 @@ def _save(take: Take, shaper: Shaper, path: Path) -> None:
 
 
 def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
-    """Show the status until the time is over or the user stops it."""
+    """Receive faces and show the status, until the time is over or the user stops."""
     ended: list[int] = []
 
     def end(number: int, _frame: FrameType | None) -> None:
@@ -150,7 +150,7 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
 
 
 def _place(receiver: Receiver) -> str:
-    """Who can connect, and where: the address to type into the app."""
+    """The address that the user types into the app, and which machines can connect."""
     if receiver.host == THIS_MACHINE:
         return f"this machine alone at port {receiver.port}; --everywhere for a phone"
     address = own_address() or "this machine's address"
@@ -158,7 +158,7 @@ def _place(receiver: Receiver) -> str:
 
 
 def words(status: Status) -> str:
-    """The status as one line."""
+    """The status of the capture as one line."""
     if not status.subject:
         heard = "nothing heard yet" if not status.packets else "no face yet"
         refused = f", {status.refused} refused ({status.reasons[0][0]})" if status.refused else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip learn: learn a person's control ranges, and remove them from other clips."""
+"""risorius clip learn: learns a person's control ranges, and scales other clips by them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def add_learn(
     add_input: Callable[[argparse.ArgumentParser], None],
     load: Callable[[argparse.Namespace], Imported],
 ) -> None:
-    """Add the command.
+    """Add the command `learn` to risorius clip.
 
     Args:
         commands: subcommands of risorius clip.
-        add_input: adds the arguments of an animation file to the parser.
-        load: reads the animation file.
+        add_input: function that adds the arguments of an animation file to a parser.
+        load: function that reads the animation file.
     """
     parser = commands.add_parser(
         "learn",
@@ -73,15 +73,16 @@ def _run(args: argparse.Namespace, load: Callable[[argparse.Namespace], Imported
 
 
 def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
-    """A clip of raw controls with the person's ranges removed.
+    """Scale the controls of a clip so that the person's ranges become 0 to 1.
 
     Args:
-        clip: after the mapping.
-        source: None for no ranges, "self" for the ranges of the clip itself, or a file of ranges.
-        report: receives a note.
+        clip: clip of raw controls, after the mapping.
+        source: None to change nothing, "self" for the ranges of the clip itself, or a file of
+            ranges.
+        report: report that receives a note.
 
     Raises:
-        AnimationFileError: the file is unusable, or the clip is unusable with "self".
+        AnimationFileError: the file of ranges, or the clip with "self", is unusable.
     """
     if source is None:
         return clip
@@ -96,14 +97,14 @@ def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
 
 
 def _learn(clip: Clip, path: str | Path, **options: float) -> Ranges:
-    """`learn` with errors that name the file."""
+    """Learn ranges from a clip, with errors that name the clip's file."""
     with _named(path):
         return learn(clip, **options)  # type: ignore[arg-type]
 
 
 @contextmanager
 def _named(path: str | Path) -> Iterator[None]:
-    """Name the file in errors about its clip."""
+    """Add the name of the file to errors about its clip."""
     try:
         yield
     except ArgumentError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius speech: a voice as animation."""
+"""risorius speech: converts a voice to animation."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the names of the outputs before the voice is analysed. Raises: CommandLineError."""
+    """Check the names of the files before the voice is analysed. Raises: CommandLineError."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
-    """Raises: InputError, ValueError."""
+    """Analyse the voice and make its clip. Raises: InputError, ValueError."""
     library = None if args.expressions is None else expressions.load(args.expressions)
     said = args.text
     if args.transcript is not None:
@@ -165,7 +165,7 @@ def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
 
 
 def _content(clip: Clip, path: Path) -> bytes:
-    """The bytes of a clip's file, by its suffix. Raises: ValueError."""
+    """The bytes of a clip's file, in the format of the path's suffix. Raises: ValueError."""
     suffix = path.suffix.lower()
     if suffix == ".csv":
         return writing.csv_text(clip).encode()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Safe terminal output: names in files may contain control characters."""
+"""Makes terminal output safe, because names in files may contain control characters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any, TextIO, cast
 
-# Colours, cursor moves and titles begin with the first ones; the rest reverse the text direction.
+# Control characters: the first begin colours, cursor moves and titles; the others change the
+# direction of text.
 _ORDERS = [*range(32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x2028, 0x202F)]
 _ORDERS += range(0x2066, 0x206A)
 _SPELLED = {
@@ -19,19 +20,19 @@ _SPELLED = {
 
 
 def spelled(text: str) -> str:
-    """A text with its control characters written as Python escapes.
+    """A text with its control characters as Python escapes.
 
     Args:
-        text: its tabs and line breaks stay.
+        text: the text; its tabs and line breaks stay.
     """
     return text.translate(_SPELLED)
 
 
 @contextlib.contextmanager
 def obeyed_by_nobody() -> Iterator[None]:
-    """Pass all text printed in this context through `spelled`.
+    """Replace control characters in all text that is printed in this context, see `spelled`.
 
-    Progress on the standard error may begin with a carriage return.
+    A carriage return at the start of a text on the standard error stays, for progress lines.
     """
     out, error = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = _stream(out, ""), _stream(error, "\r")
@@ -46,7 +47,7 @@ def _stream(stream: TextIO, begin: str) -> TextIO:
 
 
 class _Spelling:
-    """A text stream; everything except `write` belongs to the original stream."""
+    """A text stream that escapes control characters; its other methods are unchanged."""
 
     def __init__(self, stream: TextIO, begin: str) -> None:
         self._stream, self._begin = stream, begin

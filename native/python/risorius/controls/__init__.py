@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Names of a face's controls: regions, sides, ARKit units, names for people."""
+"""Names of a face's controls: regions, sides, ARKit units, names of other programs."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ARKit units as raw controls, and in the orders of protocols; read from arkit.toml."""
+"""The 52 ARKit units as raw controls, and their orders in protocols; read from arkit.toml."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 from ..base import toml
 
 FULL_SET = 10
-"""With at least this many ARKit units, VRM expressions in the same file count as repetitions."""
+"""From this number of ARKit units on, VRM expressions in the same file count as repetitions."""
 
 
 @cache
 def mapping() -> dict[str, dict[str, float]]:
-    """ARKit unit -> {raw control in the spelling of a DNA: weight in [0, 1]}; 52 units."""
+    """ARKit unit -> {full name of a raw control: weight in [0, 1]}; 52 units."""
     table = _table()
     prefix = table["prefix"]
     return {
@@ -26,8 +26,10 @@ def mapping() -> dict[str, dict[str, float]]:
 
 @cache
 def shares() -> dict[str, str]:
-    """Raw control that takes back a share of another control -> that control; see
-    `shares.share_of`."""
+    """Raw control that is a share of another control -> that control.
+
+    See `shares.share_of`.
+    """
     rows = mapping()
     return {
         control: next(iter(rows[whole]))
@@ -40,7 +42,7 @@ def order(name: str) -> tuple[str, ...]:
     """The 52 units in the order of a protocol.
 
     Args:
-        name: "live_link_face_take", "live_link_face_packet" or "face_cap".
+        name: name of the order: "live_link_face_take", "live_link_face_packet" or "face_cap".
     """
     table = _table()
     units = tuple(table["units"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds controls by typed names, and names controls that have none."""
+"""Finds controls by typed names, and makes names for controls without one."""
 
 from __future__ import annotations
 
@@ -21,33 +21,32 @@ class UnknownControlError(RisoriusError):
 
 @dataclass(frozen=True)
 class Meaning:
-    """The meaning of a typed name: control -> factor of the value."""
+    """The controls that a typed name means: control -> factor of the typed value."""
 
     controls: dict[str, float]
     is_exact: bool
 
 
 def last_part(name: str) -> str:
-    """jawOpen of CTRL_expressions.jawOpen; a bracketed suffix stays whole."""
+    """The last part of a name: jawOpen of CTRL_expressions.jawOpen; a suffix in brackets stays."""
     own, bracket, rest = name.partition(" (")
     return own.rpartition(".")[2] + bracket + rest
 
 
 def find_controls(text: str, names: Sequence[str]) -> Meaning:
-    """The controls that a typed name, or a part of a name, means.
+    """Find the controls that a typed name, or a part of a name, means.
 
-    The candidates in this order: the name itself; the part behind its last dot; an ARKit unit, if
-    the file has its controls; any part of a name, then of an ARKit unit, regardless of case; a name
-    of another program. Two names that differ only in their side (..L and ..R, ..Left and ..Right)
-    are one meaning. The first kind of candidate with any match decides, and only if it has exactly
-    one meaning.
+    Kinds of candidates, in this order: the name itself; the part after its last dot; an ARKit unit,
+    if the file has its controls; any part of a name, then of an ARKit unit, in any case; a name of
+    another program. Two names that differ only in their side (..L and ..R, ..Left and ..Right) are
+    one meaning. The first kind with a match decides, and must have exactly one meaning.
 
     Args:
-        text: typed by a user.
+        text: text that a user typed.
         names: names of all controls.
 
     Raises:
-        UnknownControlError: no meaning, or several; the message lists them.
+        UnknownControlError: no meaning, or several; the message lists similar or matching names.
     """
     if text in names:
         return Meaning({text: 1.0}, True)
@@ -65,7 +64,7 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
 
 def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, float]]]:
-    """Meanings by name, the best kind of match first."""
+    """The meanings of each kind of match, the best kind first."""
     known = set(names)
     units = {u: row for u, row in arkit.mapping().items() if known.issuperset(row)}
     wanted = text.lower()
@@ -95,14 +94,14 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
 
     Args:
         names: names in the file.
-        index: index of the element; it may lie beyond the names.
-        kind: kind of element, e.g. "joint".
+        index: index of the element; it may exceed the number of names.
+        kind: kind of the element, e.g. "joint".
     """
     return (names[index] if index < len(names) else "") or f"{kind} {index}"
 
 
 def _shapes_of_controls(dna: Dna) -> dict[int, str]:
-    """Control -> the blend shape channel that it drives, in brackets."""
+    """Control -> name of the first blend shape channel that it drives, in brackets."""
     table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
     driven: dict[int, list[int]] = {}
     for control, channel in zip(
@@ -116,7 +115,7 @@ def _shapes_of_controls(dna: Dna) -> dict[int, str]:
 
 
 class ControlNames:
-    """Names of the control vector raw | corrective | network | RBF pose of a file."""
+    """Names of a file's controls, in the order: raw, correctives, networks' outputs, RBF poses."""
 
     def __init__(self, dna: Dna) -> None:
         raw = dna.raw_control_names
@@ -146,7 +145,7 @@ class ControlNames:
         return named(self.names, index, "control")
 
     def short(self, index: int) -> str:
-        """The part behind the last dot if it is unique."""
+        """The part of a control's name after the last dot if unique, otherwise the full name."""
         return named(self._short, index, "control")
 
     def kind(self, index: int) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Face regions of controls, derived from their names by regions.toml."""
+"""The face regions of controls, from the beginnings of their names in regions.toml."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _STARTS = sorted(
 
 
 def short_name(control: str) -> str:
-    """The part after the last prefix: `CTRL_expressions.jawOpen` gives `jawOpen`."""
+    """The part after the last separator: `CTRL_expressions.jawOpen` gives `jawOpen`."""
     return re.split(r"[.:|]", control)[-1] or control
 
 
@@ -34,9 +34,9 @@ def region_of(control: str, *, by_last_part: bool = False) -> str:
     """The face region of a control, one of REGIONS.
 
     Args:
-        control: its name.
-        by_last_part: use only short_name. Otherwise the part before it decides if the last part
-            tells nothing: head.yaw and eyeL.pitch have their region before the dot.
+        control: name of the control.
+        by_last_part: True: use only short_name. False: if it gives no region, use the parts before
+            it: head.yaw and eyeL.pitch have their region before the dot.
     """
     words = [short_name(control)] if by_last_part else re.split(r"[.:|]", control)[::-1]
     for word in words:
@@ -48,14 +48,16 @@ def region_of(control: str, *, by_last_part: bool = False) -> str:
 
 
 def side_of(control: str) -> str:
-    """ "L" or "R" of a control with a side, otherwise ""."""
+    """The side of a control: "L", "R", or "" for none."""
     end = short_name(control)
     return end[-1] if end[-1:] in ("L", "R") else ""
 
 
 def expand_sides(name: str) -> list[str]:
-    """`browDown*` gives both sides, `mouthFunnel**` the four quarters of the lips, any other name
-    itself."""
+    """Expand a name: `browDown*` to both sides, `mouthFunnel**` to the four quarters of the lips.
+
+    Any other name gives itself.
+    """
     if name.endswith("**"):
         return [name[:-2] + quarter for quarter in ("UL", "UR", "DL", "DR")]
     if name.endswith("*"):
@@ -66,14 +68,14 @@ def expand_sides(name: str) -> list[str]:
 def mask(
     names: Sequence[str], parts: Mapping[str, float], default: float = 0.0
 ) -> npt.NDArray[np.float32]:
-    """A weight for each control.
+    """Make a weight for each control from weights of regions, sides, controls or patterns.
 
     Args:
-        names: the controls.
+        names: names of the controls.
         parts: weight in [0, 1] by region ("mouth"), region and side ("brow.L"), control ("jawOpen",
             with or without its prefix) or pattern ("mouthCorner*"); for the same control a later
             entry wins.
-        default: the weight of all others.
+        default: weight of all other controls.
 
     Returns:
         float32[names].

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Controls that take back a share of another control, such as lips that stay together on an open
-jaw.
+"""Converts between an amount and a share of another control, such as jawOpen.
 
-A capture has the amount (mouthClose, as large as jawOpen if the lips are shut); a raw control has
-the share (mouthLipsTogether, 1 if they are shut), which is the amount divided by jawOpen.
+Example: lips that stay together while the jaw opens.
 """
 
 from __future__ import annotations
@@ -15,8 +13,9 @@ import numpy.typing as npt
 
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
-# Below this jaw opening the share falls to 0 with the amount; otherwise the noise of a still face
-# would make it jump between 0 and 1. At most a quarter of LEAST is lost, 0.2 mm between the lips.
+# Below this jaw opening the share is the amount divided by LEAST; otherwise noise of a face at rest
+# would make the share jump between 0 and 1. The error is at most a quarter of LEAST, 0.2 mm between
+# the lips.
 LEAST = 0.02
 
 
@@ -24,17 +23,17 @@ def share_of(part: Numbers, whole: Numbers) -> Numbers:
     """The share `part` / `whole`, 0 to 1; 0 if both are 0.
 
     Args:
-        part: any shape.
-        whole: the same shape; values below LEAST count as LEAST.
+        part: amounts, in any shape.
+        whole: values of the other control in the same shape; values below LEAST count as LEAST.
     """
     return np.clip(part / np.maximum(whole, LEAST), 0.0, 1.0)
 
 
 def part_of(share: Numbers, whole: Numbers) -> Numbers:
-    """The inverse of share_of, unless its result was clamped.
+    """The inverse of share_of, except for shares that it clamped.
 
     Args:
-        share: any shape.
-        whole: the same shape.
+        share: shares, in any shape.
+        whole: values of the other control, in the same shape.
     """
     return share * np.maximum(whole, LEAST)

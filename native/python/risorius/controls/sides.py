@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Left and right in the names of controls: the partner of each."""
+"""Finds the partner of a control by left and right in its name."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ _AT_THE_END = re.compile(r"[LR](?=$|Ph\d$)")
 
 
 def mirrored_name(name: str) -> str:
-    """A control's partner: ...L and ...R, ...Left and ...Right; eyeLookLeftL and eyeLookRightR.
+    """The partner of a control in a mirror: ...L and ...R, ...Left and ...Right.
 
-    A control without a side is its own partner.
+    Both are swapped if a name contains both: eyeLookLeftL gives eyeLookRightR. A control without a
+    side is its own partner.
     """
     before, dot, last = name.rpartition(".")
     if before in ("eyeL", "eyeR"):
@@ -23,9 +24,9 @@ def mirrored_name(name: str) -> str:
 
 
 def name_across(name: str) -> str:
-    """The same control on the other side: eyeLookLeftL and eyeLookLeftR look in the same direction.
+    """The same control on the other side: eyeLookLeftL gives eyeLookLeftR, the same direction.
 
-    A control of the whole face, such as jawLeft, stays itself.
+    A control of the whole face, such as jawLeft, gives itself.
     """
     before, dot, last = name.rpartition(".")
     return before + dot + _on_the_other_side(last)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meaning of a name: controls or an expression, in one of several vocabularies.
+"""Finds the meaning of names from several programs: controls or an expression.
 
 Each vocabulary has a table in vocabularies/, next to ARKit's units (arkit.toml). Authoring, clips,
 live faces and typed names use this module. A file has a title, a description, `strip` (prefixes
@@ -34,7 +34,7 @@ PREFIX = "CTRL_expressions."
 ARKIT = "arkit"
 _ARKIT_STRIP = ("blendShapes.", "blendShape.", "ARKit_", "Face.", "FaceCap_")
 _SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
-_COPY = re.compile(r"\.\d{3}$")  # the suffix that Blender gives to a repeated name
+_COPY = re.compile(r"\.\d{3}$")  # suffix that Blender appends to a repeated name
 _WORDS = {"L": "Left", "R": "Right"}
 
 
@@ -43,12 +43,13 @@ class Meaning:
     """The meaning of a name.
 
     Attributes:
-        vocabulary: its name, as of `names`.
-        name: in the vocabulary's spelling.
-        controls: raw control in the spelling of a DNA -> weight; empty if the meaning is an
-            expression of the library, or nothing.
+        vocabulary: name of the vocabulary, one of `names`.
+        name: name in the vocabulary's spelling.
+        controls: full name of a raw control -> weight; empty if the meaning is an expression of the
+            library, or nothing.
         expression: name of an expression; "" for none.
-        is_whole: a shape of the whole face or a part of it; it is an expression, not a control.
+        is_whole: True: a shape of the whole face or a part of it, which is an expression and not a
+            control.
         units: ARKit unit -> weight, if the vocabulary uses units.
     """
 
@@ -62,9 +63,11 @@ class Meaning:
 
 @cache
 def loose_name(name: str) -> str:
-    """A name without letter case and separators, with its side as |l or |r at the end.
+    """A name in lower case without separators, with its side as
 
-    eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left are one name.
+    l or |r at the end.
+
+    eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left give the same name.
     """
     name = unicodedata.normalize("NFKC", name)
     match = _SIDE.search(name)
@@ -79,12 +82,12 @@ def loose_name(name: str) -> str:
 
 
 class Vocabulary:
-    """The names that one program or protocol uses.
+    """The names that a program or protocol uses.
 
     Attributes:
-        name, title, description: the key, and texts for people.
+        name, title, description: key of the vocabulary, and texts for display.
         meanings: name in its usual spelling -> Meaning.
-        is_loose: ignore letter case, "_" and the difference of Left and L at the end.
+        is_loose: True: letter case, "_" and the difference of Left and L at the end are ignored.
     """
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
@@ -113,11 +116,12 @@ class Vocabulary:
                 yield _meaning(self.name, first + spelled, said)
 
     def spelled(self, name: str, *, loosely: bool = True) -> str | None:
-        """The name in the vocabulary's spelling, or None.
+        """A name in the vocabulary's spelling, or None if the vocabulary lacks it.
 
         Args:
-            name: may have anything before its last dot, and the vocabulary's prefixes and suffixes.
-            loosely: ignore the spelling if the vocabulary allows it.
+            name: name with any text before its last dot, and with the vocabulary's prefixes and
+                suffixes.
+            loosely: True: ignore differences in spelling, if the vocabulary allows this.
         """
         for candidate in self._candidates(name):
             if candidate in self.meanings:
@@ -141,30 +145,34 @@ class Vocabulary:
 
 
 def parts_of(name: str) -> list[str]:
-    """The name itself; without the number of a copy; without the mesh's or figure's name before it,
-    which ends at the last dot, colon or bar, or at the first double underscore."""
+    """Forms of a name to look up: as given, and without the name of a mesh or figure before it.
+
+    That name ends at the last dot, colon or bar, or at the first double underscore. The number of a
+    copy is removed first.
+    """
     name = _COPY.sub("", name)
     after = re.split(r"[.:|]", name)[-1] if not name.startswith("CTRL_") else name
     return list(dict.fromkeys(p for p in (name, after, after.partition("__")[2]) if p))
 
 
 def names() -> tuple[str, ...]:
-    """Names of the vocabularies; ARKit first, because other vocabularies share names with it."""
+    """Names of the vocabularies; ARKit is first, because others contain some of its names."""
     return tuple(_all())
 
 
 def vocabulary(name: str) -> Vocabulary:
-    """One vocabulary. Raises: KeyError: not one of `names`."""
+    """A vocabulary by its name. Raises: KeyError: not one of `names`."""
     return _all()[name]
 
 
 def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
-    """The meaning of a name; None if no vocabulary knows it.
+    """The meaning of a name, or None if no vocabulary contains it.
 
     Args:
-        name: name of a shape or a curve; may have anything before its last dot.
-        order: vocabularies as returned by `leading`; the first that knows the name decides. None:
-            ARKit in any spelling, then the exact spelling of any vocabulary, then any spelling.
+        name: name of a shape or a curve, with any text before its last dot.
+        order: names of vocabularies, as returned by `leading`; the first that contains the name
+            decides. None: ARKit in any spelling, then the exact spelling of any vocabulary, then
+            any spelling.
     """
     if order is not None:
         return _found(name, order, loosely=True)
@@ -184,15 +192,17 @@ def _found(name: str, order: Sequence[str], *, loosely: bool) -> Meaning | None:
 
 
 def known(given: Iterable[str]) -> dict[str, int]:
-    """The number of these names that each vocabulary knows, without those that know none."""
+    """Vocabulary -> number of the given names that it contains; without vocabularies with none."""
     given = list(given)
     counts = {v.name: sum(v.spelled(n) is not None for n in given) for v in _all().values()}
     return {name: count for name, count in counts.items() if count}
 
 
 def leading(given: Iterable[str]) -> tuple[str, ...]:
-    """The vocabularies in the order in which a set of names is looked up: the one that knows most
-    of them first; ARKit before others that know equally many."""
+    """The order of vocabularies for looking up a set of names: the one that contains most is first.
+
+    Vocabularies that contain none are left out; ARKit is before others with the same number.
+    """
     counts = known(given)
     return tuple(sorted(counts, key=lambda name: -counts[name]))
 
@@ -211,7 +221,7 @@ def _all() -> dict[str, Vocabulary]:
 
 
 def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A row unchanged, or one for each side if its name has a *."""
+    """A row unchanged, or one row for each side if its name contains a *."""
     if "*" not in name:
         yield name, value
         return
@@ -248,7 +258,7 @@ def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
 
 
 def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
-    """Controls of one part of a meaning; its units are added to `units`."""
+    """The controls of one part of a meaning; its units are added to `units`."""
     if key.startswith("@"):
         return {}
     if not key.startswith("="):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables of control names and weights in the TOML files of expressions and reactions."""
+"""Reads tables of controls and weights from the TOML files of expressions and reactions."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .regions import expand_sides
 def named_weights(
     table: Mapping[str, Any], prefix: str, where: str, lowest: float = 0.0, highest: float = 1.0
 ) -> dict[str, float]:
-    """{control: weight}; a name ending in * gives both sides, and a full name overrides a pattern.
+    """{control: weight}; a name ending in * gives both sides; names without * have precedence.
 
     Args:
         table: name -> weight, from a TOML file.
-        prefix: put before each control in the result.
-        where: the table's name in errors.
-        lowest, highest: range of a weight.
+        prefix: prefix of each control in the result.
+        where: name of the table in errors.
+        lowest, highest: allowed range of a weight.
 
     Raises:
         ValueError: a weight that is not a number in [lowest, highest].

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Describes the differences of two rigs in words: one module per layer.
+"""Describes the differences of two rigs in words, with one module per layer.
 
-Elements are matched by name, or by the things that they drive if they have no name, so that an
-insertion or another order does not make everything after it differ.
+Elements are matched by name, or without names by the elements that they drive. So an insertion or
+another order does not make all later elements differ.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _LAYERS = (
     rbf,
     rotations,
 )
-# The properties of Dna that Dna.convert can change to another rig's.
+# Properties of Dna that Dna.convert can change to match another rig.
 _SYSTEM = {
     "axes": "coordinate_system",
     "rotation_sequence": "rotation_sequence",
@@ -52,16 +52,16 @@ _SYSTEM = {
 def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[Difference]:
     """All differences of two faces; an empty list means that both are equal.
 
-    Faces with different axes or units are compared in those of A, up to rounding. If B cannot be
-    converted, this is reported and the numbers are compared unconverted.
+    If axes or units differ, B is converted to A's, up to rounding. If B cannot be converted, this
+    is reported and the numbers are compared unconverted.
 
     Args:
         a: the face before.
         b: the face after.
-        everything: list all names; otherwise long lists are shortened.
+        everything: True: list all names; False: shorten long lists.
 
     Returns:
-        Differences in the order of the layers of the format.
+        The differences, in the order of the layers in the format.
     """
     report = Report(everything)
     as_they_are = Comparison(a, b, report)
@@ -78,7 +78,7 @@ def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[
 def _in_system(
     a: risorius.Dna, b: risorius.Dna, report: Report
 ) -> tuple[risorius.Dna, Report, bool]:
-    """B in the axes and units of A, and whether the comparison is exact."""
+    """B in A's axes and units, its report, and whether the comparison is exact."""
     target = {
         argument: getattr(a, name)
         for argument, name in _SYSTEM.items()
@@ -90,7 +90,7 @@ def _in_system(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             converted = b.convert(**target)
-    except ValueError as error:  # DnaError too: invalid axes or units
+    except ValueError as error:  # also DnaError: invalid axes or units
         report.add("file", "", f"numbers are compared as they stand: {error}")
         return b, report, True
     report.add("file", "", "numbers are compared in the axes and units of A, but for rounding")
@@ -98,7 +98,7 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether the files are equal, as a check for differences that the modules missed."""
+    """Whether both files are equal, to find differences that the modules of the layers missed."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

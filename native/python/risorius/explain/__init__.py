@@ -45,21 +45,21 @@ def explain(
     lod: int = 0,
     gui: npt.ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """All facts about one settled pose, as plain values.
+    """All facts about the pose for some raw controls, as plain values.
 
     Args:
-        dna: the face from which rig was compiled.
-        rig: with Euler angles.
-        raw: float32[R], finite.
-        lod: 0 is the finest.
-        gui: float32[G] from which raw was computed, or None.
+        dna: the face.
+        rig: rig compiled from `dna`, with Euler angles.
+        raw: float32[R], finite raw controls.
+        lod: the LOD, 0 is the finest.
+        gui: float32[G], GUI controls from which `raw` was computed, or None.
 
     Returns:
-        A dict that json.dumps accepts. Every list begins with its most important entry. The
-        contributions to a joint add up to its pose.
+        A dict that json.dumps accepts. In every list the most important entry is first. The
+        contributions to a joint sum to its pose.
 
     Raises:
-        ValueError: a rig with quaternions, controls or a pose that are not finite.
+        ValueError: the rig uses quaternions, or controls or pose are not finite.
     """
     if rig.rotation != "euler":
         raise ArgumentError("explain: a rig with rotation='euler' was expected")
@@ -100,7 +100,7 @@ def explain(
 
 
 def _check_finite(dna: risorius.Dna, pose: risorius.Pose) -> None:
-    """Raises: ArgumentError: a pose that is not finite has no contributions that add up to it."""
+    """Check that a pose is finite, because contributions must sum to it. Raises: ArgumentError."""
     of = {
         "joint": (pose.joints, dna.joint_names),
         "blend shape channel": (pose.blend_shapes, dna.blend_shape_channel_names),

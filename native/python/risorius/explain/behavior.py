@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Active controls, correctives, networks, setups, channels and maps."""
+"""Explains active controls, correctives, networks, twist and swing setups, channels and maps."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Facts = dict[str, Any]
 def table_hits(
     table: risorius.Conditionals, rows: int, inputs: Doubles
 ) -> dict[int, list[tuple[int, Facts]]]:
-    """The rows of a conditional table that match some inputs.
+    """Find the rows of a conditional table whose interval contains their input.
 
     Args:
-        table: table of the face.
+        table: conditional table of the face.
         rows: number of leading rows in use.
-        inputs: float64[n], by input index.
+        inputs: float64[n], values by input index.
 
     Returns:
-        Output -> list of (input, its value, the interval and the row's result).
+        Output -> list of (input; its value, and the interval and result of the row).
     """
     out: dict[int, list[tuple[int, Facts]]] = {}
     matched = None
     for row in range(rows):
         pair = int(table.input_indices[row]), int(table.output_indices[row])
         if pair == matched:
-            continue  # in a run only the first matching row counts
+            continue  # of consecutive rows with one input and output, only the first match counts
         matched = None
         low, high = sorted((float(table.from_values[row]), float(table.to_values[row])))
         value = float(inputs[pair[0]])
@@ -54,13 +54,13 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that do not rest, and the GUI controls that set them.
+    """Raw controls that are not at rest, and the GUI controls that set them.
 
     Args:
         dna: the face.
         raw: float64[raw controls].
-        rest: float64[raw controls], at rest.
-        gui: float64[GUI controls]; None: the raw controls were set directly.
+        rest: float64[raw controls], values at rest.
+        gui: float64[GUI controls]; None if the raw controls were set directly.
         names: names of the controls.
     """
     hits: dict[int, list[tuple[int, Facts]]] = {}
@@ -89,11 +89,11 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; unread correctives rest there.
+    """Controls that something reads at a LOD; correctives that nothing reads are at rest there.
 
     Args:
         dna: the face.
-        lod: from 0.
+        lod: the LOD, from 0.
     """
     used: set[int] = set()
     for group in dna.joint_groups:
@@ -117,12 +117,12 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Correctives that fire, correctives that lack one factor, and unread ones.
+    """Active correctives, inactive ones that lack only one factor, and ones that nothing reads.
 
     Args:
         dna: the face.
-        controls: float64[controls] of a pose.
-        lod: from 0, the pose's.
+        controls: float64[controls], of a pose.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     rows = np.asarray(dna.psds.rows)
@@ -185,12 +185,12 @@ def _near_miss(facts: Facts, missing: int, names: ControlNames) -> Facts:
 def explain_networks(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
-    """The networks that run at a LOD, in their order.
+    """The networks that run at a LOD, in the order of evaluation.
 
     Args:
         dna: the face.
-        controls: float64[controls] of a pose.
-        lod: from 0, the pose's.
+        controls: float64[controls], of a pose.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     ml = dna.machine_learned_behavior
@@ -245,11 +245,11 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twist and swing setups that do not rest: their angles in degrees, and their joints.
+    """Twist and swing setups that are not at rest: their angles in degrees, and their joints.
 
     Args:
         dna: the face.
-        controls: float64[controls] of a pose.
+        controls: float64[controls], of a pose.
         names: names of the controls.
     """
     layer = dna.twist_swing_behavior
@@ -283,7 +283,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
 
 def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
-    """Angles in degrees of the twist about the axis and of the swing."""
+    """Angles of a quaternion (x, y, z, w) in degrees: twist about an axis, and swing."""
     axis = min(axis, 2)
     about, w = float(q[axis]), float(q[3])
     rest = math.hypot(*(float(q[a]) for a in range(3) if a != axis))
@@ -301,13 +301,13 @@ def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
 def explain_shapes(
     dna: risorius.Dna, values: Doubles, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
-    """Active blend shape channels and the control of each, the largest value first.
+    """Active blend shape channels, each with its control; the largest value is first.
 
     Args:
         dna: the face.
-        values: float64[channels] of a pose.
-        controls: float64[controls] of the same pose.
-        lod: from 0, the pose's.
+        values: float64[channels], of a pose.
+        controls: float64[controls], of the same pose.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     channels = dna.blend_shape_channels
@@ -339,14 +339,14 @@ def explain_maps(
     lod: int,
     names: ControlNames,
 ) -> list[Facts]:
-    """Active animated maps, the one farthest from its value at rest first.
+    """Active animated maps; the one with the largest difference from its value at rest is first.
 
     Args:
         dna: the face.
-        values: float64[maps] of a pose.
-        at_rest: float64[maps].
-        controls: float64[controls] of the same pose.
-        lod: from 0, the pose's.
+        values: float64[maps], of a pose.
+        at_rest: float64[maps], values at rest.
+        controls: float64[controls], of the same pose.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     table = dna.animated_maps.conditionals

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The moving joints, and the contribution of each control."""
+"""Explains the moving joints: the contribution of each control to each joint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Key of a contribution: a control's index, or the name of a source that combines several controls.
+# Key of a contribution: index of a control, or name of a source that combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""
@@ -24,20 +24,20 @@ Contributions = dict[int, dict[Key, Doubles]]
 def contributions(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> Contributions:
-    """The contribution of each control to each joint; they add up to the joint's pose.
+    """Compute the contribution of each control to each joint; they sum to the joint's pose.
 
     Rows of joint groups are sums over controls. Products of quaternions are not: there a control's
-    contribution is the change of the Euler angles when its column is multiplied, in the order of
-    the columns. A twist, a swing or a network's quaternion is one contribution.
+    contribution is the change of the Euler angles when its quaternion is multiplied, in the order
+    of the columns. A twist, a swing, or a quaternion of a network is one contribution.
 
     Args:
         dna: the face.
-        pose: pose of its rig, with Euler angles.
-        lod: from 0, the pose's.
+        pose: pose of the face's rig, with Euler angles.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
 
     Returns:
-        Joint -> source -> float64[9], in the units of the file.
+        Joint -> source -> float64[9], in the file's units.
     """
     controls = np.asarray(pose.controls, float)
     out = _linear(dna, controls, lod)
@@ -56,7 +56,7 @@ def contributions(
 
 
 def _replace_rotation(out: Contributions, joint: int, parts: dict[Key, Doubles]) -> None:
-    """Replace the rotation of a joint by these parts."""
+    """Replace all contributions to the rotation of a joint by these parts."""
     mine = out.setdefault(joint, {})
     for v in mine.values():
         v[3:6] = 0
@@ -79,7 +79,7 @@ def _linear(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
         for row, output in enumerate(outputs):
             joint, attribute = divmod(output, 9)
             mine = out.setdefault(joint, {})
-            for v in mine.values():  # a group assigns rows: the last group wins
+            for v in mine.values():  # groups assign rows, so the last group replaces earlier ones
                 v[attribute] = 0
             for c in np.flatnonzero(parts[row]).tolist():
                 mine.setdefault(int(inputs[c]), np.zeros(9))[attribute] += parts[row, c]
@@ -87,7 +87,7 @@ def _linear(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _quaternions(dna: risorius.Dna, controls: Doubles, lod: int) -> dict[int, dict[Key, Doubles]]:
-    """Contributions to joints whose rotation the file declares a quaternion."""
+    """Contributions to joints whose rotation is a quaternion according to the file."""
     kinds = dna.joint_behavior_metadata.joint_representations
     if len(kinds) == 0:
         return {}
@@ -111,7 +111,7 @@ def _product(
     rows: dict[int, int],
     controls: Doubles,
 ) -> dict[Key, Doubles]:
-    """Contributions of one joint's columns, multiplied in this order."""
+    """Contributions of the columns of one joint, whose quaternions are multiplied in this order."""
     total, before = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     out: dict[Key, Doubles] = {}
     for column in order.tolist():
@@ -132,7 +132,7 @@ def _product(
 
 
 def _setups(dna: risorius.Dna, names: ControlNames) -> Iterator[tuple[str, int]]:
-    """The name of each twist and swing, and a joint that it turns; twists come last."""
+    """The name of each twist and swing, with each joint that it rotates; twists come last."""
     layer = dna.twist_swing_behavior
     for word, setups in (("swing", layer.swings), ("twist", layer.twists)):
         for setup in setups:
@@ -150,7 +150,10 @@ _BY_NETWORKS = "networks"
 
 
 def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
-    """Joints that networks move. A converted rotation or a quaternion is one contribution."""
+    """Contributions of networks to joints.
+
+    A converted rotation or a quaternion is one contribution.
+    """
     joints = dna.machine_learned_behavior_ext.joints
     settings = {
         int(k): int(v) for k, v in zip(joints.parameter_keys, joints.parameter_values, strict=True)
@@ -170,7 +173,7 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
-    """The networks' axes, if the file gives all of them, and the basis to the face's axes."""
+    """The networks' rotation convention or None, and the matrix to the face's axes."""
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))
@@ -181,12 +184,12 @@ def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | N
 
 
 def _number(word: str) -> int:
-    """The number of a direction; one that the format does not define is read as "#7"."""
+    """The number of a direction; "#7" is a direction that the format does not define."""
     return _WORDS.index(word) if word in _WORDS else int(word.removeprefix("#"))
 
 
 def _axis(number: int) -> Doubles:
-    """The vector of a direction; for an undefined number, the evaluator's choice."""
+    """The vector of a direction; for an undefined number, the same axis as in the evaluator."""
     if number < len(_AXES):
         return _AXES[number]
     return np.eye(3)[number // 2 % 3]
@@ -231,23 +234,23 @@ def _moved(
     return out
 
 
-# ---- who moves most
+# ---- joints by movement
 
 
 def explain_joints(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """Each joint that does not rest, the one that moves most first.
+    """Each joint that is not at rest; the joint that moves most is first.
 
-    Movement is measured as a length: translation, plus a bone's length times the angle in radians
-    and times the change of scale. The bone's length is the median of the file. A control's share is
-    the part of its contribution in the direction of the joint's whole movement; the shares of a
-    joint add up to 1, and a control that works against the movement has a negative share.
+    Movement is a length: translation, plus bone length times angle in radians, plus bone length
+    times change of scale. The bone length is the median of the file. A control's share is the part
+    of its contribution in the direction of the joint's whole movement. The shares of a joint sum to
+    1; a control that works against the movement has a negative share.
 
     Args:
         dna: the face.
-        pose: pose of its rig, with Euler angles.
-        lod: from 0, the pose's.
+        pose: pose of the face's rig, with Euler angles.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     parts = contributions(dna, pose, lod, names)
@@ -263,7 +266,7 @@ def explain_joints(
 
 
 def bone_length(dna: risorius.Dna) -> float:
-    """The median distance of a joint from its parent, in the file's unit."""
+    """The median distance of a joint from its parent, in the file's translation unit."""
     lengths = np.linalg.norm(np.asarray(dna.neutral_joint_translations, float), axis=1)
     lengths = lengths[lengths > 0]
     return float(np.median(lengths)) if len(lengths) else 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""RBF solvers: the distance and the weight of each pose."""
+"""Explains RBF solvers: the distance and the weight of each pose."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _METHODS = ("euclidean", "quaternion", "swing angle", "twist angle")
 def explain_solvers(
     dna: risorius.Dna, rig: risorius.Rig, controls: Doubles, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """The solvers of a LOD with their poses, the greatest weight first.
+    """The solvers of a LOD with their poses; the pose with the greatest weight is first.
 
     Args:
         dna: the face.
-        rig: compiled from dna.
-        controls: float64[controls], as evaluated.
-        lod: from 0, the pose's.
+        rig: rig compiled from `dna`.
+        controls: float64[controls], of a pose.
+        lod: LOD of the pose, from 0.
         names: names of the controls.
     """
     mapping = dna.rbf_behavior.lod_solver_mapping

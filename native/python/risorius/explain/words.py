@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The facts of explain() as sentences."""
+"""Writes the facts of explain() as sentences."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..controls.control_names import last_part
 
 Facts = dict[str, Any]
 T = TypeVar("T")
-_PARTS = 5  # controls that a joint's line names
+_PARTS = 5  # most controls that the line of a joint names
 
 
 def page(facts: Facts, top: int = 10) -> str:
     """The facts as text.
 
     Args:
-        top: lines per list; the rest is counted.
+        top: most lines per list; further entries are counted.
     """
     sections = [
         _raw(facts, top),

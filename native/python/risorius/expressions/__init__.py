@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Expressions: named poses of the standard raw controls in data files that users can edit.
 
-The files beside this one have six emotions, fifteen visemes and more. Any file of the same form can
-be loaded, and `text_of` writes one. A name ending in * stands for both sides, in ** for the four
-lip quarters. A file may state the version of its form: `format = 1`.
+The files in this folder contain six emotions, fifteen visemes and more. Any file of the same form
+can be loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the
+four lip quarters. A file may state the version of its form: `format = 1`.
 """
 
 from __future__ import annotations
@@ -28,49 +28,50 @@ from ..controls.weights import named_weights
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
 EDITION = 2
-"""Version of Risorius' own expressions: a pose saved with an earlier one must keep its look, see
-`get`."""
+"""Version of Risorius' own expressions; poses saved with an older version keep their look.
+
+See `get`.
+"""
 FORMAT = 1
-"""Version of the form that text_of writes; a newer one is refused."""
-_SAVED = (-1.0, 1.5)  # weights of a file with a version: rotations, and overdrive
+"""Version of the form that text_of writes; newer versions are refused."""
+_SAVED = (-1.0, 1.5)  # range of weights in a file with a version, for rotations and overdrive
 VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A named pose."""
+    """A named pose of raw controls."""
 
     name: str
     label: str
     group: str
-    """"emotion", "viseme" or another word of the file; pose libraries sort by it."""
+    """"emotion", "viseme" or another word of the file, by which pose libraries sort."""
     description: str
     weights: Mapping[str, float]
-    """By raw control in the spelling of a DNA, in [0, 1]; in saved files [-1, 1.5]. Others are
-    0."""
+    """Full name of a raw control -> weight in [0, 1], in saved files [-1, 1.5]; others are 0."""
     regions: tuple[str, ...] = ()
-    """Regions whose other controls the expression puts to rest; empty: the regions of its
-    weights."""
+    """Regions whose other controls go to rest; empty for the regions of the weights."""
 
 
 class Lack(NamedTuple):
-    """The part of one expression that a rig cannot show."""
+    """The controls of an expression that a rig lacks."""
 
     missing: tuple[str, ...]
     """Controls that the rig lacks."""
     share: float
-    """The share that it can show: the sum of its weights over the sum of all, in [0, 1]."""
+    """The sum of the weights that the rig can show over the sum of all weights, in [0, 1]."""
 
 
 def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
-    """Expressions by name.
+    """Load expressions from a file or a folder.
 
     Args:
-        path: a TOML file, or a folder of such files (a library); None: Risorius' own, in the order
-            of FILES.
+        path: a TOML file, or a folder of TOML files (a library); None: Risorius' own expressions,
+            in the order of FILES.
 
     Raises:
-        ValueError: with the file, the expression, the found and the expected value. OSError.
+        ValueError: the text has the file, the expression, the found and the expected value.
+        OSError.
     """
     if path is None:
         return dict(_own(EDITION))
@@ -83,10 +84,10 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
 
 
 def of_text(text: str) -> dict[str, Expression]:
-    """Expressions by name, from the text of a file.
+    """Read expressions from the text of a file.
 
     Raises:
-        ValueError: as load.
+        ValueError: see load.
     """
     return _parsed(toml.parse(text), "an expression")
 
@@ -96,10 +97,10 @@ def get(name: str, edition: int = EDITION) -> Expression:
 
     Args:
         name: name of the expression.
-        edition: 1 for the earlier, milder ones; otherwise the current ones.
+        edition: 1 for the older, milder expressions; otherwise the current ones.
 
     Raises:
-        ValueError: unknown name; the text lists some known ones.
+        ValueError: unknown name; the text lists some names.
     """
     own = _own(1 if edition == 1 else EDITION)
     if name not in own:
@@ -112,11 +113,11 @@ def get(name: str, edition: int = EDITION) -> Expression:
 def check(
     rig_names: Iterable[str], expressions: Mapping[str, Expression] | None = None
 ) -> dict[str, Lack]:
-    """The gaps of expressions on a rig; expressions that it can show in full are left out.
+    """Find expressions that a rig cannot show completely, with the controls that it lacks.
 
     Args:
-        rig_names: Rig.raw_control_names.
-        expressions: by default load().
+        rig_names: names of the rig's raw controls, Rig.raw_control_names.
+        expressions: expressions to check; None for load().
     """
     known = set(rig_names)
     report = {}
@@ -129,14 +130,14 @@ def check(
 
 
 def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.NDArray[np.float32]:
-    """An expression as raw controls of a rig.
+    """Convert an expression to raw controls of a rig.
 
     Args:
-        expression: a name of load(), or an Expression.
-        rig_names: Rig.raw_control_names.
+        expression: an Expression, or the name of one of load().
+        rig_names: names of the rig's raw controls, Rig.raw_control_names.
 
     Returns:
-        float32[rig_names], 0 for other controls; controls that the rig lacks are left out.
+        float32[rig_names], 0 for other controls. Controls that the rig lacks are left out.
 
     Raises:
         ValueError: unknown name.
@@ -148,7 +149,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
 
 
 def text_of(expression: Expression) -> str:
-    """One expression as a TOML file for load, with the version of its form.
+    """The text of a TOML file with one expression, for load, with the version of its form.
 
     Raises:
         ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
@@ -179,7 +180,7 @@ def text_of(expression: Expression) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A string in TOML, which escapes the same characters as JSON, and DEL."""
+    """A string as TOML: JSON escapes the same characters except DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -193,7 +194,7 @@ def _own(edition: int = EDITION) -> dict[str, Expression]:
 
 
 def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expression]:
-    """The expressions of several files; of two with one name the later file's is taken."""
+    """Join the expressions of files; of equal names, the later file's expression is used."""
     out: dict[str, Expression] = {}
     file_of: dict[str, str] = {}
     for file, expressions in found.items():

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing of files, locks between processes, the folder of caches."""
+"""Atomic writing of files, locks between processes, the cache folder, PNG and JPEG files."""

@@ -9,8 +9,10 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """Risorius' folder among the user's caches, by the platform's convention; it may not exist
-    yet."""
+    """Risorius' folder among the user's caches, by the platform's convention.
+
+    The folder may not exist.
+    """
     if sys.platform == "win32":
         given = os.environ.get("LOCALAPPDATA", "")
         base = Path(given) if given else Path.home() / "AppData" / "Local"

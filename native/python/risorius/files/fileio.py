@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing: the only way in which this package writes files."""
+"""Atomic writing of files; the package writes files only through this module."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ _Path = str | os.PathLike[str]
 
 @contextlib.contextmanager
 def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
-    """A file to write that gets its name when it is complete and on the disk.
+    """Yield a file to write; it receives its name when it is complete and on disk.
 
-    The old file stays until then, or for good after an exception. A link stays a link, and the old
-    file's rights stay. Until it is complete the file has a hidden name in the same folder. Hidden
-    files of killed processes are removed by the next write in that folder. Devices and pipes
-    receive the bytes directly.
+    An existing file stays until then, or for good after an exception. A link stays a link, and the
+    permissions of an existing file stay. Until the file is complete, it has a hidden name in the
+    same folder. Hidden files of killed processes are removed by the next write in that folder.
+    Devices and pipes receive the bytes directly.
 
     Args:
         path: path of a file in an existing folder.
-        sweep: remove hidden files of killed processes; switch it off for thousands of files in one
-            folder and call sweep() once.
+        sweep: True: remove hidden files of killed processes. For thousands of files in one folder,
+            pass False and call sweep() once.
 
     Raises:
-        OSError: it cannot be written; the error names path.
+        OSError: the file cannot be written; the error names `path`.
     """
     name = os.fspath(path)
     if os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
@@ -62,7 +62,7 @@ def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
 
 
 class _Named(io.FileIO):
-    """A file whose write errors show the name that the user knows."""
+    """A file whose write errors contain the name that the user knows."""
 
     def __init__(self, file: _Path, mode: str, shown: str) -> None:
         super().__init__(file, mode)
@@ -80,10 +80,10 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
 
     Args:
         path: path of a file in an existing folder.
-        data: its bytes.
+        data: the bytes to write.
 
     Raises:
-        OSError: it cannot be written; the error names path.
+        OSError: the file cannot be written; the error names `path`.
     """
     with replacing(path) as file:
         file.write(data)
@@ -94,23 +94,23 @@ def write_text(path: _Path, text: str) -> None:
 
     Args:
         path: path of a file in an existing folder.
-        text: written as UTF-8 with unchanged line ends.
+        text: the text, written as UTF-8 with unchanged line ends.
 
     Raises:
-        OSError: it cannot be written; the error names path.
+        OSError: the file cannot be written; the error names `path`.
     """
     write_bytes(path, text.encode())
 
 
 def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
-    """Write several files that belong together: all are written before the first gets its name.
+    """Write several files that belong together; all are complete before one gets its name.
 
     Args:
-        files: path -> bytes; the first file gets its name last. Missing folders are made, and
+        files: path -> bytes; the first file receives its name last. Missing folders are made, and
             removed again if writing fails.
 
     Raises:
-        OSError: one file cannot be written; then none is changed.
+        OSError: a file cannot be written; then no file is changed.
     """
     made: list[Path] = []
     try:
@@ -122,25 +122,25 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
                 file.flush()
     except BaseException:
         for folder in reversed(made):
-            with contextlib.suppress(OSError):  # it is not empty
+            with contextlib.suppress(OSError):  # the folder is not empty
                 folder.rmdir()
         raise
 
 
 @contextlib.contextmanager
 def staging(path: _Path) -> Iterator[Path]:
-    """A path of the same name in a hidden folder beside the file, for external writers.
+    """Yield a path with the same file name in a hidden folder, for writers of other programs.
 
-    When the block ends, all files in the hidden folder are moved to the folder of the file,
-    subfolders included, and the file itself last. Old files stay until then, or for good after an
+    When the block ends, all files in the hidden folder are moved to the folder of `path`, with
+    their subfolders, and the file itself last. Existing files stay until then, or for good after an
     exception or a kill. The hidden folder of a killed process is removed by the next write in that
-    folder. Devices and pipes are returned unchanged.
+    folder. Paths of devices and pipes are yielded unchanged.
 
     Args:
         path: path of a file in an existing folder.
 
     Raises:
-        OSError: writing is impossible there, or the block wrote no file; the error names path.
+        OSError: the folder cannot be written, or the block wrote no file; the error names `path`.
     """
     target = Path(path)
     if os.path.exists(target) and not target.is_file() and not target.is_dir():
@@ -155,7 +155,7 @@ def staging(path: _Path) -> Iterator[Path]:
 
 
 def _take_places(folder: Path, target: Path) -> None:
-    """Move the files of a staging folder to their final places."""
+    """Move the files of a staging folder to their final paths, `target` last."""
     main = folder / target.name
     if not main.is_file():
         raise FileNotFoundError(errno.ENOENT, "nothing was written", os.fspath(target))
@@ -168,7 +168,7 @@ def _take_places(folder: Path, target: Path) -> None:
 
 
 def _made(folder: Path) -> list[Path]:
-    """Make a folder; returns the folders that were made, the outermost first."""
+    """Make a folder and its parents. Returns the folders that were made, the outermost first."""
     missing = [part for part in (folder, *folder.parents) if not part.exists()][::-1]
     for part in missing:
         part.mkdir(exist_ok=True)
@@ -179,10 +179,10 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
     """Check before long work whether replacing(path) will be possible.
 
     Args:
-        parents: missing folders will be made.
+        parents: True: missing folders are allowed, because they will be made.
 
     Raises:
-        OSError: it will not be possible; the error names path and the reason.
+        OSError: it will not be possible; the error names `path` and the reason.
     """
     target = Path(path)
     if os.path.exists(target) and not target.is_file() and not target.is_dir():
@@ -192,7 +192,7 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
         while not os.path.lexists(missing.parent) and missing.parent != missing:
             missing = missing.parent
         if missing != target:
-            target = missing.with_name(f"{missing.name}-")  # this will become a folder, not a file
+            target = missing.with_name(f"{missing.name}-")  # the name of a folder that will be made
     try:
         FileReplacement(os.fspath(target), False).discard()
     except OSError as error:
@@ -200,6 +200,6 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
 
 
 def sweep(folders: Iterable[Path]) -> None:
-    """Delete hidden files that ended processes of this machine left in folders."""
+    """Delete hidden files that dead processes of this machine left in folders."""
     for folder in folders:
         remove_leftovers(folder)

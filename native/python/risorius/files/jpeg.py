@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Baseline JPEG files, grey or colour, with Huffman codes made for the picture.
+"""Writes baseline JPEG files, grey or colour, with Huffman codes made for the picture.
 
-They are for files sent over a network: a PNG of a painted face is five times as large.
+Used for files that are sent over a network: a PNG of a painted face is five times as large.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
 
 _LONGEST = 16  # longest code in bits
-_RUN, _END = 0xF0, 0x00  # symbols: sixteen zeros, and the end of the block
-# The tables of the standard's annex K for quality 50, in rows.
+_RUN, _END = 0xF0, 0x00  # symbols: sixteen zeros, and end of the block
+# Quantisation tables of annex K of the standard, for quality 50, row by row.
 _LUMA = np.array(
     """16 11 10 16 24 40 51 61 12 12 14 19 26 58 60 55 14 13 16 24 40 57 69 56 14 17 22 29 51 87
     80 62 18 22 37 56 68 109 103 77 24 35 55 64 81 104 113 92 49 64 78 87 103 121 120 101 72 92 95
@@ -47,19 +47,20 @@ _ZIGZAG, _COSINES = _zigzag(), _cosines()
 
 
 def jpeg(pixels: Pixels, quality: int = 85, *, fine_color: bool = False) -> bytes:
-    """A JPEG file.
+    """Encode an image as a JPEG file.
 
     Args:
-        pixels: uint8[h, w] or [h, w, 3], sides from 1 to 65535; row 0 is the bottom (v = 0), as of
+        pixels: uint8[h, w] or [h, w, 3], sides from 1 to 65535; row 0 is the bottom (v = 0), as in
             files.png.
         quality: 1 to 100, as in other programs.
-        fine_color: keep the colour of each pixel, as normal maps need; otherwise of one in four.
+        fine_color: True: store the colour of each pixel, as normal maps need; False: one colour for
+            2 by 2 pixels.
     """
     height, width = pixels.shape[:2]
     image = pixels[::-1].astype(np.float64)
     planes = [image] if image.ndim == 2 else list(np.moveaxis(image @ _YCC.T, 2, 0))
     planes[0] = planes[0] - 128.0
-    side = 2 if len(planes) == 3 and not fine_color else 1  # blocks of brightness along a unit
+    side = 2 if len(planes) == 3 and not fine_color else 1  # per side of a unit
     tables = [_scaled(_LUMA, quality), _scaled(_CHROMA.ravel(), quality)]
     units = []
     for number, plane in enumerate(planes):
@@ -99,7 +100,7 @@ def _padded(plane: Floats, step: int) -> Floats:
 
 
 def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
-    """int[units, side * side, 64]: quantised frequencies in the order of the file."""
+    """The quantised frequencies in the order of the file, int[units, side * side, 64]."""
     rows, columns = (size // (8 * side) for size in plane.shape)
     cut = plane.reshape(rows, side, 8, columns, side, 8).transpose(0, 3, 1, 4, 2, 5)
     waves = _COSINES @ cut @ _COSINES.T
@@ -108,7 +109,7 @@ def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
 
 
 def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
-    """The scan, and (place, table) of its codes."""
+    """The encoded scan, and its Huffman tables as (place, table)."""
     per = [unit.shape[1] for unit in units]
     tokens = []
     for number, unit in enumerate(units):
@@ -130,12 +131,12 @@ def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
 
 
 def _tokens(blocks: Ints, order: Ints, colour: int) -> tuple[Ints, ...]:
-    """Key (place in the scan), table, symbol, and the extra bits of each token.
+    """For each token: key (its place in the scan), table, symbol, and extra bits.
 
     Args:
-        blocks: int[n, 64].
-        order: order of the blocks in the scan.
-        colour: 0 for brightness, 1 for colour: tables 2 * colour and 2 * colour + 1.
+        blocks: int[n, 64], quantised frequencies.
+        order: place of each block in the scan.
+        colour: 0 for brightness, 1 for colour; the tables are 2 * colour and 2 * colour + 1.
     """
     steady = np.diff(blocks[:, 0], prepend=0)
     block, place = np.nonzero(blocks[:, 1:])
@@ -174,8 +175,8 @@ def _extra(values: Ints, sizes: Ints) -> Ints:
 
 
 def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
-    """Lengths and codes by symbol, and the table in the form of the file."""
-    # An extra symbol gets the code of all ones, which the standard reserves.
+    """Huffman lengths and codes by symbol, and the table as the file stores it."""
+    # The extra symbol 256 receives the code of only ones, which the standard reserves.
     heap = [(int(n), i, [i]) for i, n in enumerate(counts) if n] + [(0, 256, [256])]
     long = np.zeros(257, np.int64)
     heapq.heapify(heap)
@@ -184,7 +185,7 @@ def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
         long[a[2] + b[2]] += 1
         heapq.heappush(heap, (a[0] + b[0], min(a[1], b[1]), a[2] + b[2]))
     amounts = np.bincount(long[long > 0], minlength=_LONGEST + 1)
-    for length in range(len(amounts) - 1, _LONGEST, -1):  # as in figure K.3 of the standard
+    for length in range(len(amounts) - 1, _LONGEST, -1):  # see figure K.3 of the standard
         while amounts[length] > 0:
             shorter = length - 2
             while amounts[shorter] == 0:

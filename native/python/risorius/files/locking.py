@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A lock on a folder, so that only one process works in it."""
+"""A lock on a folder, so that only one process writes in it."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from pathlib import Path
 from ..base.errors import RisoriusError
 
 NAME = ".risorius.lock"
-_GOING = 1.0  # seconds after which other processes have closed a removed file
+_GOING = 1.0  # seconds until other processes have closed a removed file
 _UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 class LockedError(RisoriusError):
-    """Another process works in the folder; the text names it."""
+    """Another process holds the lock of the folder; the text names the process."""
 
     code = "locked"
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Work alone in an existing folder.
+    """Hold the lock of an existing folder during the context.
 
-    The lock belongs to the system and ends with its process in any case. A file `.risorius.lock`
-    names the holder meanwhile.
+    The lock belongs to the operating system and ends with the process in any case. A file
+    `.risorius.lock` contains the name of the holder.
 
     Raises:
-        LockedError: another process works there; the text says which, where and since when.
-        OSError: the folder cannot be written; the error names it.
+        LockedError: another process holds the lock; the text has the process, the machine and the
+            time.
+        OSError: the folder cannot be written; the error names the folder.
     """
     handle = _open(folder)
     try:
@@ -43,7 +44,7 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # A process that waits for the lock opens another file of that name; see _open.
+        # A process that waits for the lock must open a new file of this name; see _open.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
@@ -57,13 +58,13 @@ def _remove(folder: Path) -> None:
 
 
 def _open(folder: Path) -> int:
-    """A descriptor of the folder's lock, held by this process."""
+    """Open and lock the folder's lock file. Returns its descriptor."""
     path, last = folder / NAME, time.monotonic() + _GOING
     while True:
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
         except OSError as error:
-            # Windows refuses the name of a removed file until no process has it open.
+            # Windows refuses the name of a removed file until all processes have closed it.
             if sys.platform == "win32" and error.errno == errno.EACCES and time.monotonic() < last:
                 time.sleep(0.01)
                 continue
@@ -83,7 +84,7 @@ def _open(folder: Path) -> int:
 if sys.platform == "win32":
     import msvcrt
 
-    _FAR = 1 << 30  # Windows hides locked bytes, and the holder's name must stay readable
+    _FAR = 1 << 30  # Windows hides locked bytes, so lock one beyond the text
 
     def _take(handle: int, folder: Path) -> None:
         os.lseek(handle, _FAR, os.SEEK_SET)
@@ -129,7 +130,7 @@ def _about_this_process() -> bytes:
 
 
 def _holder(handle: int) -> dict[str, object]:
-    """The holder according to the file; empty if the file is still empty."""
+    """The holder's data in the file; empty if the file is empty or unreadable."""
     os.lseek(handle, 0, os.SEEK_SET)
     try:
         found = json.loads(os.read(handle, 4096))

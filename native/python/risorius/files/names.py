@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""File names made from names in other files: the only way in which such names become paths.
+"""Makes file names from names inside files; other code must not use such names in paths.
 
 The name of an expression, a character, an image or a clip may be any text. As a file name it must
 not lead to another folder, must not open a device, and must be valid on Windows, macOS and Linux.
@@ -10,7 +10,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable
 
-LONGEST = 200  # bytes of UTF-8; file systems allow 255, and other code appends suffixes
+LONGEST = 200  # bytes of UTF-8; file systems allow 255, and callers append suffixes
 UNNAMED = "unnamed"
 _FORBIDDEN = frozenset('<>:"/\\|?*')
 _DEVICES = frozenset(
@@ -20,20 +20,20 @@ _DEVICES = frozenset(
 
 
 def file_name(name: str, ending: str = "", taken: Iterable[str] = ()) -> str:
-    """A file name for a named object, safe on every system.
+    """Make a file name for a named object, valid on every system.
 
     A safe name stays unchanged. Otherwise separators, drives, wildcards and unprintable characters
     become "_"; dots and spaces at both ends are removed; "_" is put before the name of a device; a
-    long name is cut between characters.
+    long name is shortened between characters.
 
     Args:
         name: any text, even empty.
-        ending: suffix with its dot; from the program, never from data.
-        taken: file names to avoid, regardless of case and of the spelling of accents; a number is
-            appended if needed.
+        ending: suffix with its dot; it must come from the program, never from data.
+        taken: file names that are in use, in any case and spelling of accents; a number is appended
+            if needed.
 
     Returns:
-        A name without a folder, at most LONGEST bytes.
+        A file name without a folder, at most LONGEST bytes long.
     """
     text = "".join("_" if c in _FORBIDDEN or not c.isprintable() else c for c in name)
     text = text.lstrip(" .")
@@ -55,18 +55,18 @@ def is_file_name(name: str) -> bool:
 
 
 def folded(path: str) -> str:
-    """A key that is equal for two paths that name one file on some system.
+    """A key that is equal for two paths if they are the same file on some system.
 
     Args:
-        path: a path or a file name. On some systems names that differ only in case, or in the
-            spelling of an accent, name one file.
+        path: path or file name. On some systems names that differ only in case, or in the spelling
+            of an accent, are the same file.
     """
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
 
 
 def _cut(text: str, ending: str) -> str:
-    """A text and an ending, with the text shortened to fit."""
-    room = LONGEST - len(ending.encode()) - 1  # one byte for the "_" before a device
+    """Join a text and an ending, with the text shortened to fit LONGEST."""
+    room = LONGEST - len(ending.encode()) - 1  # one byte for the "_" before a device name
     text = text.encode()[:room].decode(errors="ignore").rstrip(" .") or UNNAMED
     device = text.partition(".")[0].rstrip().casefold() in _DEVICES
     return f"{'_' * device}{text}{ending}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""PNG files as this package writes them: 8 bits, grey or colour, rows plain or filtered."""
+"""Reads and writes PNG files in this package's form: 8 bits, grey or colour, filters 0 to 2."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _MOST_TEXELS = 1 << 26
-_BAND = 1 << 22  # values that are filtered at once
+_BAND = 1 << 22  # values that are filtered at a time
 
 
 def png(image: Floats) -> bytes:
-    """An 8-bit PNG of float [h, w], [h, w, 3] or [h, w, 4] in [0, 1]; row 0 is the bottom (v = 0).
+    """An 8-bit PNG of an image, float [h, w], [h, w, 3] or [h, w, 4], from 0 to 1.
 
-    The fourth value is the opacity; the colour is not premultiplied.
+    Row 0 is the bottom (v = 0). The fourth value is the opacity; the colour is not premultiplied.
     """
     return pixels_to_png(np.clip(np.rint(image * 255), 0, 255).astype(np.uint8))
 
 
 def pixels_to_png(image: Pixels) -> bytes:
-    """Like png, for uint8 from 0 to 255."""
+    """The same as png, for an image of uint8 from 0 to 255."""
     height, width = image.shape[:2]
     values = 1 if image.ndim == 2 else image.shape[2]
     kind = {1: 0, 3: 2, 4: 6}[values]
@@ -48,11 +48,13 @@ def pixels_to_png(image: Pixels) -> bytes:
 
 
 def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8]:
-    """uint8[h, 1 + w]: each row unfiltered, minus its left neighbours, or minus the row above,
-    whichever has the smallest values and so packs best; the filter's number comes first.
+    """Filter each row: none, minus its left neighbours, or minus the row above.
+
+    The filter with the smallest absolute values is chosen, because it compresses best. Returns
+    uint8[h, 1 + w], with the filter's number first.
 
     Args:
-        rows: uint8[h, w], the uppermost first.
+        rows: uint8[h, w], the top row first.
         values: number of values per pixel.
     """
     left, above = rows.copy(), rows.copy()
@@ -75,24 +77,24 @@ def has_opacity(data: bytes) -> bool:
 
 
 def read_png(data: bytes) -> Floats | None:
-    """An image without opacity that png wrote; None for another kind of file or a damaged one.
+    """Read an image without opacity that `png` wrote; None for other or damaged files.
 
     Args:
         data: the bytes of the file.
 
     Returns:
-        float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
+        float64[h, w] or [h, w, 3], from 0 to 1; row 0 is the bottom.
     """
     pixels = read_pixels(data)
     return None if pixels is None else np.asarray(pixels / 255.0)
 
 
 def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
-    """Like read_png, as uint8 from 0 to 255.
+    """The same as read_png, with values of uint8 from 0 to 255.
 
     Args:
         data: the bytes of the file.
-        opacity: also accept [h, w, 4], whose fourth value is the opacity.
+        opacity: True: also read images [h, w, 4], whose fourth value is the opacity.
     """
     shape = pixels_of(data, opacity=opacity)
     if shape is None:
@@ -100,7 +102,7 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
     height, width, values = shape
     body = _body(data, height * (1 + width * values))
     rows = np.frombuffer(body, np.uint8).reshape(height, -1) if body else None
-    if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's file with other filters
+    if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's filters
         return None
     pixels = _unpredicted(rows, values)
     pixels = pixels.reshape((height, width, values) if values > 1 else (height, width))
@@ -108,12 +110,13 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
 
 
 def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | None:
-    """Height, width and values per pixel that a file declares; None if read_png cannot read the
-    file.
+    """Height, width and values per pixel that a file declares.
+
+    None if read_png cannot read the file.
 
     Args:
         data: the bytes of the file.
-        opacity: as in read_pixels.
+        opacity: see read_pixels.
     """
     width, height, depth, kind = _header(data)
     values = ({0: 1, 2: 3, 6: 4} if opacity else {0: 1, 2: 3}).get(kind, 0)
@@ -123,7 +126,7 @@ def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | N
 
 
 def _header(data: bytes) -> tuple[int, int, int, int]:
-    """Width, height, bits per value and kind of a PNG; zeros for other files."""
+    """Width, height, bits per value and colour type of a PNG; zeros for other files."""
     if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
         return 0, 0, 0, 0
     width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
@@ -142,7 +145,7 @@ def _unpredicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uin
 
 
 def _body(data: bytes, size: int) -> bytearray:
-    """The unpacked rows; empty if they do not have this size."""
+    """The decompressed rows; empty if their total size is not `size`."""
     unpacked, out = zlib.decompressobj(), bytearray()
     try:
         for kind, part in _chunks(data):

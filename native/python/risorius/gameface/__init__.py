@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face as glTF whose morph targets a program drives by name: ARKit, visemes, VRM, expressions."""
+"""Exports a face as glTF with named morph targets: ARKit units, visemes, VRM, expressions."""
 
 from .errors import GameFaceError
 from .export import Made, export

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Adds what a face does where morph targets do not add up: targets that are on together, targets
-// that are half on, and targets that act on top of another one, as mouthClose does on jawOpen. Works with three.js, three-vrm and whatever else has objects with
+// Drives the morph targets that correct sums of other targets: targets that are on together,
+// targets that are half on, and targets that act on top of another one, such as mouthClose on
+// jawOpen. Works with three.js, three-vrm, and other libraries whose objects have
 // `morphTargetDictionary` and `morphTargetInfluences`.
 //
 //   import { Combinations } from './combinations.js';
@@ -10,7 +11,7 @@
 
 const FORMAT = 'risorius.combinations';
 const VERSION = 1;
-const LEAST = 0.02; // what is on top of less than this is a share of this
+const LEAST = 0.02; // smallest weight of jawOpen by which mouthClose is divided
 const KINDS = {
   product: { drivers: 2, weight: (a, b) => a * b },
   half: { drivers: 1, weight: (a) => 4 * a * (1 - a) },
@@ -24,13 +25,13 @@ const KINDS = {
   shut: { drivers: 3, weight: (a, b, c) => Math.min(1, a / Math.max(b, LEAST)) * (1 - b) * c },
 };
 
-/** The weight of a combination's target from the weights of those that drive it. */
+/** The weight of a combination's target from the weights (0 to 1) of its driving targets. */
 export function weightOf(kind, weights) {
   const inside = weights.map((w) => Math.min(1, Math.max(0, w)));
   return KINDS[kind].weight(...inside);
 }
 
-/** Refuses what is no table of combinations; returns its rows. */
+/** The rows of a table of combinations; throws an Error if the table is invalid. */
 export function rowsOf(table) {
   if (!table || table.format !== FORMAT) throw new Error(`combinations: format ${FORMAT} was expected`);
   if (table.version !== VERSION) {
@@ -62,14 +63,14 @@ function meshesOf(scene) {
 
 export class Combinations {
   /**
-   * @param table the JSON beside the .glb
-   * @param scene a three.js object that holds the face, or a list of its meshes
+   * @param table the parsed .combinations.json
+   * @param scene a three.js object that contains the face, or a list of its meshes
    */
   constructor(table, scene) {
     const rows = rowsOf(table);
     this.plans = [];
     const meshes = meshesOf(scene);
-    // A mesh may lack a target that does not move it; another mesh then says how far it is on.
+    // A mesh may lack a target that does not move it; its weight is then read from another mesh.
     const sources = new Map();
     for (const mesh of meshes) {
       for (const [name, index] of Object.entries(mesh.morphTargetDictionary)) {
@@ -87,7 +88,7 @@ export class Combinations {
     }
   }
 
-  /** Sets the combinations' targets from the others. Returns how many are on. */
+  /** Sets the weights of the combinations' targets. Returns the number of weights above 0. */
   update() {
     let on = 0;
     for (const { weight, drivers, driven } of this.plans) {

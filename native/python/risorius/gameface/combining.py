@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What targets that are added up leave to the rig: combinations of two, and targets half on."""
+"""Finds where a sum of morph targets deviates from the rig, and makes targets that correct it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
 PRODUCT, HALF, BELOW, SHARE = "product", "half", "below", "share"
-"""How a combination's weight comes of a and b that drive it: a b; 4 a (1 - a); and where a acts on
-top of b, as mouthClose does on jawOpen: 4 a (1 - b), which counts where both are half on, and
-4 a (b - a), which counts where a is half of what b is."""
+"""Formulas of a combination's weight from the weights a and b of its targets. PRODUCT: a b. HALF: 4
+a (1 - a). For a target a on top of b, such as mouthClose on jawOpen: BELOW, 4 a (1 - b), 1 if both
+are half on; SHARE, 4 a (b - a), largest if a is half of b."""
 CUBIC, EARLY, LATE, MIDDLE = "cubic", "early", "late", "middle"
 TRIPLE, SHUT = "triple", "shut"
-"""Weights that are 0 where the others count: 32/3 a (1 - a) (1 - 2 a); 4 a (1 - a) b;
-4 a b (1 - b); 16 a b (1 - a) (1 - b); a b c; and where a
-acts on top of b, (1 - b) c for the share of b that a is."""
+"""More formulas, each 0 at the poses where the formulas above are exact: 32/3 a (1 - a) (1 - 2 a);
+4 a (1 - a) b; 4 a b (1 - b); 16 a b (1 - a) (1 - b); a b c; and SHUT, for a target a on top of b:
+(1 - b) c times the share of b that a takes back."""
 _WEIGHTS: dict[str, Callable[..., Doubles]] = {
     PRODUCT: lambda a, b: a * b,
     HALF: lambda a: 4 * a * (1 - a),
@@ -40,19 +40,21 @@ _WEIGHTS: dict[str, Callable[..., Doubles]] = {
     TRIPLE: lambda a, b, c: a * b * c,
     SHUT: lambda a, b, c: share_of(a, b) * (1 - b) * c,
 }
-_LEAST = 2e-6  # metres: what a target moves less, it does not move
-_TRIED = 2000  # pairs of a group: of more, as many that are spread evenly
+_LEAST = 2e-6  # metres: shorter displacements are set to 0
+_TRIED = 2000  # pairs of a group: of a larger number, about this many are tried, spread evenly
 
 
 @dataclass(frozen=True)
 class Combination:
-    """What is added where targets are on together, or where one is half on.
+    """A corrective morph target for two or three targets that are on together, or one half on.
+
+    The driver adds it to the linear sum of its targets.
 
     Attributes:
-        name: of its morph target.
-        of: the targets that drive it.
-        weight: PRODUCT, HALF, BELOW or SHARE, or of refining CUBIC to SHUT.
-        error_mm: the largest deviation of the linear sum without it.
+        name: name of its morph target.
+        of: names of the targets that drive it.
+        weight: formula of its weight: PRODUCT, HALF, BELOW or SHARE, or CUBIC to SHUT of refining.
+        error_mm: the largest deviation of the linear sum from the rig without it, in mm.
     """
 
     name: str
@@ -62,14 +64,14 @@ class Combination:
 
 
 class Sums:
-    """Sums of targets against the rig.
+    """Compares linear sums of morph targets with the rig.
 
     Attributes:
-        tried: pairs of each group that were looked at, and how many it has.
+        tried: group -> (number of pairs compared, number of pairs in the group).
     """
 
     def __init__(self, points: Points, rig: Rig, targets: Sequence[Target]) -> None:
-        """Args: points: of a level; rig: of the face; targets: those that the file has."""
+        """Args: points: vertices of a LOD; rig: the face's rig; targets: targets of the file."""
         self._points = points
         self._names = rig.raw_control_names
         self._rest = np.asarray(rig.initial_raw_controls, np.float32)
@@ -79,7 +81,7 @@ class Sums:
         self.tried: dict[str, tuple[int, int]] = {}
 
     def delta(self, name: str) -> Floats:
-        """float32[P, 3], metres, of a target."""
+        """float32[P, 3]: the displacement of the vertices by a target, in metres."""
         if name not in self._deltas:
             target = self._targets[name]
             found = self._points.at(target.raw) - self._points.at(target.base)
@@ -88,16 +90,16 @@ class Sums:
         return self._deltas[name]
 
     def combination(self, one: Combination) -> Floats:
-        """float32[P, 3], metres, of a combination's morph target."""
+        """float32[P, 3]: the displacement of a combination's morph target, in metres."""
         found = self._missing(one.weight, one.of)
         found[np.abs(found).max(axis=1) < _LEAST] = 0.0
         return found.astype(np.float32)
 
     def errors(self, group: str) -> list[Combination]:
-        """Pairs of a group, and its targets half on, the largest deviation first.
+        """Combinations for the pairs of a group and its single targets, largest deviation first.
 
         Args:
-            group: of the targets.
+            group: name of the group of targets.
         """
         mine = [t for t in self._targets.values() if t.group == group and self._moves(t)]
         pairs = [(a, b) for a, b in combinations(mine, 2) if self._meet(a, b)]
@@ -116,12 +118,16 @@ class Sums:
         return sorted(out, key=lambda one: -one.error_mm)
 
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
-        """Millimetres of a sum from the rig at most. Args: of: its targets; kind: of weight."""
+        """The largest deviation of a linear sum from the rig, in mm.
+
+        Args:
+            of: names of its targets.
+            kind: formula of the weight, such as PRODUCT."""
         missing = self._missing(kind, of)
         return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))
 
     def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
-        """What the linear sum lacks where targets are on as their weight counts most."""
+        """float64[P, 3]: rig minus linear sum, with targets on so that the weight is largest."""
         top = next((t for t in map(self._targets.__getitem__, of) if t.needs), None)
         if top is not None:
             return self._missing_on_top(kind, top, of)
@@ -135,7 +141,7 @@ class Sums:
         return self._points.at(np.clip(raw, -1.0, 1.0)) - linear
 
     def _missing_on_top(self, kind: str, top: Target, of: tuple[str, ...]) -> Doubles:
-        """The same of one that acts on top of another: its raw controls are shares of that one."""
+        """_missing for a target on top of another: its raw controls take a share of the other's."""
         below, on, share = top.base, np.float32(1.0), 0.5
         if kind == BELOW:
             below = self._rest + np.float32(0.5) * (top.base - self._rest)
@@ -152,8 +158,8 @@ class Sums:
         return bool((target.raw != target.base).any())
 
     def _meet(self, a: Target, b: Target) -> bool:
-        """Whether a face does both: not where they look, shift or turn to opposite sides; and one
-        on top of the other is what it is."""
+        """Whether a face can show both targets: not two opposites, such as looking left and right,
+        and not a target together with the one that it acts on top of."""
         if a.name == b.needs or b.name == a.needs:
             return False
         on = [[self._names[i] for i in np.flatnonzero(t.raw != self._rest)] for t in (a, b)]
@@ -161,27 +167,27 @@ class Sums:
 
 
 def weight_of(kind: str, *drivers: Doubles) -> Doubles:
-    """The weight of a combination. Args: kind: of weight; drivers: weights from 0 to 1."""
+    """The weight of a combination. Args: kind: its formula; drivers: target weights, 0 to 1."""
     return _WEIGHTS[kind](*drivers)
 
 
 def chosen(found: Sequence[Combination], within_mm: float, most: int) -> list[Combination]:
-    """Those that leave more than allowed, the largest first.
+    """The combinations with a larger deviation than allowed, largest first.
 
     Args:
-        found: of Sums.errors.
-        within_mm: what a sum may deviate.
-        most: so many at most.
+        found: from Sums.errors, largest deviation first.
+        within_mm: allowed deviation of a linear sum, in mm.
+        most: largest number of combinations.
     """
     return [one for one in found if one.error_mm > within_mm][:most]
 
 
 def driver_table(file: str, made: Sequence[Combination]) -> dict[str, object]:
-    """The JSON that combinations.js reads.
+    """The content of the JSON file that combinations.js reads.
 
     Args:
-        file: the name of the .glb.
-        made: combinations whose targets the file has.
+        file: file name of the .glb.
+        made: combinations whose morph targets are in the .glb.
     """
     rows = [{"target": one.name, "of": list(one.of), "weight": one.weight} for one in made]
     return {"format": "risorius.combinations", "version": 1, "file": file, "combinations": rows}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a game face cannot be made of."""
+"""The error of the glTF export of game faces."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from ..base.errors import RisoriusError
 
 
 class GameFaceError(RisoriusError):
-    """A face, or a wish, that no file can be made of."""
+    """A face, or a combination of options, that cannot be exported as glTF."""
 
     code = "game_face"

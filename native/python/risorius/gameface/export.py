@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face as one glTF file: meshes with morph targets, materials, a few joints, within a size."""
+"""Exports a face as one glTF file within a size: meshes, morph targets, materials, joints."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ from .writing import Change, Written, write
 Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-_SMALL = 256  # pixels: smaller textures show, quantized vertices do not
-_COMBINATIONS = 256  # targets of them where nobody says how many a client takes
+_SMALL = 256  # pixels per side: smaller textures are more visible than quantized vertices
+_COMBINATIONS = 256  # limit of combination targets if the user gives no limit of targets
 
 
 @dataclass
 class Made:
-    """What was made.
+    """The exported files and what to tell the user.
 
     Attributes:
-        files: name -> bytes, the .glb first.
-        notes: sentences: what is missing, approximated, or was lowered for the size.
-        groups: a line for each group of targets.
+        files: file name -> bytes, the .glb first.
+        notes: sentences about parts that are missing, approximated, or reduced to meet the size.
+        groups: one line of text per group of targets.
     """
 
     files: dict[str, bytes]
@@ -56,17 +56,18 @@ class Made:
 
 
 def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
-    """A face as a file of glTF, and the driver of its combinations where it is asked for.
+    """Exports a face as glTF; with wishes.within, adds the JSON and script of its combinations.
 
     Args:
         dna: the whole face, with geometry.
-        rig: compiled from it, with Euler angles.
-        file: of the face: its textures lie beside it, and errors name it.
-        out: the name of the .glb, which the names of the others are made of.
-        wishes: how it is to be.
+        rig: compiled from it, with rotations as Euler angles.
+        file: path of the face: textures are in its folder, and errors name it.
+        out: file name of the .glb; the names of the other files derive from it.
+        wishes: export options.
 
     Raises:
-        GameFaceError: the face lacks what was asked for; too many targets; no way to the size.
+        GameFaceError: the face lacks something requested; too many targets; the size limit cannot
+            be met.
     """
     levels = max(1, rig.lod_count)
     if not wishes.lod < levels:
@@ -98,16 +99,16 @@ def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
 
 
 def _as_avatar(wishes: Wishes, out: str) -> Wishes:
-    """The wishes with all that a VRM, or a body, needs.
+    """The wishes with the options that a VRM or a humanoid needs.
 
     Raises:
-        GameFaceError: a VRM whose licence is not said.
+        GameFaceError: a VRM without a complete licence.
     """
     if not (wishes.vrm or wishes.humanoid or wishes.body):
         return wishes
     if wishes.vrm:
         licence.checked(wishes.licence, wishes.vrm, out)
-        # Presets come first: no other target may take their names.
+        # VRM presets come first, so that no other target takes their names.
         wishes = replace(wishes, shapes=tuple(dict.fromkeys(("vrm", *wishes.shapes))))
     return replace(wishes, skeleton=True)
 
@@ -115,10 +116,10 @@ def _as_avatar(wishes: Wishes, out: str) -> Wishes:
 def _within(
     maker: _Maker, written: Written, wishes: Wishes, levels: int, face: str
 ) -> tuple[Written, Wishes]:
-    """The file within its size, and how it came to be.
+    """The file within the size limit, and the reduced options that it was made with.
 
     Raises:
-        GameFaceError: with everything lowered it is still larger.
+        GameFaceError: the file is still too large with every reduction.
     """
     most, wish = int((wishes.mb or 0) * 1e6), wishes
     for lower in _lower(wishes, levels):
@@ -133,7 +134,8 @@ def _within(
             f"{_megabytes(written)}: ask for fewer shapes{more}"
         )
     size = wishes.textures
-    while wish.lod != wishes.lod and size > wish.textures:  # a coarser level may leave room
+    # a coarser LOD may leave room for larger textures
+    while wish.lod != wishes.lod and size > wish.textures:
         larger = replace(wish, textures=size)
         again = maker.make(larger)
         if len(again.data) <= most:
@@ -143,7 +145,7 @@ def _within(
 
 
 def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
-    """What makes the file smaller, each on top of the one before: what shows most comes last."""
+    """Options that make the file smaller, each on top of the one before; the most visible last."""
     wish = wishes
     if not (wish.sparse or wish.meshopt):
         wish = replace(wish, sparse=True)
@@ -151,7 +153,7 @@ def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
     while wish.textures > _SMALL:
         wish = replace(wish, textures=max(_SMALL, wish.textures // 2))
         yield wish
-    if not (wish.quantize or wish.vrm):  # few programs that read VRM read such vertices
+    if not (wish.quantize or wish.vrm):  # few programs that read VRM read quantized vertices
         wish = replace(wish, quantize=True)
         yield wish
     for lod in range(wish.lod + 1, levels):
@@ -160,7 +162,7 @@ def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
 
 
 def _lowered(before: Wishes, after: Wishes) -> Iterator[str]:
-    """What is lower, in words."""
+    """The names of the reduced options."""
     if after.sparse != before.sparse:
         yield "sparse targets"
     if after.textures != before.textures:
@@ -176,7 +178,7 @@ def _megabytes(written: Written) -> str:
 
 
 class _Maker:
-    """The file of a face again and again, with what needs no second look kept."""
+    """Makes the file of a face repeatedly, and keeps results that the options do not change."""
 
     def __init__(self, dna: Dna, rig: Rig, file: Path, targets: Sequence[Target]) -> None:
         self._dna, self._rig, self._targets = dna, rig, targets
@@ -191,7 +193,7 @@ class _Maker:
         self._refined: list[tuple[Combination, Floats]] = []
 
     def make(self, wishes: Wishes) -> Written:
-        """The file as wished, whatever its size."""
+        """The file with the given options, whatever its size."""
         self._wishes = wishes
         if wishes.lod != self._lod:
             self._take_level(wishes)
@@ -245,11 +247,11 @@ class _Maker:
             self._refine(wishes, room - len(self.made))
 
     def _refine(self, wishes: Wishes, room: int) -> None:
-        """Targets for what pairs leave at poses that faces have."""
+        """Adds combinations that correct the deviations left by pairs at typical poses of faces."""
         mine = [t for t in self._targets if t.group == "arkit"]
         names = [t.name for t in mine]
         poses = faces.typical(names, POSES)
-        if wishes.frames:  # twice: what somebody captures says more than what faces could do
+        if wishes.frames:  # twice, because captured poses matter more than random ones
             own = faces.of_frames(names, wishes.frames)
             poses = np.concatenate([poses, own, own])
         self._refiner = Refiner(self._points, self._rig, self._sums, mine, self.made)
@@ -299,7 +301,7 @@ class _Maker:
         return found, move
 
     def lines(self, written: Written) -> list[str]:
-        """For each group of targets how many, on how many vertices, bytes, and what sums leave."""
+        """One line per group: numbers of targets and vertices, bytes, deviation of linear sums."""
         out = []
         for group, found in self._found.items():
             tried, there = self._sums.tried[group]
@@ -324,7 +326,7 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group that captures drive: the first that was asked for, which is ARKit mostly."""
+    """The group that captures drive: the first requested one; in a VRM not vrm, if possible."""
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 
 

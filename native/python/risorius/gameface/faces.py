@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Poses in ARKit's units as faces have them: which are on together, how often, and how far."""
+"""Random poses in ARKit units that resemble faces: which units are on together, and how far."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 Doubles = npt.NDArray[np.float64]
 
-_STEEP = 1.3  # of levels: low ones are more frequent
-_ONE_SIDED = 0.25  # of the poses
-# Pair of units -> in how many poses it is on. Of pairs in one row at most one is.
+_STEEP = 1.3  # exponent of the random weights: low weights are more frequent
+_ONE_SIDED = 0.25  # share of the poses with one side weaker than the other
+# Unit without its side -> share of the poses in which it is on. At most one unit of a row is on.
 _PAIRS = (
     {"eyeBlink": 0.75},
     {"eyeLookDown": 0.55, "eyeLookUp": 0.2},
@@ -34,19 +34,19 @@ _SINGLE = {
     "cheekPuff": 0.1, "mouthLeft": 0.1, "mouthRight": 0.1, "jawLeft": 0.08, "jawRight": 0.08,
     "jawForward": 0.1, "tongueOut": 0.06,
 }  # fmt: skip
-_STILL = 0.3  # of the poses with an open jaw have it hardly open
-_SHUT = 0.6  # of the poses with an open jaw have mouthClose
+_STILL = 0.3  # share of the poses whose jawOpen is reduced to 0.12 of its weight
+_SHUT = 0.6  # share of the poses in which mouthClose takes back part of jawOpen
 _ASIDE = (("eyeLookOutLeft", "eyeLookInRight"), ("eyeLookInLeft", "eyeLookOutRight"))
 _EACH_ASIDE = 0.25
 
 
 def typical(names: Sequence[str], count: int, seed: int = 1) -> Doubles:
-    """float64[count, names], weights from 0 to 1.
+    """Random poses: float64[count, names], weights from 0 to 1.
 
     Args:
-        names: units of ARKit; what the table does not know stays off.
-        count: how many poses.
-        seed: of chance; equal seeds give equal poses.
+        names: ARKit units; units that the tables above lack stay 0.
+        count: number of poses.
+        seed: seed of the random numbers; equal seeds give equal poses.
     """
     chance = np.random.default_rng(seed)
     on: dict[str, Doubles] = {}
@@ -76,6 +76,6 @@ def typical(names: Sequence[str], count: int, seed: int = 1) -> Doubles:
 
 
 def of_frames(names: Sequence[str], frames: Sequence[Mapping[str, float]]) -> Doubles:
-    """float64[frames, names]. Args: names: of targets; frames: unit -> weight."""
+    """Frames as float64[frames, names]. Args: names: of targets; frames: unit -> weight."""
     rows = [[frame.get(name, 0.0) for name in names] for frame in frames]
     return np.clip(np.array(rows, np.float64).reshape(-1, len(names)), 0.0, 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A GLB file written piece by piece: whole lists, sparse ones, and ones packed by meshoptimizer."""
+"""Writes a GLB file: accessors that are dense, sparse, or packed with meshoptimizer."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ _VERTICES, _CORNERS = 34962, 34963
 
 
 class Glb:
-    """Attributes:
-    table: the JSON; whoever writes nodes and meshes adds to its lists.
-    pictures: name of a picture of the face -> its texture.
-    packs: lists of vertices and corners are packed by meshoptimizer.
-    sparse: lists that hold zeros for the most part are kept by their other rows.
+    """The JSON table and the binary buffer of a GLB file under construction.
+
+    Attributes:
+        table: the JSON; callers append nodes and meshes to its lists.
+        packs: whether vertices and triangles are packed with meshoptimizer.
+        sparse: whether an accessor of mostly zero rows stores only its other rows.
+        pictures: name of a picture of the face -> its texture.
     """
 
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:
@@ -34,25 +36,26 @@ class Glb:
         self.table: dict[str, Any] = {"accessors": [], "bufferViews": []}
         self.pictures: dict[str, int] = {}
         self._binary = bytearray()
-        self._unpacked = 0  # bytes of the buffer that is not there, which packed views stand for
+        # bytes of buffer 1, which is not stored: packed views declare their unpacked size in it
+        self._unpacked = 0
 
     def vertices(self, values: Numbers, *, normalized: bool = False, bounds: bool = False) -> int:
-        """An accessor of one row for each vertex.
+        """Adds an accessor with one row per vertex, and returns its number.
 
         Args:
             values: [V, k] of int8, uint8, int16, uint16 or float32.
-            normalized: whole numbers stand for -1 to 1, or 0 to 1.
-            bounds: say the least and the largest, as positions must.
+            normalized: whether integers mean -1 to 1 (signed) or 0 to 1 (unsigned).
+            bounds: whether to write minimum and maximum, which glTF requires for positions.
         """
         about = self._about(values, normalized, bounds)
         about["bufferView"] = self._rows(values)
         return self._accessor(about)
 
     def changes(self, values: Numbers, *, normalized: bool = False, bounds: bool = False) -> int:
-        """As vertices, of a morph target: zeros alone take no bytes, few other rows take few.
+        """Adds an accessor of a morph target; rows of zeros alone take no bytes.
 
         Args:
-            values, normalized, bounds: as of vertices.
+            values, normalized, bounds: as for `vertices`.
         """
         about = self._about(values, normalized, bounds)
         moved = np.flatnonzero(values.any(axis=1))
@@ -73,7 +76,7 @@ class Glb:
         return self._accessor(about)
 
     def corners(self, triangles: Numbers, vertices: int) -> int:
-        """An accessor of triangles. Args: triangles: int[T, 3]; vertices: how many there are."""
+        """Adds an accessor of triangles. Args: triangles: int[T, 3]; vertices: vertex count."""
         wide = 2 if vertices <= 0xFFFF else 4
         flat = triangles.reshape(-1).astype(f"<u{wide}")
         about = self._about(flat[:, None], False, False)
@@ -89,19 +92,19 @@ class Glb:
         return self._accessor({**about, "bufferView": self.view(values.tobytes())})
 
     def matrices(self, values: Numbers) -> int:
-        """An accessor of matrices. Args: values: float[n, 4, 4], rows first."""
+        """Adds an accessor of matrices. Args: values: float[n, 4, 4], row-major."""
         flat = np.ascontiguousarray(np.swapaxes(values, 1, 2), "<f4").reshape(-1, 16)
         return self._accessor(
             {**self._about(flat, False, False), "bufferView": self.view(flat.tobytes())}
         )
 
     def view(self, data: bytes, *, target: int = 0, stride: int = 0) -> int:
-        """A buffer view of bytes as they are.
+        """Adds a buffer view of unchanged bytes, and returns its number.
 
         Args:
             data: the bytes.
-            target: of vertices or of corners, 0 for what is neither.
-            stride: bytes of a row, 0 for what has none.
+            target: code of vertex or index buffers, 0 for other data.
+            stride: bytes per row, 0 for data without rows.
         """
         about: dict[str, Any] = {
             "buffer": 0,
@@ -116,11 +119,11 @@ class Glb:
         return len(self.table["bufferViews"]) - 1
 
     def uses(self, extension: str, *, required: bool) -> None:
-        """Name an extension.
+        """Adds an extension to the lists of the JSON.
 
         Args:
             extension: its name.
-            required: nobody can read the file without it.
+            required: whether a program without it cannot read the file.
         """
         for key in ("extensionsUsed", "extensionsRequired")[: 1 + required]:
             if extension not in self.table.setdefault(key, []):
@@ -128,11 +131,11 @@ class Glb:
 
     @property
     def size(self) -> int:
-        """Bytes of the lists so far."""
+        """Bytes of the binary buffer so far."""
         return len(self._binary)
 
     def data(self) -> bytes:
-        """The file."""
+        """The bytes of the GLB file."""
         if self._unpacked:
             self.uses(MESHOPT, required=True)
         buffers: list[dict[str, Any]] = [{"byteLength": len(self._binary)}]
@@ -171,7 +174,7 @@ class Glb:
         return len(self.table["accessors"]) - 1
 
     def _rows(self, values: Numbers) -> int:
-        """A view of rows that begin at whole words, as vertices must."""
+        """A buffer view with rows at multiples of 4 bytes, which glTF requires of vertices."""
         stride = _stride(values)
         own = values.dtype.itemsize * values.shape[1]
         flat = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), own)
@@ -204,6 +207,6 @@ class Glb:
 
 
 def _stride(values: Numbers) -> int:
-    """Bytes of a row, rounded up to whole words."""
+    """Bytes of a row, rounded up to a multiple of 4."""
     own = int(values.dtype.itemsize * values.shape[1])
     return own + -own % 4

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a VRM says of a face and is measured at it: how far eyes turn, what goes with a feeling."""
+"""Measures VRM values of a face: angles of the gaze, and presets that do not mix with a feeling."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .targets import Target
 Doubles = npt.NDArray[np.float64]
 
 HELD_MM = 2.0
-"""Millimetres: an expression holds back what its sum with that is farther from the rig."""
-_LEAST_DEGREES = 1.0
+"""Millimetres: an expression blocks a kind of preset if their sum deviates farther from the rig."""
+_LEAST_DEGREES = 1.0  # degrees: smaller turns of the eyes count as none
 
 
 def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manner:
-    """Of a level.
+    """Measures the VRM values of a face at one LOD.
 
     Args:
-        points: of it.
-        sums: of its targets.
-        targets: of the group vrm, by name.
+        points: vertices of the LOD.
+        sums: linear sums of its targets.
+        targets: name -> target of the group vrm.
     """
     look = {}
     for name in KINDS["LookAt"]:
@@ -43,7 +43,7 @@ def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manne
 
 
 def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
-    """Degrees that the eyeballs turn, in the mean; 0 for a face without eyes."""
+    """Mean rotation of the eyeballs in degrees; 0 for a face without eyes."""
     found = list[float]()
     for part in points.parts:
         rows = np.unique(part.rows)
@@ -55,7 +55,7 @@ def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
 
 
 def _rotation(rest: Doubles, at: Doubles) -> Doubles:
-    """The rotation that brings points nearest to others, in least squares."""
+    """float64[3, 3]: the rotation that best maps `rest` onto `at` in least squares, both [n, 3]."""
     left, _, right = np.linalg.svd(rest.T @ at)
     sign = np.sign(np.linalg.det(left @ right))
     return np.asarray((left * [1.0, 1.0, sign]) @ right, np.float64).T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Materials of a game face: textures that lie beside the DNA file, no larger than asked for."""
+"""Materials of a game face, with the textures from the DNA file's folder scaled down."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from .naming import safe
 Pixels = npt.NDArray[np.uint8]
 
 LARGEST = 8192
-_AS_THEY_ARE = ("image/png", "image/jpeg")  # every client shows these
+# media types that are stored unchanged if the pixels cannot be read
+_AS_THEY_ARE = ("image/png", "image/jpeg")
 _QUALITY = {"color": 85, "normal": 88, "roughness": 75}
-# Colour and roughness of what has no texture.
+# Colour and roughness of materials without a texture.
 _PLAIN = {
     "skin": ((0.72, 0.50, 0.41), 0.55), "eyes": ((0.85, 0.83, 0.80), 0.25),
     "teeth": ((0.86, 0.80, 0.70), 0.3), "tongue": ((0.60, 0.28, 0.27), 0.45),
@@ -32,14 +33,14 @@ _PLAIN = {
 }  # fmt: skip
 _WET = 0.06  # opacity of tears and corneas
 _SMOOTH = {"magFilter": 9729, "minFilter": 9987}  # a sampler
-_CUT = 0.35  # opacity below which hair is not there
+_CUT = 0.35  # opacity below which hair is cut away
 
 
 class Materials:
-    """The materials of meshes; pictures are read and packed once for each size."""
+    """Makes the materials of meshes; each picture is read once and packed once per size."""
 
     def __init__(self, dna: Dna, file: Path) -> None:
-        """Args: dna: has the metadata; file: its file."""
+        """Args: dna: its metadata names the textures; file: path of the DNA file."""
         self._textures = Textures(dna, file)
         self._pixels: dict[str, Pixels | None] = {}
         self._packed: dict[tuple[str, str, int], tuple[str, bytes] | None] = {}
@@ -47,13 +48,13 @@ class Materials:
         self.notes: list[str] = []
 
     def add(self, mesh: str, glb: Glb, known: dict[str, int], longest: int) -> int:
-        """The material of a mesh.
+        """Adds the material of a mesh to the file, and returns its number.
 
         Args:
-            mesh: its name in the DNA file.
-            glb: gets it.
-            known: of this file, by name; a material that is there is used again.
-            longest: pixels of the longer side of a picture.
+            mesh: name of the mesh in the DNA file.
+            glb: the file that receives it.
+            known: material name -> number in this file; a known material is used again.
+            longest: largest number of pixels of a picture's longer side.
         """
         base, kind = base_name(mesh), kind_of(mesh)
         name = safe(base)
@@ -81,7 +82,8 @@ class Materials:
             if normal is not None:
                 material["normalTexture"] = {"index": normal}
             roughness = self._picture(named.get("roughness", ""), "roughness", longest // 2, glb)
-            if roughness is not None:  # grey is read as green, and its blue is taken times 0
+            # glTF reads roughness from green; blue, the metalness, is multiplied by 0
+            if roughness is not None:
                 surface["metallicRoughnessTexture"] = {"index": roughness}
                 surface["roughnessFactor"] = 1.0
         materials = glb.table.setdefault("materials", [])
@@ -91,11 +93,11 @@ class Materials:
 
     @staticmethod
     def is_painted(glb: Glb, number: int) -> bool:
-        """Whether a material needs texture coordinates.
+        """Whether a material has a texture, so that its meshes need texture coordinates.
 
         Args:
-            glb: has it.
-            number: that add gave.
+            glb: the file that has it.
+            number: number from `add`.
         """
         material = glb.table["materials"][number]
         return any(
@@ -103,7 +105,7 @@ class Materials:
         )
 
     def _picture(self, name: str, role: str, longest: int, glb: Glb, alpha: str = "") -> int | None:
-        """The texture of a file, None where there is none."""
+        """The number of the texture made from a picture file, None without a picture."""
         if not name:
             return None
         key = (name, role, longest)
@@ -126,7 +128,7 @@ class Materials:
         return glb.pictures[label]
 
     def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
-        """Media type and bytes of a picture."""
+        """Media type and bytes of a picture file, scaled and recompressed; None if unusable."""
         pixels = self._read(name)
         if pixels is None:
             return self._whole.get(name)
@@ -173,14 +175,14 @@ class Materials:
 
 
 def _sides(data: bytes) -> tuple[int, int]:
-    """Width and height that a PNG says; zeros for other files."""
+    """Width and height in pixels from a PNG's header; zeros for other files."""
     if media_type(data) != "image/png" or len(data) < 24:
         return 0, 0
     return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
 
 
 def _like(mask: Pixels, picture: Pixels) -> Pixels:
-    """A mask with as many pixels as a picture: the nearest."""
+    """A mask resampled (nearest pixel) to the width and height of a picture."""
     grey = mask if mask.ndim == 2 else mask[..., 0]
     rows, columns = (
         np.arange(n) * m // n for n, m in zip(picture.shape[:2], grey.shape, strict=True)

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Names that every client and engine takes."""
+"""Names of meshes and targets that every client and game engine accepts."""
 
 from __future__ import annotations
 
 import re
 
-# To three.js, Godot, Unity and Unreal the others are parts of a path, or of nothing.
+# three.js, Godot, Unity and Unreal read other characters as parts of a path, or drop them.
 _UNSAFE = re.compile(r"[^\w+\-]")
 
 
 def safe(name: str) -> str:
-    """A name of letters, digits, "_", "+" and "-". Args: name: any; other signs become "_"."""
+    """A name of letters, digits, "_", "+" and "-". Args: name: other characters become "_"."""
     return _UNSAFE.sub("_", name) or "_"
 
 
 def unlike(name: str, taken: set[str]) -> str:
-    """A name that is not taken, with a number where it must be; small letters count as large ones.
+    """A name that is not taken, if necessary with a number; upper and lower case are the same.
 
     Args:
-        name: that is wished.
-        taken: of lower case; gets it.
+        name: the preferred name.
+        taken: names in lower case; the result is added to it.
     """
     free, number = name, 2
     while free.lower() in taken:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of one level as glTF has them, and where a pose brings their vertices."""
+"""The meshes of one LOD in glTF's layout, and the positions of their vertices at a pose."""
 
 from __future__ import annotations
 
@@ -26,22 +26,23 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
-_FARTHEST = 1e4  # metres
+_FARTHEST = 1e4  # metres: a vertex farther away is an error
 
 
 @dataclass(frozen=True)
 class Part:
-    """A mesh.
+    """A mesh in glTF's layout: one vertex per pair of position and texture coordinate.
 
     Attributes:
-        name: without what a client takes for a path.
+        name: name in the file, made safe for paths.
         mesh: its name in the DNA file.
-        kind: of web.kinds.
-        rows: int64[V], each vertex's place among the points of Points.
-        uv: float64[V, 2], v from the top as glTF counts it.
-        normals: float64[V, 3] at rest.
+        kind: material kind from web.kinds.
+        rows: int64[V], row of each vertex in the points of Points.
+        uv: float64[V, 2], v from the top as in glTF.
+        normals: float64[V, 3] at the rest pose.
         triangles: int64[T, 3].
-        joints, weights: int64 and float64[V, INFLUENCES], of the skeleton; in steps of 1 / 255.
+        joints, weights: int64 and float64[V, INFLUENCES], joints of the skeleton and their weights
+            in steps of 1 / 255.
     """
 
     name: str
@@ -56,26 +57,26 @@ class Part:
 
 
 class Points:
-    """All points of a level, asked together.
+    """All vertices of a LOD, evaluated together.
 
     Attributes:
-        parts: the meshes.
-        rest: float64[P, 3], metres, y up, the face looks along z.
-        axes: float64[3, 3] from the file's axes to those of the glTF, metres.
+        parts: the meshes that have triangles.
+        rest: float64[P, 3], rest positions in metres; y up, the face looks along z.
+        axes: float64[3, 3], maps the file's axes and unit to glTF's metres.
     """
 
     def __init__(
         self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles,
         move: Doubles | None = None,
     ) -> None:  # fmt: skip
-        """Of a level.
+        """Prepares the vertices of a LOD.
 
         Args:
-            dna: with geometry.
-            rig: of it.
-            lod: of the file.
-            skeleton: of its joints.
-            axes: as axes_of gives them.
+            dna: face with geometry.
+            rig: compiled from it.
+            lod: number of the LOD.
+            skeleton: joints of the exported file.
+            axes: from axes_of.
             move: float64[3], metres that the face moves to the body that it hangs on.
         """
         surface = Surface(dna, rig, lod)
@@ -96,13 +97,13 @@ class Points:
         self.parts = [part for part in made if len(part.triangles)]
 
     def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
-        """float64[P, 3] of a pose.
+        """float64[P, 3]: positions at a pose, in metres.
 
         Args:
-            raw: float32[R].
+            raw: float32[R], values of the raw controls.
 
         Raises:
-            GameFaceError: a pose has places that are no numbers.
+            GameFaceError: a position is not finite or farther than 10 km.
         """
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
@@ -119,7 +120,8 @@ class Points:
         if len(mesh.texture_coordinates):
             textures = mesh.layout_texture_coordinates.astype(np.int64)
         key = places * (int(textures.max(initial=0)) + 1) + textures
-        # In the order of the triangles neighbours lie together, which packs better.
+        # In the order of the triangles, neighbouring vertices are close in memory, which packs
+        # better.
         _, first, turn = np.unique(key[layouts.ravel()], return_index=True, return_inverse=True)
         order = np.argsort(first, kind="stable")
         rank = np.empty(len(order), np.int64)
@@ -145,11 +147,11 @@ class Points:
 
 
 def axes_of(dna: Dna, *, faces_back: bool = False) -> Doubles:
-    """float64[3, 3] from the file's axes and unit to glTF's: metres, y up, z to the front.
+    """float64[3, 3]: maps the file's axes and unit to glTF's: metres, y up, z to the front.
 
     Args:
-        dna: says its axes.
-        faces_back: the face looks against z, as VRM 0.x has it.
+        dna: its metadata names axes and unit.
+        faces_back: whether the face looks along -z, as in VRM 0.x.
     """
     words = dna.coordinate_system
     known = all(word in _AXES for word in words)
@@ -159,18 +161,18 @@ def axes_of(dna: Dna, *, faces_back: bool = False) -> Doubles:
 
 
 def unit(vectors: Doubles) -> Doubles:
-    """Vectors of length 1; (0, 0, 1) for none."""
+    """Vectors scaled to length 1; a zero vector becomes (0, 0, 1)."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
 
 
 def normals_of(points: Doubles, triangles: Ints, rows: Ints) -> Doubles:
-    """float64[V, 3]: smooth over seams of texture coordinates.
+    """float64[V, 3]: vertex normals, smooth across seams of texture coordinates.
 
     Args:
         points: float64[V, 3].
         triangles: int64[T, 3].
-        rows: int64[V], equal where vertices are one point.
+        rows: int64[V], equal for vertices that share a position.
     """
     corners = points[triangles]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -184,7 +186,7 @@ def normals_of(points: Doubles, triangles: Ints, rows: Ints) -> Doubles:
 
 
 def _own_normals(mesh: Mesh) -> Doubles:
-    """float64[positions, 3]: the mean of the corners' normals."""
+    """float64[positions, 3]: the sum of the corner normals at each position; 0 without normals."""
     sums = np.zeros((len(mesh.positions), 3))
     if len(mesh.normals):
         np.add.at(sums, mesh.layout_positions, mesh.normals[mesh.layout_normals].astype(np.float64))
@@ -192,7 +194,7 @@ def _own_normals(mesh: Mesh) -> Doubles:
 
 
 def _skin(mesh: Mesh, skeleton: Skeleton) -> tuple[Ints, Doubles]:
-    """The strongest joints of the skeleton of each position."""
+    """The INFLUENCES strongest joints of each position, and their weights."""
     count = len(mesh.positions)
     width = max(INFLUENCES, len(skeleton.names))
     dense = np.zeros((count, width))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What pairs of targets leave where several are partly on, fitted to poses that faces have.
+"""Fits more combinations to the errors that pairs leave at typical poses of faces.
 
-A pair's target is exact where both are fully on. Between, lids that are half shut and look half
-down are elsewhere; so are three targets that are on together. Functions of weights that are 0 where
-the others are exact get targets of their own: the best one after another, in least squares.
+The target of a pair is exact if both targets are fully on. At other poses errors remain, such as
+lids that are half shut and look half down, or three targets on together. Functions of the weights
+that are 0 at the exact poses get targets of their own, chosen greedily in least squares.
 """
 
 from __future__ import annotations
@@ -37,34 +37,34 @@ Floats = npt.NDArray[np.float32]
 MOST = 120
 POSES = 1500
 _BATCH = 50
-_LOUDEST = 1200  # vertices by which targets are chosen
-_MAIN = 80  # directions of what they leave
+_LOUDEST = 1200  # vertices with the largest errors, by which combinations are chosen
+_MAIN = 80  # principal components of the errors that are kept
 _RIDGE = 1e-4
-_LEAST_GAIN = 0.001  # of what is there at first
-_OFTEN = 12  # poses in which a function must be on
-_NEW = 0.05  # of a function, that those before it do not say
-_LEAST = 2e-6  # metres
+_LEAST_GAIN = 0.001  # share of the initial squared error that a combination must remove
+_OFTEN = 12  # number of poses in which a function must be above 0
+_NEW = 0.05  # share of a function's length that the chosen functions must not explain
+_LEAST = 2e-6  # metres: shorter displacements are set to 0
 
 
 class Refiner:
-    """What sums and pairs leave at poses.
+    """Corrects the errors that linear sums and pairs leave at given poses.
 
     Attributes:
-        before, after: float64[n], millimetres of the farthest vertex on each fifth pose.
+        before, after: float64[n], error of the farthest vertex in mm on every fifth pose.
     """
 
     def __init__(
         self, points: Points, rig: Rig, sums: Sums, targets: Sequence[Target],
         made: Sequence[Combination],
     ) -> None:  # fmt: skip
-        """Of a level.
+        """Prepares the fit at one LOD.
 
         Args:
-            points: of it.
-            rig: of the face.
-            sums: of its targets.
-            targets: those of the group that captures drive.
-            made: the combinations that there are.
+            points: vertices of the LOD.
+            rig: the face's rig.
+            sums: linear sums of its targets.
+            targets: targets of the group that captures drive.
+            made: the combinations of pairs.
         """
         self._points, self._targets, self._made = points, list(targets), list(made)
         self._rest = np.asarray(rig.initial_raw_controls, np.float32)
@@ -74,11 +74,11 @@ class Refiner:
         self.before = self.after = np.zeros(0)
 
     def found(self, poses: Doubles, most: int) -> list[tuple[Combination, Floats]]:
-        """Combinations with their targets, the one that says most first.
+        """New combinations with their displacements, the most useful first.
 
         Args:
             poses: float64[n, targets], weights from 0 to 1.
-            most: so many at most.
+            most: largest number of combinations.
         """
         wanted = list(self._candidates(poses))
         if not wanted or most < 1:
@@ -90,7 +90,7 @@ class Refiner:
         return list(zip(chosen, deltas, strict=True))
 
     def _left(self, weights: Doubles) -> Doubles:
-        """float64[P, 3], what sums and pairs leave at a pose."""
+        """float64[P, 3]: the error of linear sums and pairs at a pose, in metres."""
         out = self._points.at(pose_of(self._targets, self._rest, weights)) - self._points.rest
         for weight, delta in zip(weights, self._deltas, strict=True):
             if weight:
@@ -103,7 +103,7 @@ class Refiner:
         return out
 
     def _weights(self, of: Sequence[Combination], poses: Doubles) -> Doubles:
-        """float64[poses, combinations]."""
+        """float64[poses, combinations]: weights of the combinations."""
         rows = [weight_of(one.weight, *(poses[:, self._column[n]] for n in one.of)) for one in of]
         return np.array(rows).reshape(len(of), len(poses)).T
 
@@ -131,7 +131,7 @@ class Refiner:
     def _choose(
         self, wanted: Sequence[Combination], poses: Doubles, most: int
     ) -> list[Combination]:
-        """The best ones one after another, each by what those before it leave."""
+        """Chooses greedily: each next combination removes most of the remaining error."""
         left = self._main_directions(poses)
         own = self._weights(wanted, poses)
         at_first, whole = float(np.square(left).sum()), np.linalg.norm(own, axis=0)
@@ -150,7 +150,7 @@ class Refiner:
         return out
 
     def _main_directions(self, poses: Doubles) -> Doubles:
-        """float64[poses, _MAIN]: what is left at the loudest vertices, as its main directions."""
+        """float64[poses, _MAIN]: principal components of the errors at the _LOUDEST vertices."""
         loud = np.zeros(len(self._points.rest))
         for pose in poses[:: max(1, len(poses) // 100)]:
             np.maximum(loud, np.square(self._left(pose)).sum(axis=1), out=loud)
@@ -160,7 +160,7 @@ class Refiner:
         return np.asarray(turns[:, -_MAIN:] * np.sqrt(np.maximum(sizes[-_MAIN:], 0.0)), np.float64)
 
     def _fit(self, chosen: Sequence[Combination], poses: Doubles) -> list[Floats]:
-        """float32[P, 3] of each, in least squares over all poses."""
+        """float32[P, 3] of each combination, fitted in least squares over all poses."""
         weights = self._weights(chosen, poses)
         right = np.zeros((len(chosen), self._points.rest.size))
         for begin in range(0, len(poses), _BATCH):
@@ -182,12 +182,12 @@ class Refiner:
 
 
 def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats:
-    """float32[R], the pose of the rig that a capture with such weights is.
+    """float32[R]: raw controls of the rig at given weights of ARKit units.
 
     Args:
-        targets: of ARKit's group.
-        rest: float32[R].
-        weights: float64[targets].
+        targets: targets of the group arkit.
+        rest: float32[R], raw controls at rest.
+        weights: float64[targets], 0 to 1.
     """
     column = {target.name: i for i, target in enumerate(targets)}
     raw = rest.astype(np.float64)
@@ -201,5 +201,5 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
 
 
 def _farthest(delta: Doubles) -> float:
-    """Millimetres."""
+    """Length of the largest displacement, metres to millimetres."""
     return 1000.0 * float(np.sqrt(np.square(delta).sum(axis=1).max(initial=0.0)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of captures, as weights of ARKit's units."""
+"""Reads frames of captures as weights of ARKit units."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..controls.arkit import mapping
 from .errors import GameFaceError
 
 MOST = 500
-"""Frames of a capture that are taken, spread evenly."""
+"""Largest number of frames taken from a capture, spread evenly."""
 
 
 def frames_of(path: Path) -> list[dict[str, float]]:
-    """Unit -> weight, for frames of a capture.
+    """Frames of a capture, each as unit -> weight.
 
     Args:
-        path: of a file of Live Link Face, or another one whose curves are ARKit's units.
+        path: path of a Live Link Face file, or another one whose curves are ARKit units.
 
     Raises:
-        GameFaceError: no curve is a unit.
-        AnimationFileError: the file is damaged, or no animation.
+        GameFaceError: no curve is an ARKit unit.
+        AnimationFileError: the file is damaged or not an animation.
     """
     clip = importing.read(path).clip
     arkit = vocabulary.vocabulary(vocabulary.ARKIT)

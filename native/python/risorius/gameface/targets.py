@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which morph targets a client expects by name, and the pose of the rig that each of them is."""
+"""The morph targets that clients expect by name, and the rig's pose for each of them."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _LISTED = 6
 
 @dataclass(frozen=True)
 class Target:
-    """A morph target.
+    """A morph target, and the pose of the rig that it shows.
 
     Attributes:
-        name: as the client spells it.
-        group: of GROUPS.
-        raw: float32[R], the pose.
-        base: float32[R], the pose that it is counted from.
-        needs: the target that is on where this one acts, "" for none.
+        name: spelled as the client expects.
+        group: one of GROUPS.
+        raw: float32[R], raw controls of the pose.
+        base: float32[R], raw controls of the pose from which displacements are measured.
+        needs: name of the target that this one acts on top of, "" for none.
     """
 
     name: str
@@ -43,15 +43,15 @@ class Target:
 
 
 def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Target], list[str]]:
-    """The targets of groups, and a sentence for each thing that the rig lacks.
+    """The targets of the requested groups, and a note for each thing that the rig lacks.
 
     Args:
         rig: the compiled face.
-        groups: of GROUPS, in the order in which the file has them.
-        face: names the face in errors.
+        groups: some of GROUPS, in the order of the file.
+        face: name of the face in errors.
 
     Raises:
-        GameFaceError: the rig can show nothing of a group.
+        GameFaceError: the rig has no controls for a group.
     """
     finder = _Finder(rig)
     out, notes = list[Target](), list[str]()
@@ -65,7 +65,7 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every client reads and no other target has: Unreal takes eyes for Eyes."""
+    """A name that every client reads and no other target has; Unreal ignores upper case."""
     free = safe(name)
     if free != name:
         notes.append(f"{name}: no client reads such a name: the target is {free}")
@@ -79,7 +79,7 @@ class _Finder:
         self.names = rig.raw_control_names
         self.rest = np.asarray(rig.initial_raw_controls, np.float32)
         self.index = {name: i for i, name in enumerate(self.names)}
-        for i, name in enumerate(self.names):  # faces of other programs have no prefix
+        for i, name in enumerate(self.names):  # faces from other programs lack the prefix
             self.index.setdefault(vocabulary.PREFIX + name.rpartition(".")[2], i)
 
     def group(self, group: str, notes: list[str], face: str) -> list[Target]:
@@ -110,7 +110,7 @@ class _Finder:
     def _target(self, name: str, group: str, weights: Mapping[str, float]) -> Target:
         raw, base, needs = self._pose(weights), self.rest, ""
         whole = _whole_of(name) if group == "arkit" else ""
-        if whole:  # ARKit counts the shut lips of an open jaw from the open jaw
+        if whole:  # ARKit measures mouthClose from the open jaw
             base = self._pose(arkit.mapping()[whole])
             raw = np.maximum(raw, base)
             needs = whole
@@ -132,14 +132,14 @@ class _Finder:
 
 
 def _whole_of(unit: str) -> str:
-    """The ARKit unit that this one takes back a share of, "" for none."""
+    """The ARKit unit that this one partly takes back, "" for none."""
     shares = arkit.shares()
     whole = {shares[control] for control in arkit.mapping()[unit] if control in shares}
     return next((u for u, row in arkit.mapping().items() if whole & row.keys()), "")
 
 
 def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Name and weights of each target of a group."""
+    """Name and control weights of each target of a group."""
     if group == "arkit":
         yield from arkit.mapping().items()
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes, targets, joints and materials as the lists of one glTF file."""
+"""Writes meshes, morph targets, joints and materials into one glTF file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from .wishes import Wishes
 Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-_STEPS = 32767  # whole numbers to each side of the middle of a quantized face
-_TURNED = 127.0
-_REACHES = 0.2  # metres: meshes that end so near to the feet stand on them
-_LEAST_TURN = 1e-3  # a change of a normal below a sixteenth of a degree is none
+_STEPS = 32767  # largest integer of a quantized coordinate
+_TURNED = 127.0  # largest integer of a quantized normal
+_REACHES = 0.2  # metres: meshes that end nearer than this to the toes have legs
+_LEAST_TURN = 1e-3  # smaller changes of a normal's components, about 0.06°, are set to 0
 
 
 class Change(NamedTuple):
-    """A morph target: its name, the group that it is counted with, float32[P, 3] in metres."""
+    """A morph target: its name, its group in the statistics, float32[P, 3] in metres."""
 
     name: str
     group: str
@@ -42,9 +42,11 @@ class Change(NamedTuple):
 
 @dataclass
 class Written:
-    """Attributes:
-    data: the file.
-    groups: group -> targets, vertices that they move, bytes.
+    """The written file and its statistics.
+
+    Attributes:
+    data: bytes of the file.
+    groups: group -> (number of targets, number of vertices that they move, bytes).
     """
 
     data: bytes
@@ -61,15 +63,15 @@ def write(
     body: Body | None = None,
     chains: Chains | None = None,
 ) -> Written:
-    """The file.
+    """Writes the glTF file.
 
     Args:
-        points: of the level.
-        skeleton: of the face, written where wished.
-        materials: of the face.
-        changes: the targets in the order in which meshes have them.
-        wishes: how lists are kept.
-        manner: of the face, for a VRM.
+        points: vertices of the LOD.
+        skeleton: joints of the face, written if wishes.skeleton is set.
+        materials: materials of the face.
+        changes: morph targets in the order of the file.
+        wishes: export options.
+        manner: measured VRM values of the face.
         body: that the skeleton hangs on; None: the face alone.
         chains: joints of the skeleton that swing.
     """
@@ -105,7 +107,7 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = self._joints(nodes) if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
+        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
@@ -179,7 +181,7 @@ class _Writer:
         return springs.Springs(rows, [ball])
 
     def _add_soles(self, below: list[int]) -> None:
-        """Two triangles of a millimetre where a body without meshes stands: TalkingHead lowers an
+        """Adds two triangles of 1 mm at the toes of a body without meshes: TalkingHead lowers an
         avatar until its lowest vertex is on the ground, and a head alone would sink into it."""
         own, table = self.skeleton, self.glb.table
         feet = [own.bones[f"{side}Toes"] for side in ("left", "right")]
@@ -202,7 +204,7 @@ class _Writer:
         table["nodes"].append({"name": "Soles", "mesh": len(table["meshes"]) - 1, "skin": 0})
 
     def _first_person(self, part: Part) -> str:
-        """Whether the owner of the head sees a mesh: of one that ends at the neck, a part."""
+        """Whether the wearer sees a mesh: "auto" hides only the part that follows the head."""
         own = self.skeleton
         is_head = np.zeros(max(len(own.names), INFLUENCES), np.bool_)
         for joint in range(len(own.names)):
@@ -235,7 +237,8 @@ class _Writer:
                 nodes[above].setdefault("children", []).append(self.node_of[i])
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
         back = np.swapaxes(own.turns, 1, 2)
-        inverse[:, :3, :3] = back * self.step  # what a skin turns has no node that would scale it
+        # glTF ignores the node of a skinned mesh, so the scale is here
+        inverse[:, :3, :3] = back * self.step
         inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
         skin = {"joints": self.node_of, "inverseBindMatrices": self.glb.matrices(inverse)}
         self.glb.table["skins"] = [skin if body else {**skin, "skeleton": 0}]
@@ -280,7 +283,7 @@ class _Writer:
         return {"primitives": [primitive], "extras": {"targetNames": names}}
 
     def _turns(self, part: Part) -> bool:
-        # A card of hair has the normals of the skin under it, which its own polygons do not tell.
+        # Hair cards keep the normals of the skin below, which their polygons cannot give.
         return self.wishes.normals and part.kind not in ("hair", "lashes")
 
     def _target(self, part: Part, delta: Floats, neutral: Doubles | None) -> dict[str, int]:
@@ -301,7 +304,7 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Metres as the file has them."""
+        """Metres as float32, or as int16 steps if positions are quantized."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")

@@ -9,7 +9,7 @@ from ..base.errors import RisoriusError
 
 
 class AnimationFileError(RisoriusError):
-    """An animation file or a mapping that cannot be used; the sentence names file and place."""
+    """An animation file or a mapping that cannot be used; the message names file and place."""
 
     code = "animation_file"
 
@@ -22,8 +22,8 @@ class AnimationFileError(RisoriusError):
         column: int | str | None = None,
         unknown: Sequence[str] = (),
     ) -> None:
-        """Args: name of the file; message, one clause; line from 1; column from 1, or its header;
-        unknown: curves that no mapping knows, if that is the error."""
+        """Args: name: of the file; message: one clause; line: from 1; column: from 1, or its
+        header; unknown: curves that no mapping knows, if that is the error."""
         self.name = name
         self.unknown = tuple(unknown)
         self.line = line

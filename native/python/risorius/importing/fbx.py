@@ -22,7 +22,7 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Ticks per second of key times; FBX 8000 has larger ticks.
+# Ticks per second in key times; files of FBX 8000 and later use TICKS_8000.
 TICKS = 46186158000
 TICKS_8000 = 141120000
 # GlobalSettings.TimeMode -> frames per second.
@@ -32,20 +32,20 @@ TIME_MODES = {
     17: 60000 / 1001, 18: 120000 / 1001,
 }  # fmt: skip
 _TOP = {"GlobalSettings", "Objects", "Connections"}
-# Nodes that are skipped unread, because they are most of a file.
+# Records whose content is skipped, because they are most of a file.
 _BULK = frozenset(("Geometry", "Video", "Texture", "Material", "Pose", "Implementation"))
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-# Bytes of memory per record, per value of a record and per key of a curve, rounded up.
+# Memory in bytes per record, per value of a record and per key of a curve, rounded up.
 _NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
-# KeyAttrFlags.
+# Bits of KeyAttrFlags: interpolation and tangents of a key.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
 
 
 @dataclass(slots=True)
 class Packed:
-    """An array in the file, which is unpacked on demand."""
+    """An array of a record, still in its stored form; `unfold` unpacks it."""
 
     parser: Parser
     dtype: np.dtype[Any]
@@ -55,7 +55,7 @@ class Packed:
     size: int
 
     def unfold(self) -> npt.NDArray[Any]:
-        """Raises: AnimationFileError: damaged bytes. BudgetError: more than the file may take."""
+        """Unpacks the array. Raises: AnimationFileError: damaged bytes. BudgetError: too large."""
         wanted = self.count * self.dtype.itemsize
         data = memoryview(self.parser.data)[self.at : self.at + self.size]
         if self.is_packed:
@@ -75,7 +75,7 @@ class Packed:
 
 @dataclass(slots=True)
 class Node:
-    """A record: name, values, nested records."""
+    """A record of the file: name, values, nested records."""
 
     name: str
     values: list[Any]
@@ -85,13 +85,13 @@ class Node:
         return next((node for node in self.inner if node.name == name), None)
 
     def array(self, name: str) -> npt.NDArray[Any]:
-        """The array in a nested record, unpacked; empty if there is none."""
+        """The unpacked array of a nested record; empty if there is none."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
     def length(self, name: str) -> int:
-        """The length of the array according to the file, before it is unpacked."""
+        """The array's length that the file states, before the array is unpacked."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.count if isinstance(value, Packed) else 0
@@ -102,7 +102,7 @@ def is_fbx(data: bytes) -> bool:
 
 
 def is_text_fbx(text: str) -> bool:
-    """Whether a file is text FBX, which is not suitable for exchanging animation."""
+    """Whether a text is an FBX file in text form, which this module cannot read."""
     head = text[:2000]
     return "FBXHeaderExtension:" in head or head.lstrip().startswith("; FBX")
 
@@ -129,11 +129,11 @@ class Parser:
         self.version = struct.unpack_from("<I", data, 23)[0]
         if not 7100 <= self.version < 9000:
             raise self.fail(23, f"FBX 7.1 to 8.x was expected, found {self.version}")
-        # From 7.5 on offsets have 64 bits.
+        # Since FBX 7.5 offsets have 64 bits.
         self.head = struct.Struct("<QQQB" if self.version >= 7500 else "<IIIB")
 
     def fail(self, at: int, message: str) -> AnimationFileError:
-        """An AnimationFileError that names the file and a byte of it.
+        """Makes an AnimationFileError that names the file and the byte.
 
         Args:
             at: offset in the file, bytes.
@@ -142,7 +142,7 @@ class Parser:
         return AnimationFileError(self.name, f"byte {at}: {message}")
 
     def top(self) -> dict[str, Node]:
-        """The records of _TOP."""
+        """The records named in _TOP, by name."""
         return {node.name: node for node in self._records(27, len(self.data), 0)}
 
     def _records(self, at: int, end: int, depth: int) -> Iterator[Node]:
@@ -205,14 +205,14 @@ class Parser:
 
 @dataclass
 class Scene:
-    """The parts of a file that describe motion.
+    """The settings, objects and connections of a file.
 
     Attributes:
         settings: GlobalSettings, or None.
         objects: id -> record.
-        parents: id -> (parent's id, property or ""), in the file's order.
+        parents: id -> (parent's id, connected property or "") of each connection, in file order.
         budget: budget of the file.
-        notes: sentences about the reading.
+        notes: sentences for the user about dropped or assumed data.
     """
 
     name: str
@@ -225,14 +225,14 @@ class Scene:
     _keys: dict[int, Keys] = field(default_factory=dict)
 
     def keys(self, curve: int) -> Keys:
-        """The keys of an AnimationCurve, unpacked on first use."""
+        """The keys of a curve, unpacked at first use. Args: curve: id of the AnimationCurve."""
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]
 
     @cached_property
     def children(self) -> dict[int, list[int]]:
-        """Parent -> children, in the order of objects in `parents`; each child once."""
+        """Parent id -> ids of its children in file order; each child once."""
         out: dict[int, list[int]] = {}
         for child, links in self.parents.items():
             self.budget.work(len(links), "connections")
@@ -245,21 +245,21 @@ class Scene:
 
 
 def read(data: bytes, name: str, take: str | None = None, budget: Budget | None = None) -> Take:
-    """The curves of an animation stack.
+    """The curves of one animation stack, which FBX software shows as a take or clip.
 
     The curve of a blend shape channel has the channel's name, with its percentage as a fraction.
-    The curve of a property has the property's name, on any node, because curves of rigs are written
-    so. A node whose name begins with CTRL_ is a slider of a face board: its location gives
-    CTRL_C_jaw.tx, .ty, .tz.
+    The curve of a property has the property's name, whichever node has it, because exporters of
+    rigs put such properties on any node. A node whose name begins with CTRL_ is a slider of a face
+    board: its location gives CTRL_C_jaw.tx, .ty, .tz.
 
     Args:
         data: the whole file.
         name: the file's name in errors.
-        take: name or number of a stack; None: the first that animates any of these.
-        budget: limits memory and work; None: by the size of the file.
+        take: name or number of a stack; None: the first stack with curves of these three kinds.
+        budget: limits memory and work; None: a limit by the size of the file.
 
     Raises:
-        AnimationFileError: not a readable FBX, no such stack, or none of these is animated.
+        AnimationFileError: not a readable FBX, no such stack, or no curves of these kinds.
         BudgetError: the file unpacks to far more than its size.
     """
     scene = read_scene(Parser(data, name, budget or Budget.of(len(data))))
@@ -284,11 +284,11 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
 
 
 def read_scene(parser: Parser) -> Scene:
-    """The objects of a file and their connections.
+    """Reads the objects of a file and their connections.
 
     Raises:
-        AnimationFileError: a damaged file; with the place.
-        BudgetError: more than a file of its size may need.
+        AnimationFileError: a damaged file; the message names the byte.
+        BudgetError: more memory or work than a file of its size may need.
     """
     top = parser.top()
     objects = {
@@ -307,14 +307,14 @@ def read_scene(parser: Parser) -> Scene:
 
 
 def properties(node: Node | None) -> dict[str, list[Any]]:
-    """Name -> values of the properties that an object, or the scene, states explicitly."""
+    """Name -> values of the properties in Properties70, without those left at their default."""
     table = node.first("Properties70") if node is not None else None
     rows = [p for p in (table.inner if table else []) if len(p.values) > 4]
     return {str(p.values[0]): p.values[4:] for p in rows}
 
 
 def _rate(scene: Scene) -> float:
-    """Frames per second of the scene."""
+    """Frames per second of the scene's time mode; 30 if unknown."""
     rows = {name: values[-1] for name, values in properties(scene.settings).items()}
     custom = rows.get("CustomFrameRate")
     if rows.get("TimeMode") == 14 and isinstance(custom, int | float) and 0 < custom < 1e4:
@@ -341,7 +341,7 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
 def _curves(
     scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
 ) -> dict[str, Keys]:
-    """Name -> keys of everything that a stack animates; 0 for curves without a stack."""
+    """Name -> keys of the curves that a stack animates; all curves if `stack` is 0."""
     out: dict[str, Keys] = {}
     bones = 0
     for identity, parts in components.items():
@@ -352,7 +352,8 @@ def _curves(
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                continue  # repeats the percentage of a blend shape, for other software
+                # a copy of the blend shape's percentage, which exporters add for other software
+                continue
             scene.budget.work(len(parts), "connections")
             named = _named(scene, owner, way, parts)
             bones += not named
@@ -371,7 +372,7 @@ def _curves(
 
 
 def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
-    """Curve node -> (component, curve) of its curves: d|X, d|Y, d|Z, or one."""
+    """Id of a curve node -> (component: d|X, d|Y ..., id of a curve) for its curves."""
     out: dict[int, list[tuple[str, int]]] = defaultdict(list)
     for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
@@ -382,7 +383,7 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """Objects, and the properties of theirs to which something is connected."""
+    """(object, property) of each connection to a property of an object."""
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -393,7 +394,7 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(curve's name, keys) of a property; empty for the location of a bone and the like."""
+    """(name of a curve, its keys) for an animated property; empty for a bone's transform."""
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -416,7 +417,7 @@ def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
 
 
 def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
-    """Keys of an AnimationCurve.
+    """Reads the keys of an AnimationCurve.
 
     Raises:
         AnimationFileError: numbers of times and values differ, or times do not ascend.
@@ -449,8 +450,7 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """Flags of each key, and the slopes after it and before the next; the file stores runs of
-    keys."""
+    """Flags of each key, and slopes after it and before the next key, shared by runs of keys."""
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
@@ -467,7 +467,7 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
 def _auto(
     times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Slopes of keys with automatic tangents: parallel to their neighbours, flat at an extreme."""
+    """Sets slopes of automatic tangents: parallel to the neighbours, flat at an extreme."""
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():
         return leave, arrive

@@ -26,19 +26,19 @@ from .source import Take, keep_ascending, make_clip, read_bytes
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"glTF"
-# Frames per second for sampling smooth curves.
+# Samples per second of smooth curves.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = (5126,)
 COORDINATES = (5120, 5121, 5122, 5123, 5126)
-"""Component types of positions, their deltas and texture coordinates, including quantised ones."""
+"""Component types of positions, deltas and texture coordinates, including quantised ones."""
 INDICES = (5121, 5123, 5125)
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _KINDS = {"STEP": CONSTANT, "LINEAR": LINEAR, "CUBICSPLINE": CUBIC}
 
 
 class Document:
-    """A glTF document and its buffers, which are read on demand."""
+    """A glTF document with its buffers, which are read when needed."""
 
     def __init__(
         self, path: Path, json: Mapping[str, Any], binary: bytes | None, budget: Budget
@@ -53,16 +53,16 @@ class Document:
         self._numbers: dict[int, Doubles] = {}
 
     def fail(self, place: str, message: str) -> AnimationFileError:
-        """An AnimationFileError that names the file and the place in its JSON, e.g. "accessors[3]".
+        """Makes an AnimationFileError that names the file and a place in its JSON.
 
         Args:
-            place: in the JSON.
+            place: place in the JSON.
             message: the expected and the found value.
         """
         return AnimationFileError(self.name, f"{place}: {message}")
 
     def item(self, kind: str, index: object, place: str) -> dict[str, Any]:
-        """The table `kind[index]` of the JSON.
+        """The table at an index of a list at the top of the JSON.
 
         Args:
             kind: a list at the top of the JSON, e.g. "accessors".
@@ -80,7 +80,7 @@ class Document:
         return rows[index]
 
     def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
-        """A whole number of 0 or more from a table of the JSON.
+        """Reads a whole number of 0 or more from a table of the JSON.
 
         Args:
             table: the table.
@@ -98,7 +98,7 @@ class Document:
             raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
-        """float64[count] of a scalar accessor; normalised integers become fractions.
+        """float64[count]: the values of a scalar accessor; normalised integers become fractions.
 
         Repeated calls return the same array, because a thousand channels may share one.
 
@@ -139,7 +139,7 @@ class Document:
     def rows(
         self, index: object, place: str, kind: str, components: Sequence[int] = COORDINATES
     ) -> Doubles:
-        """float64[count, n] of an accessor of meshes: n is 1, 2, 3, 4 or 16 by its kind.
+        """float64[count, n]: the values of a mesh accessor; n is 1, 2, 3, 4 or 16 by its kind.
 
         Supports strided, sparse, quantised and packed accessors. Integers stay integers unless the
         file declares them normalised.
@@ -171,7 +171,7 @@ class Document:
         self.budget.hold(count * width * 8, at)
         out = np.zeros((count, width))
         sparse = accessor.get("sparse")
-        with np.errstate(invalid="ignore"):  # of some NaNs, which are refused below
+        with np.errstate(invalid="ignore"):  # NaNs may warn here, and are refused below
             if "bufferView" in accessor:
                 out[:] = self._viewed(accessor, at, dtype, (count, width))
             if isinstance(sparse, dict):
@@ -185,7 +185,7 @@ class Document:
     def _put_sparse(
         self, sparse: Mapping[str, Any], at: str, dtype: np.dtype[Any], out: Doubles
     ) -> None:
-        """Write the rows of a sparse accessor into `out`."""
+        """Writes the rows of a sparse accessor into `out`."""
         count = self.whole(sparse, "count", at)
         parts = [sparse.get("indices"), sparse.get("values")]
         if not all(isinstance(part, dict) for part in parts):
@@ -203,7 +203,7 @@ class Document:
     def _viewed(
         self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
     ) -> npt.NDArray[Any]:
-        """Numbers [shape] at a table's bufferView and byteOffset, with the view's stride."""
+        """An array of `shape` at a table's bufferView and byteOffset, with the view's stride."""
         number = table.get("bufferView")
         view = self.item("bufferViews", number, at)
         view_at = f"bufferViews[{number}]"
@@ -225,8 +225,7 @@ class Document:
         return np.ndarray(shape, dtype, data, start + inside, (stride, dtype.itemsize))
 
     def _part(self, index: object, place: str) -> tuple[bytes, int, int]:
-        """The bytes that contain a buffer view, its offset and its length; unpacked if it is
-        packed."""
+        """(bytes, offset, length) of a buffer view's content, unpacked if it is packed."""
         view = self.item("bufferViews", index, place)
         view_at = f"bufferViews[{index}]"
         number = int(index)  # type: ignore[call-overload]  # item says it is one
@@ -245,7 +244,7 @@ class Document:
         return out, 0, len(out)
 
     def _stored(self, table: Mapping[str, Any], place: str) -> tuple[bytes, int, int]:
-        """The buffer of a table, and its byteOffset and byteLength."""
+        """(buffer, byteOffset, byteLength) of a table."""
         data = self._buffer(table.get("buffer"), place)
         start, size = (self.whole(table, key, place) for key in ("byteOffset", "byteLength"))
         if start + size > len(data):
@@ -257,7 +256,7 @@ class Document:
         return data, start, size
 
     def view_bytes(self, index: object, place: str) -> bytes:
-        """The bytes of a buffer view, such as a picture.
+        """The content of a buffer view, such as a picture.
 
         Args:
             index: index of the buffer view, as in the file.
@@ -272,11 +271,11 @@ class Document:
         return data[start : start + size]
 
     def draco(self, table: Mapping[str, Any], place: str) -> draco.DracoMesh:
-        """The mesh that a Draco extension holds.
+        """Unpacks the mesh in a primitive's Draco extension.
 
         Args:
             table: the primitive's extension.
-            place: its name in errors.
+            place: place of the extension, for errors.
 
         Raises:
             AnimationFileError: no such bytes, not a Draco mesh, or DracoPy is not installed.
@@ -321,11 +320,11 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A glTF may refer to files in its own folder, but to no others on the disk.
+        # A glTF may name files in its own folder, but not elsewhere on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file, found=True)
-        # A buffer in its own file counts as input, but a short JSON may refer to it many times.
+        # A short JSON may refer to a large buffer many times, so each buffer counts.
         self.budget.hold(len(data), place)
         return data
 
@@ -380,7 +379,7 @@ class Document:
 
 
 def _is_key(value: object, table: Mapping[Any, object]) -> TypeGuard[Any]:
-    """Whether a value of the JSON, which may be a list, is a key of a table."""
+    """Whether a value of the JSON, of any type, is a key of a table."""
     return isinstance(value, int | str) and value in table
 
 
@@ -389,7 +388,7 @@ def is_glb(data: bytes) -> bool:
 
 
 def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
-    """A GLB, the binary form of glTF.
+    """Opens a GLB, the binary form of glTF.
 
     Args:
         path: path of the file; its buffers are in the same folder, and errors name it.
@@ -433,7 +432,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
 
 
 def is_gltf(document: object) -> bool:
-    """Whether a JSON has the version that every glTF must have."""
+    """Whether parsed JSON has asset.version, which every glTF must have."""
     return (
         isinstance(document, dict)
         and isinstance(document.get("asset"), dict)
@@ -444,7 +443,7 @@ def is_gltf(document: object) -> bool:
 def open_gltf(
     path: Path, document: object, binary: bytes | None = None, budget: Budget | None = None
 ) -> Document:
-    """A glTF from parsed JSON.
+    """Makes a Document from parsed JSON.
 
     Args:
         path: path of the file; its buffers are in the same folder, and errors name it.
@@ -466,7 +465,7 @@ def open_gltf(
 
 
 def read(document: Document, take: str | None = None) -> Take:
-    """The curves of an animation.
+    """The curves of one animation.
 
     The curve of a morph target has the target's name from extras.targetNames of its mesh, which
     exporters write, else "mesh.number". The curve of a property that KHR_animation_pointer animates
@@ -551,7 +550,7 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """The curves of a channel; empty for location, rotation or scale of a node."""
+    """Names of the curves of a channel; empty for location, rotation or scale of a node."""
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)
@@ -573,7 +572,7 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Colours, positions and so on are not curves of a face; properties in extras may be.
+    # Animated extras may be properties of a rig; colours, positions and so on are no face curves.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 
@@ -597,7 +596,7 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """A curve for each name of a channel's sampler."""
+    """The keys of each curve of a channel's sampler, in the order of `names`."""
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

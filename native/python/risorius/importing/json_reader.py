@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checked values of JSON: numbers, names, rates and times, and the Take made from them."""
+"""Checks numbers, names, rates and times of JSON, and makes a Take from them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
-# Range of frames per second; a rate outside is taken as a damaged number.
+# Range of frames per second; a rate outside it is an error in the file.
 SLOWEST, FASTEST = 0.01, 1e6
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Reader:
-    """One file, its budget, and the caller's options on time."""
+    """The name of a file, its budget, and the caller's options on time."""
 
     def __init__(self, name: str, asked: Asked, budget: Budget) -> None:
         self.name = name
@@ -32,17 +32,16 @@ class Reader:
         self.notes: list[str] = []
 
     def fail(self, message: str, place: str | None = None) -> AnimationFileError:
-        """An AnimationFileError that names the file.
+        """Makes an AnimationFileError that names the file and the place.
 
         Args:
             message: the expected and the found value.
-            place: in the JSON, e.g. "frames[3]"; None: the whole document.
+            place: place in the JSON, e.g. "frames[3]"; None: the whole document.
         """
         return AnimationFileError(self.name, f"{place}: {message}" if place else message)
 
     def number(self, value: object, place: str) -> float:
-        """A finite number within float32; texts are accepted because some software writes numbers
-        so.
+        """Reads a finite number within float32, which may be a text, as some software writes.
 
         Args:
             value: a value of the JSON.
@@ -62,7 +61,7 @@ class Reader:
         raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
 
     def numbers(self, values: object, place: str, *, has_holes: bool = False) -> list[float]:
-        """A list of finite numbers.
+        """Reads a list of finite numbers.
 
         Args:
             values: a value of the JSON.
@@ -80,7 +79,7 @@ class Reader:
         ]
 
     def strings(self, values: object, place: str) -> list[str]:
-        """A list of names.
+        """Reads a list of names.
 
         Args:
             values: a value of the JSON.
@@ -94,7 +93,7 @@ class Reader:
         return values
 
     def rate_of(self, *tables: object) -> float | None:
-        """Frames per second: from the caller, else from the first of these tables that has them."""
+        """Frames per second from the caller, else from the first table that states them."""
         if self.asked.rate is not None:
             return self.asked.rate
         for table in tables:
@@ -103,7 +102,7 @@ class Reader:
         return None
 
     def frames_a_second(self, value: object, place: str) -> float:
-        """A rate from SLOWEST to FASTEST frames per second.
+        """Reads a rate from SLOWEST to FASTEST frames per second.
 
         Args:
             value: a value of the JSON.
@@ -122,7 +121,7 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count] seconds of frames: the given times, else by the rate from 0 on.
+        """float64[count]: seconds of frames, from given times, else from 0 at the rate.
 
         Args:
             given: a list of times from the JSON, or None.
@@ -146,7 +145,7 @@ class Reader:
     def take(
         self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
     ) -> Take:
-        """A Take of curves; frames whose time does not ascend are dropped and noted.
+        """Makes a Take from curves; frames whose time does not ascend are dropped, with a note.
 
         Args:
             names: names of the curves, each once.
@@ -173,17 +172,17 @@ class Reader:
 
 
 def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
-    """The first of some keys that a table has, or None.
+    """The first of these keys that a table has, or None.
 
     Args:
         table: table of the JSON.
-        keys: in the order of preference.
+        keys: keys in order of preference.
     """
     return next((key for key in keys if key in table), None)
 
 
 def _shown(value: object) -> str:
-    """A value for messages; for a list or table, only its kind."""
+    """A value as text for messages; for a list or table, only its kind."""
     if isinstance(value, dict | list):
         return _kind(value)
     is_long = isinstance(value, int) and abs(value) >= 1 << 64

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves as keys with individual times, and their resampling to common times."""
+"""Curves whose keys have times of their own, and resampling of curves to common times."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 CONSTANT, LINEAR, CUBIC = 0, 1, 2
-# Memory of one value on its way to a clip: float64 twice, float32 once.
+# Bytes per value while a clip is made: float64 twice, float32 once.
 VALUE_BYTES = 20
 
 
 @dataclass
 class Keys:
-    """The keys of one curve.
+    """The keys of one curve, with their interpolation.
 
     Attributes:
         times: float64[keys], seconds, ascending.
@@ -42,7 +42,7 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """Values at times, constant before the first and after the last key."""
+        """Values at times in seconds, constant before the first and after the last key."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)
@@ -71,22 +71,22 @@ class Keys:
 def on_one_clock(
     curves: Sequence[Keys], rate: float | None, budget: Budget
 ) -> tuple[Doubles, Doubles]:
-    """All curves at the union of their key times.
+    """Resamples all curves at the union of their key times.
 
     Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
     second.
 
     Args:
-        rate: frames per second, or None for no samples between keys.
+        rate: samples per second, or None for no samples between keys.
         budget: budget of the file.
 
     Returns:
-        float64[frames] seconds; float64[curves, frames].
+        float64[frames], seconds, and float64[curves, frames].
 
     Raises:
         BudgetError: too many curves with keys at different times, or keys too far apart.
     """
-    # Curves with common times normally share one array.
+    # Curves with equal times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))
@@ -97,7 +97,7 @@ def on_one_clock(
         _take(len(curves), (times[-1] - times[0]) * rate, times, budget)
         count = int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1
         times = np.union1d(times, times[0] + np.arange(count) / rate)
-    # Key times that differ only by rounding are one time.
+    # Key times closer than a microsecond differ by rounding only, and become one time.
     times = times[np.concatenate([[True], np.diff(times) > 1e-6])]
     _take(len(curves), times.size, times, budget)
     rows = np.empty((len(curves), times.size))

@@ -33,7 +33,7 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Curves that are not raw controls: angles of head, neck and eyes in radians.
+# Curves that are not controls of the rig: angles of head, neck and eyes in radians.
 HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
 ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
@@ -43,18 +43,19 @@ _KEYS = {
 VOWELS = "AIUEO"
 _WITH_UNITS = (ARKIT, "vrm")
 _OLD_BASES = {"arkit units": "vocabulary arkit", "vrm expressions": "vocabulary vrm"}
-_PATTERN_STEPS = 50  # steps of a budget to compare a pattern with a name
-# Seconds between keys of a keyed curve; between frames added to it; the most added per gap.
+_PATTERN_STEPS = 50  # budget steps per comparison of a pattern with a name
+# Median seconds between frames above which a clip is keyed; step of the frames added between its
+# keys, in seconds; largest number of frames added per gap.
 _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 
 
 class MappingError(AnimationFileError):
-    """An inconsistent mapping."""
+    """A mapping that cannot be read, or is inconsistent."""
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """The change of a control's curve: offset + gain * curve(value).
+    """Changes the curve of a control to offset + gain * curve(value).
 
     Attributes:
         points: (value, result) by ascending value, linear between, constant outside; empty:
@@ -74,7 +75,7 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class Mapping:
-    """The rows of a mapping, with full names.
+    """The rows of a mapping from curve names to controls, without abbreviations.
 
     Attributes:
         name: name of the file, without suffix.
@@ -87,9 +88,9 @@ class Mapping:
         controls: pattern of control names -> adjustment; the last match counts.
         strip: prefixes of curve names that are ignored.
         vocabulary: name in controls.vocabulary; its other spellings are accepted too.
-        is_loose: ignore letter case, "_" and the difference of Left and L at the end.
-        is_gui: the controls are GUI controls, which the rig's table converts to raw ones.
-        metadata: free; copied to the clip.
+        is_loose: whether names match regardless of letter case, "_" and Left or L at the end.
+        is_gui: whether the controls are GUI controls, which the rig's table converts to raw ones.
+        metadata: any text; copied to the clip.
     """
 
     name: str
@@ -104,13 +105,13 @@ class Mapping:
     metadata: Table[str, str] = field(default_factory=dict)
 
     def targets(self) -> tuple[str, ...]:
-        """All controls, in the order of the rows; patterns stay patterns."""
+        """All controls of the rows, in order; patterns with * are not expanded."""
         return tuple(dict.fromkeys(control for row in self.rows.values() for control in row))
 
     def finder(self) -> Callable[[str], tuple[str, Row] | None]:
-        """A function: curve of a source -> (row's name, {control: weight}), or None."""
+        """A function from a curve's name to (name of its row, {control: weight}), or None."""
         exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
-        exact.pop("", None)  # for a name without letters
+        exact.pop("", None)  # names without letters are all equal here
         patterns = [key for key in self.rows if "*" in key]
 
         def find(name: str) -> tuple[str, Row] | None:
@@ -130,8 +131,8 @@ class Mapping:
         return find
 
     def _spellings(self, name: str) -> Iterator[str]:
-        """The name itself, without a known prefix, without a mesh's name, and in the vocabulary's
-        spelling."""
+        """The spellings under which a name is looked up: itself, without known prefixes, without a
+        mesh's name, as in the vocabulary."""
         yield name
         for start in self.strip:
             if name.lower().startswith(start.lower()) and len(name) > len(start):
@@ -144,7 +145,7 @@ class Mapping:
                 yield spelled
 
     def adjustment(self, control: str) -> Adjustment | None:
-        """The adjustment of a control, or None."""
+        """The last adjustment whose pattern matches a control, or None."""
         last = None
         for pattern, what in self.controls.items():
             if fits(control, pattern):
@@ -154,7 +155,7 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """Curves after a mapping, and the use of each name."""
+    """A clip after a mapping: curve -> controls, and the names that were not used."""
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -165,11 +166,11 @@ class Mapped:
 
 
 def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
-    """The controls that a mapping computes from a clip of a source's curves.
+    """Applies a mapping to a clip of a file's curves; the result has curves of controls.
 
-    Curves that move one control are added with their weights; then a control that is a share of
-    another is divided by that one, and adjusted. A curve that gives one control with weight 1,
-    without share or adjustment, keeps its bits.
+    Weighted curves for the same control are summed. A control that is a share of another is divided
+    by it, then adjusted. Values stay bitwise equal if one curve moves a control with weight 1,
+    without share or adjustment.
 
     Raises:
         BudgetError: too many controls or patterns for the size of the clip.
@@ -221,7 +222,7 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
 def _divided(
     mapping: Mapping, clip: Clip, sums: dict[str, Doubles], budget: Budget
 ) -> tuple[Clip, dict[str, Doubles]]:
-    """The sums with amounts replaced by shares, and the clip at their times."""
+    """Divides controls that are shares by the other control; the clip may get more frames."""
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
     times = _between(clip.frame_times()) if any(sums[c].any() for c, _ in shares) else None
@@ -236,14 +237,14 @@ def _divided(
 
 
 def _between(times: Doubles) -> Doubles | None:
-    """Add times between keys that lie far apart. A quotient of linear curves is not linear, and
+    """Adds times between keys that are far apart. A quotient of linear curves is not linear, and
     lips that are shut at both keys would part between them.
 
     Args:
         times: float64[frames], seconds.
 
     Returns:
-        None if nothing is added: a capture has enough frames, and its gaps stay gaps.
+        None if nothing is added, because the frames of a capture are close enough.
     """
     steps = np.diff(times)
     if len(steps) == 0 or np.median(steps) <= _KEYED:
@@ -255,13 +256,13 @@ def _between(times: Doubles) -> Doubles | None:
 
 
 def fits(control: str, pattern: str) -> bool:
-    """Whether a pattern with * and ? matches a control, with or without its prefix; case counts."""
+    """Whether a pattern with * and ? matches a control's name or its short name; case counts."""
     short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
     return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
 
 
 def _star(pattern: str, name: str) -> str | None:
-    """The text that a pattern's * matches in a name, or None if it does not match."""
+    """The text that the * of a pattern matches in a name, or None if the pattern does not match."""
     before, _, after = pattern.partition("*")
     if len(name) < len(before) + len(after) or not (
         name.startswith(before) and name.endswith(after)
@@ -275,7 +276,7 @@ def _folder() -> Traversable:
 
 
 def mapping_names() -> list[str]:
-    """Names of the built-in mappings: their own files, and one for each vocabulary."""
+    """Names of the built-in mappings: TOML files of this package, and one per vocabulary."""
     return sorted({*_files(), *vocabulary.names()})
 
 
@@ -286,14 +287,14 @@ def _files() -> frozenset[str]:
 
 
 def mapping_title(name: str) -> str:
-    """The title of a built-in mapping: its vocabulary's title, or its name."""
+    """The displayed title of a built-in mapping."""
     if name in vocabulary.names():
         return vocabulary.vocabulary(name).title
     return name.replace("_", " ").title()
 
 
 def mapping_text(name: str) -> str:
-    """The TOML of a built-in mapping, for saving and editing.
+    """The TOML text of a built-in mapping, which users may save and edit.
 
     Raises:
         MappingError: unknown name.
@@ -311,10 +312,10 @@ def mapping_text(name: str) -> str:
 
 
 def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
-    """A mapping: a built-in one by name, or a TOML file.
+    """Loads a built-in mapping by name, or a TOML file.
 
     Raises:
-        MappingError: missing, not TOML, or inconsistent rows; with the place.
+        MappingError: missing, not TOML, or inconsistent rows; the message names the place.
     """
     if isinstance(source, Mapping):
         return source
@@ -339,11 +340,11 @@ def _built_in(name: str) -> Mapping:
 
 
 def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
-    """A mapping from TOML.
+    """Parses a mapping from TOML.
 
     Args:
         text: TOML.
-        where: its name in messages.
+        where: name of the text in messages.
         name: the mapping's name, unless the text has one.
 
     Raises:
@@ -360,7 +361,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     prefix = _text(table, "prefix", where)
     rows = {key: _row(key, row, prefix, where) for key, row in _table(table, "rows", where).items()}
     rows |= {key: {} for key in _texts(table, "ignore", where)}
-    for key in mapping.rows:  # a row of the base is replaced only under its exact spelling
+    for key in mapping.rows:  # a row of the base is replaced only by exactly its name
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(where, f"rows: {key} is in the base with another spelling")
     shares = _shares(_table(table, "shares", where), prefix, where)
@@ -389,7 +390,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 def _base(table: Table[str, Any], where: str) -> Mapping:
     """The mapping whose rows are the base of another.
 
-    "vocabulary NAME" is one of controls.vocabulary; ARKit's and VRM's include the ARKit units.
+    "vocabulary NAME" is one of controls.vocabulary; those of ARKit and VRM include the ARKit units.
     """
     base = _text(table, "base", where)
     if not base:
@@ -409,7 +410,7 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 
 
 def row_of(said: Meaning) -> Row:
-    """The controls of a name's meaning; for an expression of the library, its controls."""
+    """Control -> weight of a name in a vocabulary; an expression is replaced by its controls."""
     if said.controls or not said.expression:
         return dict(said.controls)
     return dict(expressions.get(said.expression).weights)
@@ -451,7 +452,7 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 
 
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
-    """A row's controls in full.
+    """Control -> weight of a row, without abbreviations.
 
     "@PP" is the weighted pose of the expression PP. A name ending in * stands for both sides, in **
     for the four lip quarters, unless the row itself is a pattern. A name without a dot gets the
@@ -486,7 +487,7 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
 
 
 def _expression(name: str, at: str, where: str) -> Table[str, float]:
-    """The pose of an expression."""
+    """Control -> weight of an expression."""
     try:
         return expressions.get(name).weights
     except ValueError as error:
@@ -494,9 +495,9 @@ def _expression(name: str, at: str, where: str) -> Table[str, float]:
 
 
 def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
-    """Shares with full names; "" removes a share of the base.
+    """Control -> control of which it is a share, with full names; "" removes one from the base.
 
-    No control is a share of a share, because both would have to be divided in order.
+    A control may not be a share of a share, because the order of division would matter.
     """
     out: dict[str, str] = {}
     for key, value in table.items():
@@ -539,14 +540,14 @@ def _number(value: object, at: str, where: str) -> float:
 
 
 def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
-    """The controls of a mapping that a rig lacks.
+    """Compares a mapping with a rig.
 
     Args:
         mapping: the mapping.
-        rig_names: raw controls of the rig, or its GUI controls if the mapping uses these.
+        rig_names: raw controls of the rig, or its GUI controls if mapping.is_gui.
 
     Returns:
-        Sentences; empty if the rig has all.
+        One sentence per missing control; empty if the rig has all.
     """
     known = set(rig_names)
     out = []
@@ -560,15 +561,15 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows most of these curves; None if none clearly fits.
+    """The built-in mapping that knows most of these curves; None if no mapping knows any.
 
-    Of equals, the one that knows more of all columns wins, then the one with fewer rows, which is
-    more specific. Single letters decide nothing, because several vocabularies have mouth shapes
-    that are letters; but the vowels A, I, U, E, O together are VRM.
+    Ties go to the mapping that knows more of all columns, then to the one with fewer rows, which is
+    more specific. Single letters are no evidence, because several vocabularies use them as mouth
+    shapes; but the vowels A, I, U, E, O together mean VRM.
 
     Args:
         names: curves that are not constantly 0.
-        columns: all curves; None: the same.
+        columns: names of all curves; None: the same as `names`.
     """
     columns = names if columns is None else columns
     letters = {name.upper() for name in columns if len(name) == 1}
@@ -583,18 +584,18 @@ def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> 
         is_sure = is_vowels or not all(map(_is_letter, hits))
         if is_sure and (found := hits.intersection(names)):
             scores.append((-len(found), -len(hits), len(mapping.rows), mapping.name))
-    if len(known[ARKIT]) >= arkit.FULL_SET:  # VRM expressions repeat the units
+    if len(known[ARKIT]) >= arkit.FULL_SET:  # the expressions of VRM include the ARKit units
         scores = [score for score in scores if score[-1] != "vrm"]
     return min(scores)[-1] if scores else None
 
 
 def _is_letter(curve: str) -> bool:
-    """Whether a name is a single letter, which many vocabularies have; kana are MikuMikuDance's."""
+    """Whether a name is a single ASCII letter; a single kana is a name of MikuMikuDance."""
     return len(curve) == 1 and curve.isascii()
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """The mappings that know single-letter curves; empty unless all curves are letters."""
+    """Names of the mappings that know single-letter curves; empty unless all curves are letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

@@ -25,7 +25,7 @@ NAME_KEYS = (
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
-# NeuroSync returns rows without names: Live Link Face's columns, then seven emotions.
+# The last columns of NeuroSync's rows, after the columns of Live Link Face.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
 NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
@@ -35,7 +35,7 @@ DEEPEST = 64
 
 
 def parse(text: str, name: str) -> object:
-    """The document in a JSON text.
+    """Parses a JSON text.
 
     Args:
         text: content of the file.
@@ -52,14 +52,14 @@ def parse(text: str, name: str) -> object:
         ) from error
     except RecursionError as error:
         raise AnimationFileError(name, "not JSON that can be read: nested too deeply") from error
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # such as a number with thousands of digits
         raise AnimationFileError(name, f"not JSON that can be read: {error}") from error
 
 
 def read(
     document: object, name: str, asked: Asked | None = None, budget: Budget | None = None
 ) -> Take:
-    """The curves of a document, by the first layout that fits.
+    """Reads the curves of a document by the first layout that fits.
 
     Args:
         document: parsed JSON.
@@ -91,7 +91,7 @@ def read(
 
 
 def own_clip(reader: Reader, document: object) -> Take | None:
-    """The layout of `importing.write_json`; None if the document has another one.
+    """Reads the layout of `importing.json_text`; None if the document has another one.
 
     Args:
         reader: reader of the file.
@@ -145,8 +145,8 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 def matrix(reader: Reader, document: object) -> Take | None:
     """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
 
-    A frame may be a table with the values under "weights" and a time. Returns None for another
-    layout.
+    A frame may be a table with the values under "weights" and a time. Returns None if the document
+    has another layout.
 
     Args:
         reader: reader of the file.
@@ -199,7 +199,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
 def neurosync(reader: Reader, document: object) -> Take | None:
     """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -232,9 +232,9 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}; the values may be under a key of their own.
+    """A list of frames {time, name: value, ...}; the values may be in a table under "weights".
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -254,7 +254,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Keyed curves and rows of a curve table are lists of tables too.
+    # Keyed curves and rows of a curve table are lists of tables, too.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -272,7 +272,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """name -> value in a frame."""
+    """name -> value of the numbers in a frame."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -305,8 +305,8 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None: another
-    layout.
+    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None if the
+    document has another layout.
 
     Args:
         reader: reader of the file.
@@ -330,7 +330,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 
 
 def keyed_curves(reader: Reader, document: object) -> Take | None:
-    """Curves with keys {Time, Value}, anywhere in the document.
+    """Reads curves with keys {Time, Value}, anywhere in the document.
 
     An Unreal animation's FloatCurves have this layout: [{CurveName, FloatCurve: {Keys: [...]}}].
     Returns None if there are no such curves.
@@ -370,7 +370,7 @@ def _key_number(reader: Reader, row: Mapping[str, object], key: str, place: str)
 
 
 def _find_curves(value: object, depth: int) -> list[tuple[str, list[Any]]]:
-    """(name, keys) of all curves inside a value."""
+    """(name, keys) of all curves at any depth of a value, up to `depth`."""
     if depth == 0:
         return []
     if isinstance(value, list):
@@ -396,7 +396,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 def lists_by_name(reader: Reader, document: object) -> Take | None:
     """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -428,7 +428,7 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
 
 
 def _is_rows(value: object) -> bool:
-    """Whether a value is a list of lists, or of tables with a list in each."""
+    """Whether a value is a list whose rows are lists, or tables with a list of weights."""
     if not isinstance(value, list) or not value:
         return False
     return all(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Processing steps between a capture and a face; each takes a clip and returns a clip."""
+"""Processing of captured clips, such as smoothing; each function returns a new clip."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
 
-# If the neutral value leaves a smaller range, stretching would only amplify noise.
+# Smallest range from the neutral value to 1; a smaller one would only amplify noise.
 LEAST_RANGE = 0.05
-# Mirroring a face negates these angles.
+# Angles that change their sign when a face is mirrored.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
 
 def resample(clip: Clip, rate: float) -> Clip:
-    """The clip at even times from its first frame to its last, linear between its frames.
+    """Resamples a clip at even times, linearly between its frames.
 
     Args:
         clip: any clip.
@@ -43,14 +43,14 @@ def resample(clip: Clip, rate: float) -> Clip:
 
 
 def shift(clip: Clip, seconds: float) -> Clip:
-    """The clip and its events, later by `seconds`; negative values: earlier."""
+    """Moves the clip and its events by `seconds`, later if positive."""
     times = None if clip.times is None else clip.times + seconds
     events = [event._replace(time=event.time + seconds) for event in clip.events]
     return clip.replaced(start=clip.start + seconds, times=times, events=events)
 
 
 def cut(clip: Clip, first: float, last: float) -> Clip:
-    """The frames and events from `first` to `last`, seconds on the clip's clock, both included.
+    """The frames and events of clip from `first` to `last`, in seconds, both included.
 
     Raises:
         ValueError: there is no frame in this range.
@@ -72,12 +72,12 @@ def cut(clip: Clip, first: float, last: float) -> Clip:
 def adjust(
     clip: Clip, gains: Mapping[str, float] | None = None, offsets: Mapping[str, float] | None = None
 ) -> Clip:
-    """Each control as gain * value + offset.
+    """Changes each control to gain * value + offset.
 
     Args:
         clip: any clip.
         gains: pattern of control names -> factor; the factors of all matches are multiplied.
-        offsets: pattern -> offset, added after that; the offsets of all matches are added.
+        offsets: pattern -> offset, added after the gain; the offsets of all matches are added.
 
     Raises:
         ValueError: a pattern that matches no control.
@@ -93,12 +93,12 @@ def adjust(
 
 
 def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
-    """Make the neutral face neutral: subtract it, and stretch the rest so that 1 stays 1.
+    """Makes a face's neutral values 0: subtracts them, and rescales the rest so that 1 stays 1.
 
-    A control with the neutral value n becomes (value - n) / (1 - n), and 0 if that is negative and
-    the control never was. Angles of the head and the eyes are only subtracted. A control that is a
-    share of another (lips of an open jaw) is calibrated as an amount, because a resting face with
-    shut lips may have any share.
+    A control with the neutral value n becomes (value - n) / (1 - n), clamped to 0 unless the
+    control was negative in the capture. Angles of head and eyes are only subtracted. A control that
+    is a share of another (lips of an open jaw) is calibrated as an amount, because a neutral face
+    with shut lips may have any share.
 
     Args:
         clip: a capture that contains a neutral face.
@@ -130,15 +130,15 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
 
 
 def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
-    """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and time.
+    """Smooths with a Savitzky-Golay filter: peaks keep their height and time.
 
     Polynomials up to `order` pass unchanged, also at the ends; there is no delay; no curve leaves
-    its old range. A clip with individual times is smoothed by frame, because captures have even
-    times except for dropped frames.
+    its old range. Frames are treated as evenly spaced, because captures are, except for dropped
+    frames.
 
     Args:
         clip: any clip; it is returned unchanged if it has fewer frames than the window.
-        window: seconds of each fit, above 0.
+        window: duration of each fit in seconds, above 0.
         order: degree of the polynomial, 0 or more.
 
     Raises:
@@ -154,14 +154,15 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     budget.hold((2 * half + 1) ** 2 * 24, f"a window of {window:g} s, {2 * half + 1} frames")
     curves = clip.curves.astype(np.float64)
     low, high = curves.min(axis=1, keepdims=True), curves.max(axis=1, keepdims=True)
-    # A fit overshoots at a sharp edge; no lid may open further than in the capture.
+    # A fit overshoots at a sharp edge, and no lid may open further than in the capture.
     return clip.replaced(curves=np.clip(_savitzky_golay(curves, half, order), low, high))
 
 
 def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:
     size = 2 * half + 1
     base = np.vander(np.arange(-half, half + 1) / half, order + 1, increasing=True)
-    fit = base @ np.linalg.pinv(base)  # [at, from]: values of the polynomial fitted to a window
+    # [at, from]: maps the values of a window to the fitted polynomial's values
+    fit = base @ np.linalg.pinv(base)
     out = np.empty_like(curves)
     windows = np.lib.stride_tricks.sliding_window_view(curves, size, axis=1)
     out[:, half:-half] = windows @ fit[half]
@@ -171,7 +172,7 @@ def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:
 
 
 def gaussian(clip: Clip, width: float) -> Clip:
-    """A weighted mean around each frame: softer than `smooth`, and lowers short peaks.
+    """Smooths with a Gaussian-weighted mean around each frame: softer than `smooth`, lowers peaks.
 
     Args:
         clip: any clip.
@@ -187,12 +188,12 @@ def gaussian(clip: Clip, width: float) -> Clip:
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
-    """Filter like a live viewer: OneEuro over the frames, one after the other.
+    """Smooths with a OneEuro filter, frame by frame, as the live viewer does.
 
     Args:
         clip: any clip.
-        cutoff: of `OneEuro`, Hz: smoothing at rest.
-        beta: of `OneEuro`: increase of the cutoff with speed.
+        cutoff: cutoff of `OneEuro` at rest in Hz; lower is smoother.
+        beta: increase of the cutoff with speed, see `OneEuro`.
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]
@@ -200,10 +201,11 @@ def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
 
 
 def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
-    """Even frames at the clip's rate; missing frames are interpolated linearly.
+    """Resamples at the clip's rate, so that missing frames are interpolated linearly.
 
     Args:
-        longest: seconds; in a longer gap the last value is held until one frame before its end.
+        longest: seconds; in a longer gap the last value is held until one frame before the gap's
+            end.
 
     Raises:
         BudgetError: a gap with too many frames.
@@ -221,8 +223,8 @@ def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
 
 
 def drop_repeats(clip: Clip) -> Clip:
-    """Drop frames that repeat the frame before in every curve, because a capture repeats a frame
-    when none arrives. The last frame stays, so that the clip keeps its length.
+    """Drops frames that equal the frame before in every curve; captures repeat a frame if no new
+    one arrives. The last frame stays, so that the clip keeps its length.
     """
     if clip.frame_count < 3:
         return clip
@@ -233,7 +235,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Swap left and right: each control takes its partner's curve, sideways angles change sign."""
+    """Mirrors a clip: partners swap their curves, and sideways angles change their sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)
@@ -241,10 +243,10 @@ def mirror(clip: Clip) -> Clip:
 
 
 def parse_amounts(texts: Sequence[str]) -> dict[str, float]:
-    """Patterns with amounts from texts such as "jaw*=1.2".
+    """Parses texts such as "jaw*=1.2" to {pattern of control names: amount}.
 
     Raises:
-        ValueError: another form.
+        ValueError: a text of another form.
     """
     out = {}
     for text in texts:

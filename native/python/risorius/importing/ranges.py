@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rescales percentages, bytes and degrees to 0..1 and radians, and refuses other scales."""
+"""Converts percentages, bytes and degrees to 0..1 and radians, and refuses implausible values."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from .errors import AnimationFileError
 from .mapping import ANGLES, Mapping
 
 ANGLE_UNITS = ("radians", "degrees")
-# A full movement is 1 and an overdriven one 2; larger values are on another scale.
+# A full movement is 1, an exaggerated one up to 2; larger values are on another scale.
 _LARGEST = 4.0
-# radians; no head turns further
+# radians, about 115 degrees; no head turns further
 _LARGEST_ANGLE = 2.0
-_USUAL = (100.0, 255.0)
+_USUAL = (100.0, 255.0)  # values of a full movement that files use besides 1
 
 
 def check_options(full: float | None, angles: str | None) -> None:
-    """Raises: ArgumentError: a full value that is not above 0, or an unknown unit of angles."""
+    """Checks options. Raises: ArgumentError: full is not above 0, or angles is not a known unit."""
     if full is not None and not 0.0 < full < 1e9:
         raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
     if angles is not None and angles not in ANGLE_UNITS:
@@ -29,12 +29,12 @@ def check_options(full: float | None, angles: str | None) -> None:
 
 
 def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | None) -> Clip:
-    """A file's curves on the scale of a mapping: a full movement is 1, angles are radians.
+    """Converts a file's curves to the scale of a mapping: a full movement is 1, angles are radians.
 
     Args:
         clip: curves with the file's own names.
-        mapping: tells which curves are angles.
-        full: value of a full movement; None: 1.
+        mapping: identifies the curves that are angles.
+        full: the file's value of a full movement; None: 1.
         angles: one of ANGLE_UNITS; None: radians.
     """
     if full in (None, 1.0) and angles != "degrees":
@@ -51,16 +51,16 @@ def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | Non
 
 
 def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str | None) -> None:
-    """Refuse values far outside the range of their control.
+    """Raises an error if values are far outside the range of their control.
 
     Args:
         clip: curves of controls and ANGLES.
         name: the file's name in errors.
-        full: as in `rescaled`; None: not stated, so it is checked.
-        angles: as in `rescaled`; None: not stated, so it is checked.
+        full: as in `rescaled`; None: the option was not given, so controls are checked.
+        angles: as in `rescaled`; None: the option was not given, so angles are checked.
 
     Raises:
-        AnimationFileError: a control far above 1, a head that turns too far.
+        AnimationFileError: a control above 4, or an angle above 2 radians.
     """
     said = []
     reached = np.abs(clip.curves).max(axis=1, initial=0.0)

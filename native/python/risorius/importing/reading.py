@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a file to a clip of raw controls: reads it, chooses and applies a mapping, reports."""
+"""Reads a file, applies a mapping, and returns a clip of raw controls with a report."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
-# Curves that are Risorius' controls already, or keyed by an animator: any value is intended.
+# Kinds whose curves are Risorius' own controls, or keyed by an animator: any value is intended.
 _OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
-    """Options of `read`."""
+    """The arguments of `read` after the path."""
 
     kind: str | None
     asked: units.Asked
@@ -57,7 +57,7 @@ class Options(NamedTuple):
 
 
 class RigLike(Protocol):
-    """The parts of a `risorius.Rig` that a mapping of GUI controls needs."""
+    """The members of `risorius.Rig` that a mapping of GUI controls needs."""
 
     @property
     def gui_control_names(self) -> list[str]: ...
@@ -68,16 +68,16 @@ class RigLike(Protocol):
 
 @dataclass
 class Imported:
-    """The content of a file, before any mapping.
+    """The curves of a file before a mapping is applied.
 
     Attributes:
-        clip: curves with the file's own names and times; time 0 is the first frame of a take, or
-            the start of the sound for visemes.
+        clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
+            the start of the sound.
         kind: one of KINDS.
-        mapping: name of the fitting mapping: by kind, else the built-in one that knows most of the
-            names; "" if none knows any.
+        mapping: name of the built-in mapping of this kind of file, else the one that knows most
+            curves; "" if none knows any.
         source: the file's name.
-        notes: sentences about the reading.
+        notes: sentences for the user about dropped or assumed data.
     """
 
     clip: Clip
@@ -96,23 +96,23 @@ class Imported:
         full_value: float | None = None,
         angles: str | None = None,
     ) -> tuple[Clip, Report]:
-        """A clip of raw controls, and the use of each curve.
+        """Converts to a clip of raw controls, and reports the use of each curve.
 
         Args:
-            mapping: a built-in one by name, a TOML file, or a Mapping; None: the fitting one.
+            mapping: name of a built-in one, path of a TOML file, or a Mapping; None: self.mapping.
             rig_names: raw controls of the rig, `Rig.raw_control_names`; other controls are dropped
                 and reported. None: all are kept.
-            rig: for a mapping of GUI controls, whose table belongs to the rig.
-            rotations: "head": the head's angles, if captured; the eyes use eyeLook controls. "all":
-                the eyes' angles too. "none": neither.
+            rig: needed for a mapping of GUI controls, because the rig has their table.
+            rotations: curves of angles to keep. "head": head and neck; the eyes follow eyeLook
+                controls. "all": the eyes' angles too. "none": no angles.
             full_value: the file's value of a full movement: 100 for per cent, 255 for bytes. None:
-                1, and far larger values are refused.
-            angles: unit of the file's angles, one of ANGLE_UNITS. None: radians, and impossible
-                angles are refused.
+                1, and values above 4 are an error.
+            angles: unit of the file's angles, one of ANGLE_UNITS. None: radians, and values above 2
+                are an error.
 
         Raises:
-            ValueError: no mapping fits, an unusable mapping, a GUI mapping without a rig, values on
-                another scale.
+            ValueError: no mapping fits, an unusable mapping, a GUI mapping without a rig,
+                implausible values.
         """
         ranges.check_options(full_value, angles)
         if rotations not in ROTATIONS:
@@ -165,8 +165,8 @@ class Imported:
 
 
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
-    """Keep the requested angles of head and eyes; drop those of a head that was not captured, which
-    would hold the head still."""
+    """Keeps the requested angles of head and eyes; drops head angles that are all 0, which would
+    hold the head still."""
     clip = done.clip
     drop = set()
     for name in clip.names:
@@ -187,7 +187,7 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 
 
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
-    """Raw controls from GUI curves, frame by frame by the rig's table."""
+    """Converts GUI curves to raw controls, frame by frame, with the rig's table."""
     index = {name: i for i, name in enumerate(rig.gui_control_names)}
     gui = np.zeros((clip.frame_count, len(index)), np.float32)
     angles = [name for name in clip.names if name in ANGLES]
@@ -222,17 +222,17 @@ def read(
     time_unit: str | None = None,
     take: str | None = None,
 ) -> Imported:
-    """Read a file of animation.
+    """Reads an animation file.
 
     Args:
-        path: the file.
+        path: path of the file.
         kind: one of KINDS, or None: inferred from the content, else from the suffix.
         rate: frames per second, for tables with frame numbers or without times.
-        timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 and the like
-            stand for 30000/1001.
-        time_unit: one of importing.TIME_UNITS, for tables and JSON that do not state it; "rows":
-            times are ignored, and each row is a frame at `rate`. None: from the file.
-        take: name or number of an animation, for files with several; None: the first.
+        timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 means
+            30000/1001, and so on.
+        time_unit: one of importing.TIME_UNITS, for tables and JSON without a unit; "rows" ignores
+            the times, and each row is a frame at `rate`. None: from the file.
+        take: name or number of an animation, for files with several; None: the first with curves.
 
     Raises:
         AnimationFileError: the file cannot be read or used; the sentence names file and place.
@@ -254,7 +254,8 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    except (ValueError, ArithmeticError) as error:  # unexpected numbers in the file
+    # such as an overflow caused by a number in the file
+    except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
         raise AnimationFileError(str(path), "nested too deeply to be read") from error
@@ -266,7 +267,7 @@ def read(
 
 
 def _moving(clip: Clip) -> list[str]:
-    """The curves that are not constantly 0, or all."""
+    """The curves that are not constantly 0, or all curves if each is."""
     moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
     return moving or list(clip.names)
 
@@ -285,7 +286,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 
 
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
-    """Mouth shapes, if the text contains them."""
+    """Reads mouth shapes, or returns None if the text has another layout."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
         return visemes.read_dat(text.lstrip(), name, options.asked.rate)
     is_asked = options.kind in (None, "rhubarb", "papagayo")
@@ -339,14 +340,14 @@ def import_file(
     full_value: float | None = None,
     angles: str | None = None,
 ) -> tuple[Clip, Report]:
-    """A file as a clip of raw controls, and the use of each of its curves.
+    """Reads a file and maps it to a clip of raw controls; also reports the use of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: as in `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: as in `Imported.apply`.
+        path, kind, rate, timecode_rate, time_unit, take: see `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: see `Imported.apply`.
 
     Raises:
-        ValueError: as these do.
+        ValueError: an error of `read` or `Imported.apply`.
     """
     found = read(
         path, kind=kind, rate=rate, timecode_rate=timecode_rate, time_unit=time_unit, take=take
@@ -370,16 +371,17 @@ def import_curves(
     rig: RigLike | None = None,
     rotations: str = "head",
 ) -> tuple[Clip, Report]:
-    """Named curves as a clip of raw controls, such as shape keys in an action of another rig.
+    """Maps named curves, such as shape keys of another rig's action, to a clip of raw controls.
 
     Args:
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
             values), linear between keys.
-        source: its name in the report.
-        rig_names, mapping, rig, rotations: as in `Imported.apply`.
+        source: name of the curves in the report.
+        rig_names, mapping, rig, rotations: see `Imported.apply`.
 
     Raises:
-        ValueError: no curves, times that do not ascend, values that are not finite; as apply.
+        ValueError: no curves, times that do not ascend, values that are not finite; errors of
+            `Imported.apply`.
     """
     keys = {name: _keys(name, times, values) for name, (times, values) in curves.items()}
     if not any(key.times.size for key in keys.values()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reports the use of every curve of a file."""
+"""Reports the use of each curve of a file in a mapping."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ _WIDTH = 100
 
 @dataclass
 class Report:
-    """Attributes:
-    source: the file, or another source of the curves.
+    """The use of each curve of a file.
+
+    Attributes:
+    source: name of the file, or of another source of the curves.
     kind: kind of file, one of `importing.KINDS`.
     mapping: name of the mapping used.
     mapped: curve of the source -> controls it moves.
@@ -38,7 +40,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
 
     def lists(self) -> list[tuple[str, list[str]]]:
-        """(heading, names) of every non-empty list, most important first."""
+        """(heading, names) of each non-empty list, the most important first."""
         rows = [
             ("not mapped", self.unmapped),
             ("not in the rig", self.not_in_rig),
@@ -50,7 +52,7 @@ class Report:
         return [(heading, names) for heading, names in rows if names]
 
     def text(self) -> str:
-        """The whole report as lines of text."""
+        """The complete report as lines of text."""
         controls = {control for row in self.mapped.values() for control in row}
         out = [
             f"{self.source}: {self.kind}, mapping {self.mapping}",
@@ -65,7 +67,7 @@ class Report:
 
 
 def _lines(text: str) -> list[str]:
-    """Wrap a long line without splitting names."""
+    """Wraps a long line without splitting names."""
     return wrap(
         text, _WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False
     )

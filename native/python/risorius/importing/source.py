@@ -19,24 +19,24 @@ from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
 
-# No recorded take is as large; a larger file is a mistake that would fill the memory.
+# Larger than any recorded take; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Times with larger steps than this rate are times of keys, not of frames.
+# Times further apart than at this rate (per second) are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
-# Share of frames that a take may lose because their time does not ascend.
+# largest fraction of frames that may be dropped because their time does not ascend
 MOST_LOST = 1.0 / 3.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
 
 
 @dataclass
 class Take:
-    """The result of a reader: curves with the file's own names, and notes on the reading.
+    """Curves with the file's own names, and notes for the user.
 
     Attributes:
         clip: names and times as in the file.
         kind: one of `importing.KINDS`.
-        mapping: the built-in mapping of this kind, or "" if the names decide.
+        mapping: name of the built-in mapping for this kind of file, or "" to choose by curve names.
         notes: sentences about dropped, filled or assumed data.
     """
 
@@ -47,11 +47,11 @@ class Take:
 
 
 def read_bytes(path: Path, *, found: bool = False) -> bytes:
-    """The bytes of a file.
+    """Reads the bytes of a file.
 
     Args:
         path: path of the file.
-        found: another file names it, so that it may not be a pipe.
+        found: whether the path comes from another file; such a path may not be a pipe.
 
     Raises:
         AnimationFileError: missing, unreadable, empty, larger than MAX_BYTES, a device.
@@ -68,7 +68,7 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
 
 
 def refuse_other_kinds(data: bytes, name: str) -> None:
-    """Raise an error that names the kind of a file if its first bytes show that it is no animation.
+    """Raises an error that names the kind of a file if its first bytes show another kind.
 
     Args:
         data: the file, or its first bytes.
@@ -83,14 +83,15 @@ def refuse_other_kinds(data: bytes, name: str) -> None:
 
 
 def decode(data: bytes, name: str) -> str:
-    """Text of a file: UTF-8 with or without a byte order mark, UTF-16 with one.
+    """Decodes UTF-8 with or without a byte order mark, or UTF-16 with one.
 
     Args:
         data: the whole file.
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: another encoding, with line and column of the first bad byte.
+        AnimationFileError: another encoding; the message names line and column of the first bad
+            byte.
     """
     encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
@@ -107,7 +108,7 @@ def decode(data: bytes, name: str) -> str:
 
 def frame_rate(times: Doubles) -> float:
     """Frames per second of frame times: a usual rate if one is within 1 %, else the measured one;
-    USUAL_RATE for keys that lie far apart."""
+    USUAL_RATE for keys that are far apart."""
     if times.size < 2:
         return USUAL_RATE
     step = float(np.median(np.diff(times)))
@@ -132,9 +133,9 @@ def make_clip(
     events: Sequence[Event] = (),
     metadata: Mapping[str, str] | None = None,
 ) -> Clip:
-    """A clip with even timing if its times are even.
+    """Makes a clip; it has a rate instead of times if its times are even.
 
-    They are even if no frame is further than a microsecond from start + i / rate.
+    Times are even if no frame is further than a microsecond from start + i / rate.
 
     Args:
         names: names of the curves, each once.
@@ -160,7 +161,7 @@ def make_clip(
 
 
 def number(text: str, name: str, line: int, column: int | str) -> float:
-    """The finite number in a cell of a table or a word of a line.
+    """Parses a finite number from a cell of a table or a word of a line.
 
     Args:
         text: the cell.
@@ -172,7 +173,8 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
         AnimationFileError: not a number, NaN, infinite or outside float32.
     """
     try:
-        value = float(text.replace("_", "?"))  # 1_000 is a number only in Python
+        # "_" is replaced, because 1_000 is a number only in Python
+        value = float(text.replace("_", "?"))
     except ValueError:
         found = text if len(text) <= 40 else text[:40] + "..."
         raise AnimationFileError(
@@ -186,7 +188,7 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
 
 def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
-    """Indices of the frames whose time is later than all times before; the others are noted.
+    """Indices of the frames whose time is later than all earlier ones; drops are noted.
 
     Args:
         times: float64[frames], seconds.

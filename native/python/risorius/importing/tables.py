@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads delimited tables: Live Link Face takes, and curves by column of any software."""
+"""Reads delimited tables: Live Link Face takes, and tables with a column per curve."""
 
 from __future__ import annotations
 
@@ -35,29 +35,30 @@ COMMENTS = ("#", "//", "%")
 _NAMED_DELIMITER = re.compile(r"sep=(.|\\t)", re.IGNORECASE)
 # Cells that mean a missing value.
 _MISSING = frozenset(("", "-", "--", "\N{EN DASH}", "na", "n/a", "#n/a", "null", "none"))
-# Curves of a Live Link Face take, in their order.
+# Names of the curves of a Live Link Face take, in the order of its columns.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
     *"HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll".split(),
     *"RightEyeYaw RightEyePitch RightEyeRoll".split(),
 )
-# Columns that count blend shapes and hold no curve.
+# Columns with the number of blend shapes, which are not curves.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
-_SPARSEST = 4  # largest ratio of cells of a table by curve to rows of a table by time and name
-_HOLES_BY_NAME = 3  # number of curves with missing values that notes name individually
+# largest allowed ratio of cells after conversion to rows before, for a table by time and name
+_SPARSEST = 4
+_HOLES_BY_NAME = 3  # up to this number of curves with missing values, notes name each one
 
 
 @dataclass
 class Table:
-    """The cells of a table as text; every row is as long as the header.
+    """The cells of a table as text; all rows are as long as the header.
 
     Attributes:
         header: names of the columns, stripped.
-        rows: the other rows.
-        lines: line of the file, from 1, at which each row ends.
+        rows: the rows below the header.
+        lines: line of the file, from 1, at which each of these rows ends.
         delimiter: character between cells.
-        notes: sentences about dropped parts.
+        notes: sentences for the user about dropped parts.
     """
 
     name: str
@@ -68,7 +69,7 @@ class Table:
     notes: list[str] = field(default_factory=list)
 
     def cell(self, row: int, column: int) -> float:
-        """The number in a cell.
+        """Parses the number in a cell.
 
         Args:
             row: from 0, without the header.
@@ -79,22 +80,23 @@ class Table:
         """
         text = self.rows[row][column].strip()
         if "." not in text and (self.delimiter != "," or not self.has_points):
-            # a decimal comma, as spreadsheets of many countries write.
+            # a decimal comma, which spreadsheets of many countries write
             text = text.replace(",", ".")
         return number(text, self.name, self.lines[row], self.place(column))
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points; then a comma in a cell is not a decimal comma."""
+        """Whether numbers have decimal points; if so, a comma in a cell is not a decimal comma."""
         return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
-        """The cells by column; call it after the check of row lengths."""
+        """The cells by column; to be called after `_check`, because rows must be equally long."""
         return list(zip(*self.rows, strict=True))
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
-        """float64[rows] of a column, all rows or some. Raises: as cell."""
+        """float64[rows] of a column, for all rows or some. Raises: AnimationFileError: as
+        `cell`."""
         values = self.whole_column(column) if rows is None else None
         if values is None:
             wanted = range(len(self.rows)) if rows is None else rows
@@ -102,7 +104,7 @@ class Table:
         return values
 
     def whole_column(self, column: int) -> Doubles | None:
-        """float64[rows] of a whole column; None if a cell is not a plain number."""
+        """float64[rows] of all cells of a column; None if a cell is not a plain number."""
         cells = self.columns[column]
         try:
             values = np.array(list(map(float, cells)))
@@ -117,14 +119,14 @@ class Table:
 
 
 def sniff(line: str) -> str:
-    """The delimiter: the character that splits a header into most cells, ignoring quotes."""
+    """The delimiter: the character that splits a header line into most cells, outside quotes."""
     return max(DELIMITERS, key=re.sub(r'"[^"]*"', '""', line).count)
 
 
 def read_table(text: str, name: str) -> Table:
-    """A table with a header.
+    """Parses a table with a header.
 
-    Comments are skipped. A line "sep=;" sets the delimiter, as in Excel.
+    Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel.
 
     Args:
         text: content of the file, with commas, semicolons or tabs between cells.
@@ -152,7 +154,7 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
-    # NumPy writes its header as a comment.
+    # NumPy writes the header as a comment.
     named = next(csv.reader([comment], delimiter=delimiter), [])
     if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
         rows.insert(0, named)
@@ -163,8 +165,8 @@ def read_table(text: str, name: str) -> Table:
 
 
 def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
-    """The lines with comments emptied, the delimiter that one states, and the last comment at the
-    top."""
+    """Empties lines of comments; returns the lines, the delimiter if a line states it, and the last
+    comment above the header."""
     delimiter = comment = ""
     is_top = True
     for i, line in enumerate(lines):
@@ -187,7 +189,7 @@ def _check(table: Table, line: int) -> None:
             "a header with the names of the curves was expected, found numbers",
             line=line,
         )
-    # A header that ends in a delimiter has one more empty column; its rows may lack it.
+    # A header that ends in a delimiter has an empty column at its end, which the rows may lack.
     if len(table.header) > 1 and not table.header[-1]:
         table.header.pop()
         for row in table.rows:
@@ -204,7 +206,7 @@ def _check(table: Table, line: int) -> None:
             )
         seen[header] = column
     if len(table.rows) > 1 and len(table.rows[-1]) < len(table.header):
-        # The program ended while it wrote; the last number may be cut too.
+        # The writing program was interrupted; the last number may be cut, too.
         table.notes.append(f"the last row (line {table.lines[-1]}) is cut short and left out")
         del table.rows[-1], table.lines[-1]
     for row, at in zip(table.rows, table.lines, strict=True):
@@ -231,7 +233,7 @@ def _is_missing(cell: str) -> bool:
 
 
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
-    """The rows that have a time, or all rows if rows are counted.
+    """Drops rows without a time, unless rows are counted instead of times.
 
     Raises:
         AnimationFileError: more than MOST_LOST of the rows have no time.
@@ -255,16 +257,16 @@ def _with_times(table: Table, at: int, asked: Asked) -> Table:
 
 
 def is_live_link_face(header: Sequence[str]) -> bool:
-    """Whether a header is a timecode, the count of shapes, then shapes, as in Live Link Face."""
+    """Whether a header begins with a timecode and the number of shapes, as in Live Link Face."""
     names = [plain(cell) for cell in header]
     return len(names) > 2 and names[0] == "timecode" and names[1] in COUNTS
 
 
 def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
-    """A take of Live Link Face: times from the timecode and its rate, not from the row number.
+    """Reads a take of Live Link Face; times come from the timecode, not from the row number.
 
     Args:
-        table: 2 columns and 51 to 61 curves, in any order, in either style of names.
+        table: 2 columns, then 51 to 61 curves in any order, in either spelling of their names.
         asked: the caller's options on timecodes.
 
     Raises:
@@ -289,7 +291,7 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
-    """Seconds of the timecodes in a column, or of row numbers if rows are counted."""
+    """Seconds of the timecodes in a column; of row numbers if the caller counts rows."""
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
     codes = [
@@ -334,7 +336,7 @@ def _note_count(table: Table, found: int, notes: list[str]) -> None:
 
 
 def _note_dropped(times: Doubles, notes: list[str]) -> None:
-    """Note rows that are missing, as from a phone under load."""
+    """Notes the number of missing rows, which phones under load drop."""
     if times.size < 3:
         return
     steps = np.diff(times)
@@ -349,11 +351,11 @@ def _note_dropped(times: Doubles, notes: list[str]) -> None:
 
 
 def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
-    """Curves by column.
+    """Reads a table with a column per curve.
 
-    The time is the column with such a header (in a unit of `clock.units`, timecodes, or frame
-    numbers at the caller's rate), else the row number at that rate. An empty cell is a missing
-    value: the curve is interpolated linearly, or keeps its first or last value.
+    Times come from the column with a header of times (in a unit of `clock.units`, as timecodes, or
+    as frame numbers at the caller's rate), else from the row number at that rate. An empty cell is
+    a missing value: it is interpolated linearly, or gets the curve's first or last value.
 
     Args:
         table: from `read_table`.
@@ -385,7 +387,7 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _time_column(table: Table) -> int | None:
-    """The column of the times, preferably a time rather than a frame number."""
+    """Index of the column of times; a column of frame numbers only if there is no other."""
     found = [(i, name) for i, h in enumerate(table.header) if (name := time_name(h)) is not None]
     found.sort(key=lambda row: row[1].unit == FRAMES)
     return found[0][0] if found else None
@@ -404,7 +406,7 @@ def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
-    """Whether a column holds a curve: not a row number, a count, a second time, or text."""
+    """Whether a column is a curve, and not a row number, a count, a second time, or text."""
     header = plain(table.header[column])
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
@@ -413,7 +415,7 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
         notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
         return False
     if not header:
-        return False  # the row numbers that pandas writes without a header
+        return False  # a column of row numbers without a header, as pandas writes
     if not any(re.search(r"\d", cell) or _is_number(cell) for cell in cells):
         notes.append(f"{table.header[column]}: text, left out")
         return False
@@ -421,17 +423,17 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
 
 
 def _by_curve(table: Table, at: int) -> tuple[Table, int]:
-    """A table with a row for each time and name becomes one with a column for each name.
+    """Converts a table with a row per time and name to one with a column per name.
 
     Args:
-        table: its columns are a time, a name and a value, as MediaPipe's results often have.
+        table: with a column of times, one of names and one of values, as for MediaPipe's results.
         at: the column of the time.
 
     Returns:
-        The table, converted if it has this form, and its column of the time.
+        The table, converted if it has these three columns, and the number of its column of times.
 
     Raises:
-        AnimationFileError: most names have no value at most times.
+        AnimationFileError: the converted table would be mostly empty.
     """
     others = [i for i in range(len(table.header)) if i != at and table.header[i]]
     is_named = {i: not any(map(_is_number, table.columns[i])) for i in others}
@@ -459,7 +461,7 @@ def _by_curve(table: Table, at: int) -> tuple[Table, int]:
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
-    """The only column that holds nothing but Rhubarb's mouth shapes, or None."""
+    """The only column that contains Rhubarb's mouth shapes alone, or None."""
     found = [
         i
         for i in range(len(table.header))
@@ -469,7 +471,7 @@ def _shapes(table: Table, at: int | None) -> int | None:
 
 
 def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
-    """float64[columns, rows]; missing values are filled from the rows around them."""
+    """float64[columns, rows]; missing values are interpolated from other rows."""
     holes: list[tuple[str, int]] = []
     curves = np.array([_column(table, column, times, holes) for column in columns])
     if len(holes) > _HOLES_BY_NAME:
@@ -488,8 +490,8 @@ def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, in
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
-        return values  # decimal commas
+        return values  # numbers with decimal commas, which whole_column does not parse
     holes.append((table.header[column], int((~filled).sum())))
-    # A clock that runs back would distort the curve; its frames are dropped later.
+    # Times that go back would distort the interpolation; their frames are dropped later.
     at = np.maximum.accumulate(times)
     return np.interp(at, at[known], values)

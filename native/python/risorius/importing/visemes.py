@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks of lip sync tools, as smooth curves instead of steps."""
+"""Reads viseme tracks of lip sync tools, and makes smooth curves of them."""
 
 from __future__ import annotations
 
@@ -21,24 +21,23 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves; cues are timed to a hundredth of a second or a frame.
+# Frames per second of the curves; files time cues to a hundredth of a second or to a frame.
 RATE = 60.0
-# Seconds in which a mouth changes from one shape to the next.
+# Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
-# Moho and Papagayo count frames of a film; a .dat file does not state its rate.
+# Frames per second of a Moho .dat file, which does not state its rate: that of film.
 DAT_RATE = 24.0
-# seconds; a longer file has a wrong number
+# seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
-# A mouth that never closes for an M is noticed, a shortened D is not. 1: neighbours do not reach
-# beyond the middle of the shape; 0: they may reach through all of it.
+# Weight of each shape against its neighbours, because a mouth that never closes for an M is
+# noticed, and a shortened D is not. 1: neighbours reach to its middle at most; 0: to its end.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
     "rest": 0.3,
 }  # fmt: skip
 RHUBARB = frozenset("ABCDEFGHX")
-# Names that only Papagayo's ten mouth shapes have, which distinguish its files from Rhubarb's; E is
-# in both.
+# Papagayo's ten mouth shapes. All names but E distinguish its files from Rhubarb's.
 PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
 _TSV = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)(?:\s+|\s*[;,|]\s*)([A-HXa-hx])\s*")
 
@@ -54,17 +53,17 @@ class Cue(NamedTuple):
 def flowing_curves(
     cues: Sequence[Cue], times: Doubles, blend: float = BLEND
 ) -> tuple[list[str], Doubles]:
-    """The weight of each shape; weights add up to 1 in every frame.
+    """float64[shapes, frames]: the weight of each shape; weights add up to 1 in every frame.
 
-    At the border of two cues one blends into the other along half a cosine, `blend` seconds long
-    and centred on the border, but shorter if the cues demand it: a transition may reach to the
-    middle of a dominant cue, and to the far end of a weak one. A dominant cue therefore has weight
-    1 in its middle, and a short weak one between two others never reaches full weight.
+    Two neighbouring cues cross-fade along half a cosine that is `blend` seconds long and centred on
+    their border. It is shorter if the cues demand it: it may reach to the middle of a dominant cue,
+    and to the far end of a weak one. A dominant cue therefore has weight 1 in its middle, and a
+    short weak one between two others never reaches weight 1.
 
     Args:
-        cues: by time; each ends where the next starts.
+        cues: in order of time; each ends where the next starts.
         times: float64[frames], seconds, ascending.
-        blend: seconds.
+        blend: length of a transition in seconds.
 
     Returns:
         The shapes, in order of their first cue; float64[shapes, frames].
@@ -79,7 +78,7 @@ def flowing_curves(
     for i in range(1, len(cues)):
         border = cues[i].start
         half = min(0.5 * blend, reach[i - 1], reach[i])
-        # A window ends with the next cue at the latest; borders of later cues follow in turn.
+        # A transition ends with the next cue at the latest; later borders are applied on top.
         beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
         first, last = np.searchsorted(times, [border - half, beyond])
         at = times[first:last]
@@ -93,10 +92,11 @@ def flowing_curves(
 def _take(
     cues: list[Cue], kind: str, name: str, notes: list[str], events: Sequence[Event] = ()
 ) -> Take:
-    """A take from cues: curves at RATE, and the cues themselves as events.
+    """Makes a take from cues: curves at RATE, and the cues themselves as events.
 
     Raises:
-        AnimationFileError: no cue has a length. BudgetError: too many shapes for such a long track.
+        AnimationFileError: no cue has a length. BudgetError: too many shapes for a track of this
+            length.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -118,7 +118,7 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Cues from start times, each lasting until the next; a rest before the first."""
+    """Makes cues from start times, each lasting until the next; a rest before the first."""
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -126,14 +126,14 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Whether at least half of the lines are a time and a shape of Rhubarb's."""
+    """Whether at least half of the lines consist of a time and a Rhubarb shape."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)
     return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)
 
 
 def read_rhubarb_tsv(text: str, name: str) -> Take:
-    """Rhubarb's lines "0.32<tab>B", seconds and a shape; the last line marks the end.
+    """Reads Rhubarb's lines "0.32<tab>B": seconds and a shape; the last line marks the end.
 
     Accepts lower case, blanks, decimal commas and other separators than the tab.
 
@@ -161,11 +161,11 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
 
 
 def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
-    """Rhubarb's shapes in one column of a table.
+    """Reads Rhubarb's shapes from one column of a table.
 
     Args:
         times: float64[rows], seconds.
-        shapes: shapes of each row, from its time on; the last one marks the end.
+        shapes: shape of each row, which begins at the row's time; the last one marks the end.
         name: the file's name in errors.
 
     Raises:
@@ -179,7 +179,7 @@ def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
 
 
 def is_shape(text: str) -> bool:
-    """Whether a cell is one of Rhubarb's shapes."""
+    """Whether a text is one of Rhubarb's shapes, in any letter case."""
     return text.strip().upper() in RHUBARB
 
 
@@ -197,14 +197,14 @@ def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> N
 
 
 def read_rhubarb_xml(text: str, name: str) -> Take:
-    """Rhubarb's <rhubarbResult> with <mouthCue start end>, in seconds.
+    """Reads Rhubarb's <rhubarbResult> with <mouthCue start end>, in seconds.
 
     Args:
         text: content of the file.
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: not such XML, or XML with declarations of its own.
+        AnimationFileError: not such XML, or XML with a document type.
     """
     text = re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.DOTALL)
     try:
@@ -230,7 +230,7 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
 
 
 def _refuse_declarations(text: str, name: str) -> None:
-    """Scan for a document type, which could define growing entities.
+    """Refuses a document type, which could define entities that grow exponentially.
 
     Raises:
         AnimationFileError: there is one. ExpatError: not XML.
@@ -248,7 +248,7 @@ def _refuse_declarations(text: str, name: str) -> None:
 
 
 def read_rhubarb_json(document: dict[str, object], name: str) -> Take:
-    """Rhubarb's {"metadata": ..., "mouthCues": [{"start", "end", "value"}]}, in seconds.
+    """Reads Rhubarb's {"metadata": ..., "mouthCues": [{"start", "end", "value"}]}, in seconds.
 
     Args:
         document: parsed JSON.
@@ -291,7 +291,7 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
 
 
 def read_dat(text: str, name: str, rate: float | None = None) -> Take:
-    """Moho's switch data: MohoSwitch1, then lines with a frame, counted from 1, and a shape.
+    """Reads Moho's switch data: MohoSwitch1, then lines with a frame (from 1) and a shape.
 
     Args:
         text: content of the file.
@@ -334,7 +334,7 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
 
 
 class Lines:
-    """The lines of a .pgo file, one after the other."""
+    """Reads the lines of a .pgo file one after the other; errors name the line."""
 
     def __init__(self, text: str, name: str) -> None:
         self.rows = re.split(r"\r\n|\n|\r", text.rstrip("\r\n"))
@@ -351,14 +351,14 @@ class Lines:
         return AnimationFileError(self.name, message, line=self.at)
 
     def count(self, text: str, what: str) -> int:
-        """The integer of up to nine digits in a line; it may be negative.
+        """Parses an integer of up to nine digits, which may be negative.
 
         Args:
             text: the line.
             what: the meaning of the number, for errors.
 
         Raises:
-            AnimationFileError: another content.
+            AnimationFileError: the line is not such a number.
         """
         if not re.fullmatch(r"-?\d{1,9}", text):
             raise self.fail(f"{what} was expected, found {text[:40]!r}")
@@ -366,7 +366,7 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of Papagayo: frames from 0, the last one inclusive."""
+    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame."""
 
     text: str
     start: int
@@ -375,7 +375,7 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Papagayo's text file: voices with phrases with words with phonemes.
+    """Reads Papagayo's text file: voices with phrases with words with phonemes.
 
     Args:
         text: content of the file.
@@ -386,13 +386,13 @@ def read_pgo(text: str, name: str) -> Take:
     """
     lines = Lines(text, name)
     lines.next()
-    lines.next()  # the sound's path
+    lines.next()  # path of the sound file
     rate = float(lines.count(lines.next(), "frames a second"))
     lines.count(lines.next(), "the sound's length in frames")
     voices = []
     for _ in range(lines.count(lines.next(), "the number of voices")):
         voice, words = lines.next(), []
-        lines.next()  # its text
+        lines.next()  # the voice's text
         for _ in range(lines.count(lines.next(), "the number of phrases")):
             lines.next()
             lines.count(lines.next(), "the phrase's first frame")
@@ -420,7 +420,7 @@ def _pgo_word(lines: Lines) -> Word:
 
 
 def read_pgo_json(document: dict[str, object], name: str) -> Take:
-    """A file of Papagayo-NG, version 2.
+    """Reads a file of Papagayo-NG, version 2.
 
     Args:
         document: parsed JSON.
@@ -451,7 +451,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """The first voice that speaks; the mouth rests between words."""
+    """Makes a take from the first voice with phonemes; the mouth rests between words."""
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]
@@ -478,7 +478,7 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
 
 
 def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
-    """The reader for a text that is neither JSON nor a table, or None.
+    """The function that reads a text that is neither JSON nor a table, or None.
 
     Args:
         text: content of the file.
@@ -489,7 +489,7 @@ def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
         return read_rhubarb_xml
     if head.startswith("lipsync version"):
         return read_pgo
-    # If the caller says rhubarb, the error names the invalid line; a header makes the text a table.
+    # If the caller says rhubarb, the error names the invalid line; a text with a header is a table.
     if is_rhubarb_tsv(text) or (kind == "rhubarb" and head[:1].isdigit()):
         return read_rhubarb_tsv
     return None

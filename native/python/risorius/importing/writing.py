@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes clips as text that other software reads and that gives the same bits again; and mappings
-with a user's rows."""
+"""Writes clips as text (CSV, JSON, Unreal curve tables), and mappings with additional rows."""
 
 from __future__ import annotations
 
@@ -20,11 +19,12 @@ from ..base.errors import ArgumentError
 from ..files import fileio
 from .mapping import load_mapping, mapping_names
 
-_UNREAL = re.compile(r"""[\s"',./:|&!~@#(){}\[\]=;^%$`]""")  # no name of Unreal's holds these
+# characters that are not allowed in names of Unreal
+_UNREAL = re.compile(r"""[\s"',./:|&!~@#(){}\[\]=;^%$`]""")
 
 
 def csv_text(clip: Clip) -> str:
-    """A table: time in seconds, then a column for each control; lines end in LF.
+    """A CSV table: time in seconds, then a column per control; lines end in LF.
 
     Every number has enough digits to restore its float32 (the time: float64).
 
@@ -41,7 +41,7 @@ def csv_text(clip: Clip) -> str:
 
 
 def json_text(clip: Clip) -> str:
-    """The whole clip: rate, times, curves by name, events, metadata.
+    """A JSON text of the complete clip: rate, times, curves by name, events, metadata.
 
     Raises:
         ValueError: a value that is not finite.
@@ -56,7 +56,7 @@ def json_text(clip: Clip) -> str:
         "events": [event._asdict() for event in clip.events],
         "metadata": clip.metadata,
     }
-    # json writes all digits of a double; a float32 needs fewer.
+    # Not by json, which would write all digits of a double; a float32 needs fewer.
     rows = [
         f"{json.dumps(name)}: [{', '.join(map(_shortest, curve))}]"
         for name, curve in zip(clip.names, clip.curves, strict=True)
@@ -66,16 +66,16 @@ def json_text(clip: Clip) -> str:
 
 
 def curve_table_text(clip: Clip, *, is_json: bool) -> str:
-    """A curve table as Unreal Engine imports it: a row for each curve, a column for each time.
+    """A curve table for Unreal Engine's import: a row per curve, a column per time.
 
-    A control is called as the curves of MetaHuman animations are: CTRL_expressions_jawOpen.
+    Names are spelled as the curves of MetaHuman animations: CTRL_expressions_jawOpen.
 
     Args:
-        clip: of raw controls.
-        is_json: the rows as JSON; else as CSV, whose first cell Unreal passes over.
+        clip: clip of raw controls.
+        is_json: True: JSON; False: CSV, whose first cell Unreal ignores.
 
     Raises:
-        ValueError: a value that is not finite, or two controls that get one name.
+        ValueError: a value that is not finite, or two controls whose names become equal.
     """
     _check_finite(clip, "a curve table")
     names = [_UNREAL.sub("_", name) for name in clip.names]
@@ -99,7 +99,7 @@ def curve_table_text(clip: Clip, *, is_json: bool) -> str:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a text file atomically.
+    """Writes a text file atomically.
 
     Args:
         text: the new content, written as UTF-8.
@@ -123,7 +123,7 @@ def _check_finite(clip: Clip, kind: str) -> None:
 
 
 def mapping_with(base: str, rows: Mapping[str, Mapping[str, float]]) -> str:
-    """The TOML of a mapping with additional rows, for load_mapping.
+    """A mapping as TOML, with additional rows; load_mapping reads it.
 
     Args:
         base: name of a built-in mapping, path of another, or "" for none. Comments of a file are
@@ -131,7 +131,7 @@ def mapping_with(base: str, rows: Mapping[str, Mapping[str, float]]) -> str:
         rows: curve -> {control, or @expression: weight}; an empty row ignores the curve.
 
     Raises:
-        MappingError: a base that cannot be read. TomlError.
+        MappingError: a base that cannot be read. TomlError: a name or value that TOML cannot store.
     """
     if base:
         load_mapping(base)  # raises the error if it is invalid

@@ -15,12 +15,12 @@ from ..base.errors import ArgumentError
 from ..base.words import counted
 from .poses import Pose, motions_at
 
-_AT_ONCE = 1 << 15  # joints that are posed at once
-_LOOKED_AT = 6000  # number of vertices that is enough to rank correctives
+_AT_ONCE = 1 << 15  # limits the number of joints that are posed together
+_LOOKED_AT = 6000  # largest number of vertices that is needed to rank correctives
 
 
 def needed_correctives(dna: Dna) -> set[int]:
-    """Rows of correctives, from 0, that networks, solvers' poses, twists or maps read."""
+    """Rows of correctives, from 0, that networks, solvers' poses, twists or animated maps read."""
     raw = len(dna.raw_control_names)
     read: list[object] = [dna.animated_maps.conditionals.input_indices]
     read += [n.input_indices for n in dna.machine_learned_behavior.neural_networks]
@@ -40,13 +40,13 @@ def needed_correctives(dna: Dna) -> set[int]:
 
 
 def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
-    """float64[correctives]: root of the summed squared displacements that each corrective adds to
-    the vertices of the finest level, with all of its controls at 1, in the file's unit.
+    """float64[correctives]: root of the sum of squared displacements that a corrective adds to the
+    vertices of the finest LOD, with all of its controls at 1, in the file's unit.
 
     Args:
         dna: the face.
         rig: compiled from it.
-        poses: poses of poses_of; a corrective without a pose counts 0.
+        poses: from poses_of; a corrective without a pose gets 0.
     """
     out = np.zeros(dna.psd_count)
     mine = [pose for pose in poses if pose.input >= len(dna.raw_control_names)]
@@ -76,14 +76,14 @@ def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
 
 
 def middle_of(dna: Dna) -> Doubles:
-    """float64[3]: the middle of the bounding box of all meshes."""
+    """float64[3]: the centre of the bounding box of all meshes."""
     points = [np.asarray(mesh.positions, np.float64) for mesh in dna.meshes]
     whole = np.concatenate([*points, np.zeros((0, 3))])
     return (whole.min(axis=0) + whole.max(axis=0)) / 2 if len(whole) else np.zeros(3)
 
 
 class _Spread:
-    """The displacements of a mesh's vertices by its joints and shapes."""
+    """The vertex displacements of one mesh by motions of its joints and by its blend shapes."""
 
     def __init__(self, dna: Dna, mesh: Mesh, middle: Doubles, step: int) -> None:
         points = np.asarray(mesh.positions, np.float64)[::step] - middle
@@ -93,7 +93,7 @@ class _Spread:
         self.shapes = {column: shape[::step] for column, shape in shapes.items()}
 
     def squares(self, motions: Doubles, inputs: Doubles, values: Doubles) -> Doubles:
-        """float64[n]: summed squared displacements of each motion and its shape."""
+        """float64[n]: sum of squared displacements for each motion and the shape of its input."""
         out = np.zeros(len(motions))
         for at, motion in enumerate(motions):
             way = self.skin.moved(motion + np.eye(3, 4))
@@ -105,16 +105,17 @@ class _Spread:
 
 
 def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int]:
-    """Rows of the correctives to remove, from 0, in the order of their contribution. A corrective
-    that a remaining one is made of is never removed.
+    """Rows of the correctives to remove, from 0, ascending: those with the least contribution.
+
+    A corrective that a remaining corrective reads is never removed.
 
     Args:
         dna: the face.
         leaving: number of correctives to remove.
-        contribution: float64[correctives].
+        contribution: float64[correctives], see `contributions`.
 
     Raises:
-        ArgumentError: correctives that others read would have to be removed.
+        ArgumentError: the number can only be reached by removing correctives that others read.
     """
     raw = len(dna.raw_control_names)
     readers: dict[int, set[int]] = {}
@@ -137,14 +138,14 @@ def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int
 
 
 def require_correctives(dna: Dna, correctives: int) -> None:
-    """Check a number of correctives.
+    """Checks the number of correctives to keep.
 
     Args:
         dna: the face.
-        correctives: the number to keep.
+        correctives: number of correctives to keep.
 
     Raises:
-        ArgumentError: the face has no correctives, or fewer.
+        ArgumentError: the face has no correctives, or fewer than this.
     """
     if not dna.psd_count:
         raise ArgumentError("correctives: the face has none, so that none can be taken out")

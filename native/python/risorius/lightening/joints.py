@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Selects the joints that a face can lose: repeatedly the joint whose vertices other joints move
-most similarly."""
+"""Selects joints to remove: repeatedly the joint that other joints replace with the least error."""
 
 from __future__ import annotations
 
@@ -17,8 +16,8 @@ from ..base.words import counted
 from ..rigs.joint_controls import joint_controls
 from .simplex import shares
 
-_HEIRS = 5  # joints that may take over the vertices of one joint
-# Joints that users and programs turn, look up or attach objects to.
+_HEIRS = 5  # joints that may take over the vertices of a removed joint
+# Joints that stay because users and programs rotate them or attach objects to them.
 _NEEDED = re.compile(
     r"root|pelvis|hips|spine.*|neck.*|head|facial_c_(facialroot|jaw|neck.*root)|jaw"
     r"|facial_[lr]_eye|(eye_?[lr]|[lr]_?eye)"
@@ -26,12 +25,12 @@ _NEEDED = re.compile(
 
 
 def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
-    """Joints that must stay: neck, head, jaw, eyes and root by their names, joints with rotation
-    controls, joints that networks, twists and swings move, and all ancestors of these.
+    """Indices of joints that must stay: neck, head, jaw, eyes and root by their names, joints with
+    rotation controls, joints that networks, twists and swings move, and all their ancestors.
 
     Args:
         dna: the face.
-        asked: names of further joints.
+        asked: names of further joints that must stay.
 
     Raises:
         ArgumentError: an unknown name.
@@ -59,7 +58,7 @@ def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
 
 
 def mirrored_joints(dna: Dna) -> Ints:
-    """int64[joints]: the joint at the mirrored place on the other side, otherwise the joint itself.
+    """int64[joints]: the joint at the mirrored position on the other side, or the joint itself.
 
     Args:
         dna: the face.
@@ -80,7 +79,7 @@ def mirrored_joints(dna: Dna) -> Ints:
 
 
 class Leaving:
-    """Removes joints one after the other; each gives its vertices to the most similar joints."""
+    """Removes joints one after the other; other joints, its heirs, take over its vertices."""
 
     def __init__(
         self,
@@ -89,13 +88,12 @@ class Leaving:
         held: list[tuple[Ints, Doubles]],
         importance: Doubles,
     ) -> None:
-        """Start with all joints.
+        """Starts with all joints.
 
         Args:
-            products: float64[J, 4, J, 4]: products of the motions of two joints, summed over all
-                poses.
-            points: float64[V, 4], vertices of all meshes, (p, 1).
-            held: vertices and weights of each joint.
+            products: float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
+            points: float64[V, 4], vertices of all meshes in homogeneous coordinates.
+            held: (indices of vertices, weights) of each joint.
             importance: float64[V], weight of a vertex's squared error.
         """
         count = len(held)
@@ -110,14 +108,15 @@ class Leaving:
     def choose(
         self, leaving: int, fixed: Sequence[int], parents: Ints, pairs: Ints, levels: Doubles
     ) -> list[int]:
-        """The removed joints, in order.
+        """Removes joints, and returns them in the order of removal.
 
         Args:
             leaving: number of joints to remove.
             fixed: joints that must stay.
-            parents: int64[J]; a joint stays as long as it has children.
-            pairs: int64[J], the joint on the other side.
-            levels: bool[J, levels], the levels that list a joint; its heirs are listed there too.
+            parents: int64[J]; a joint stays until all of its children are removed.
+            pairs: int64[J], the mirrored joint; both are removed together.
+            levels: bool[J, levels], the LODs that list a joint; its heirs must be listed in these
+                too.
         """
         self.levels = levels
         can = np.ones(len(parents), bool)
@@ -150,8 +149,8 @@ class Leaving:
         return out
 
     def _price(self, joint: int) -> None:
-        """The squared error of a joint's vertices if the best mixture of other joints takes
-        them."""
+        """Sets a joint's cost: the squared error of its vertices if the best mixture of other
+        joints takes them over."""
         vertices, weights = self.held[joint]
         rows = self.points[vertices]
         spread = (rows * (self.importance[vertices] * weights**2)[:, None]).T @ rows
@@ -192,15 +191,15 @@ class Leaving:
 
 
 def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
-    """Check a number of joints.
+    """Checks the number of joints to keep.
 
     Args:
         dna: the face.
-        joints: the requested number.
+        joints: number of joints to keep.
         needed: joints that must stay.
 
     Raises:
-        ArgumentError: more joints than the face has, or fewer than must stay.
+        ArgumentError: more joints than the face has, or fewer than the joints that must stay.
     """
     there = len(dna.joint_names)
     if joints > there:
@@ -217,7 +216,7 @@ def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
 
 
 def joint_table(dna: Dna) -> Doubles:
-    """bool[J, levels]: the joints that each level lists; all if the file has no list.
+    """bool[J, levels]: the joints that each LOD lists; True for all if the file has no list.
 
     Args:
         dna: the face.
@@ -231,7 +230,7 @@ def joint_table(dna: Dna) -> Doubles:
 
 
 def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubles]]:
-    """The vertices of each joint, numbered over all meshes, and their weights.
+    """(indices of vertices, weights) of each joint; indices count over all meshes.
 
     Args:
         meshes: meshes of the face.
@@ -251,4 +250,4 @@ def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubl
     ends = np.cumsum(np.bincount(owner, minlength=joints))[:-1]
     return list(
         zip(np.split(vertex[order], ends), np.split(weight[order], ends), strict=True)
-    )  # a vertex may list a joint twice: both weights count
+    )  # a vertex may list a joint twice, and both weights count

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes a finished face lighter: fewer joints, correctives and levels of detail.
 
-Dna --levels--> --correctives--> --joints, weights refitted--> --blend shapes--> Dna
+Order of the steps: levels, correctives, joints with refitted weights, blend shapes.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from .weights import Refit
 
 Progress = Callable[[float], bool | None]
 
-_ROUNDS = 4  # of choosing joints and refitting weights
-_BETTER = 0.97  # another round needs an error below this share of the last one
-_FIGHT = 1.0  # how much the importance of a pose grows with its error
-# Limits of the tables of joint motions in all poses.
+_ROUNDS = 4  # largest number of rounds of choosing joints and refitting weights
+_BETTER = 0.97  # a further round follows if the error is below this fraction of the last one
+_FIGHT = 1.0  # exponent by which the importance of a pose grows with its error
+# Memory limit of the tables of joint motions: bytes, and bytes per byte of the face.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 
 @dataclass
 class Size:
-    """The contents and the costs of a face."""
+    """Numbers of parts of a face, its file size, and the duration of an evaluation."""
 
     joints: int
     correctives: int
@@ -52,17 +52,17 @@ class Size:
     meshes: int
     channels: int
     deltas: int
-    coefficients: int  # of joint groups, zeros included
+    coefficients: int  # coefficients of joint groups, including zeros
     file_bytes: int
-    microseconds: float  # of one evaluation at the finest level
+    microseconds: float  # median duration of one evaluation at LOD 0
 
     @classmethod
     def of(cls, dna: Dna, file_bytes: int, rig: Rig) -> Size:
-        """Measure a face.
+        """Counts the parts of a face and measures its speed.
 
         Args:
             dna: the face.
-            file_bytes: size of its file.
+            file_bytes: size of its file in bytes.
             rig: compiled from it.
         """
         return cls(
@@ -80,22 +80,23 @@ class Size:
 
 @dataclass
 class ExpressionError:
-    """The error of the lighter face in one pose, over all kept levels."""
+    """The error of the lighter face in one pose, over all kept LODs."""
 
-    name: str  # of the control, or of a corrective's controls joined by +
+    name: str  # name of the control, or names of a corrective's controls joined by +
     largest_mm: float
-    rms_mm: float  # of the level with the largest error
-    lod: int  # of the lighter face
-    corrective: str  # "": a single control; otherwise "kept" or "removed"
+    rms_mm: float  # of the LOD with the largest error
+    lod: int  # the LOD with the largest error, numbered as in the lighter face
+    # "": the pose of a single control; otherwise whether the corrective was "kept" or "removed"
+    corrective: str
 
 
 @dataclass
 class LightenReport:
-    """The result of lighten."""
+    """The sizes before and after `lighten`, the removed parts, and the remaining errors."""
 
     before: Size
     after: Size
-    lods: list[int]  # kept levels, in the numbering of the input
+    lods: list[int]  # kept LODs, in the numbering of the input
     removed_joints: list[str] = field(default_factory=list)
     removed_correctives: list[str] = field(default_factory=list)
     expressions: list[ExpressionError] = field(default_factory=list)
@@ -103,7 +104,7 @@ class LightenReport:
 
 @dataclass
 class _Work:
-    """The face with the remaining levels, and the poses in which it is compared."""
+    """The source face with the kept LODs, and the poses in which faces are compared."""
 
     dna: Dna
     poses: list[Pose]
@@ -122,32 +123,32 @@ def lighten(
     measured: bool = True,
     progress: Progress | None = None,
 ) -> tuple[Dna, LightenReport]:
-    """The same face with fewer joints, correctives and levels of detail.
+    """A copy of a face with fewer joints, correctives and levels of detail.
 
-    Raw and GUI controls keep their names and numbers; remaining joints keep their names and their
-    motions, so that animation still plays. Joints are removed whose vertices other joints can move
-    with the least error, both sides together; the weights of their vertices are refitted over all
-    expressions. Correctives are removed that move vertices least. Root, spine, neck, head, jaw and
-    eyes stay, as do joints that networks, twists, swings or rotation controls need, and all
-    ancestors of these.
+    Raw and GUI controls keep their names and numbers; remaining joints keep their names and
+    motions, so animation still plays. Joints are removed in mirrored pairs if other joints can move
+    their vertices with the least error; the weights of these vertices are refitted over all
+    expressions. Correctives that displace vertices least are removed. Root, spine, neck, head, jaw
+    and eyes stay, and joints that networks, twists, swings or rotation controls need, with all
+    their ancestors.
 
     Args:
         dna: a face with meshes; not changed.
-        joints: number of joints to keep; None: all that the levels need.
+        joints: number of joints to keep; None: all that the kept LODs need.
         correctives: number of correctives to keep; None: all.
-        lods: the levels to keep, 0 is the finest; None: all.
+        lods: numbers of the LODs to keep, 0 is the finest; None: all.
         keep: names of further joints that must stay.
-        shapes_mm: vertices with a larger error in mm are corrected by blend shapes; None: none are.
-        measured: whether expressions are compared.
-        progress: called with the share of the work, 0 to 1; returning False stops.
+        shapes_mm: blend shapes correct vertices with a larger error in mm; None: no blend shapes.
+        measured: whether to report the errors of all expressions.
+        progress: called with the fraction of the work done, 0 to 1; returning False stops it.
 
     Returns:
         The lighter face and a report.
 
     Raises:
         ArgumentError: more joints or correctives than the face has, fewer joints than must stay, an
-            unknown level, a face without correctives or meshes, nothing to do.
-        BudgetError: the face's tables would be far larger than its file.
+            unknown LOD, a face without correctives or meshes, or no reduction requested.
+        BudgetError: the intermediate tables would be far larger than the face's file.
         DnaError: an inconsistent face; "stopped" if progress returned False.
     """
     if joints is None and correctives is None and lods is None:
@@ -185,7 +186,7 @@ def lighten(
 
 
 def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
-    """The levels to keep, ascending. Raises: ArgumentError: an unknown level, or none."""
+    """The LODs to keep, ascending. Raises: ArgumentError: an unknown LOD, or an empty list."""
     count = max(1, dna.lod_count)
     if lods is None:
         return list(range(count))
@@ -198,8 +199,7 @@ def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
 
 
 def _require_finite(dna: Dna) -> None:
-    """Raises ArgumentError for weights and coefficients that are not finite; no fit accepts
-    them."""
+    """Raises ArgumentError for weights, coefficients or rest poses that are not finite."""
     for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
         if not np.isfinite(mesh.skin_weights).all():
             raise ArgumentError(f"mesh {name}: skin weights that are finite were expected")
@@ -214,7 +214,7 @@ def _require_finite(dna: Dna) -> None:
 def _require_parts(
     dna: Dna, joints: int | None, correctives: int | None, keep: Sequence[str]
 ) -> None:
-    """Raises ArgumentError for impossible numbers before work begins."""
+    """Raises ArgumentError for impossible numbers of joints or correctives, before the work."""
     if correctives is not None:
         require_correctives(dna, correctives)
     needed = needed_joints(dna, keep)
@@ -223,7 +223,7 @@ def _require_parts(
 
 
 def _check_size(dna: Dna) -> None:
-    """Raises BudgetError if tables would be far larger than the face."""
+    """Raises BudgetError if the intermediate tables would be far larger than the face."""
     budget = Budget(_BASE_BYTES + _BYTES_PER_BYTE * dna.size_in_bytes(), 0)
     joints, raw = len(dna.joint_names), len(dna.raw_control_names)
     poses = raw + dna.psd_count
@@ -237,7 +237,7 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A part of the progress. Raises: DnaError: progress returned False."""
+    """A function that reports progress from `begin` to `end`. Raises: DnaError: it was stopped."""
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:
@@ -247,14 +247,14 @@ def _part(progress: Progress | None, begin: float, end: float) -> Told:
 
 
 def _fewer_correctives(work: _Work, rig: Rig, correctives: int) -> list[int]:
-    """Rows of the correctives to remove, from 0."""
+    """Chooses the correctives to remove: their rows, from 0."""
     contribution = contributions(work.dna, rig, work.poses)
     work.told(1.0)
     return least_correctives(work.dna, work.dna.psd_count - correctives, contribution)
 
 
 def _without(dna: Dna, leaving: Sequence[int]) -> Dna:
-    """The face without some correctives."""
+    """The face without the correctives in `leaving`."""
     if not leaving:
         return dna
     stays = [row not in set(leaving) for row in range(dna.psd_count)]
@@ -262,7 +262,7 @@ def _without(dna: Dna, leaving: Sequence[int]) -> Dna:
 
 
 def _dense(dna: Dna) -> Dna:
-    """The face without columns of 0 and without joint groups that move nothing."""
+    """The face without zero columns in joint groups and without joint groups that move nothing."""
     groups = []
     for group in dna.joint_groups:
         values = np.asarray(group.values)
@@ -285,10 +285,10 @@ def _dense(dna: Dna) -> Dna:
 
 
 def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tuple[Dna, list[int]]:
-    """The face with this number of joints, and the removed joints.
+    """The face with `joints` joints, and the indices of the removed joints.
 
-    Poses with large errors count more in the next round. The result is the round with the smallest
-    largest error at the finest level; rounds end when that error stops falling.
+    Poses with large errors get more importance in the next round. The result is the round whose
+    largest error at LOD 0 is smallest; rounds end when that error stops falling.
     """
     thinning = _Thinning(dna, work.middle, needed_joints(dna, keep))
     counts = np.array([1.0 / np.sqrt(pose.controls) for pose in thinning.poses])
@@ -313,7 +313,7 @@ def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tu
 
 
 class _Thinning:
-    """Removes joints of one face in several rounds."""
+    """The data that all rounds of joint removal of a face share."""
 
     def __init__(self, dna: Dna, middle: Doubles, needed: Sequence[int]) -> None:
         self.dna, self.middle, self.needed = dna, middle, needed
@@ -321,7 +321,7 @@ class _Thinning:
         self.poses = poses_of(dna, self.rig)
         self.parents = np.asarray(dna.joint_parents, np.int64)
         self.table, self.mirrored = joint_table(dna), mirrored_joints(dna)
-        self.level: dict[int, int] = {}  # the finest level of each mesh
+        self.level: dict[int, int] = {}  # index of a mesh -> its finest LOD
         for lod in reversed(range(dna.lod_count)):
             self.level |= {m: lod for m in listed_meshes(dna, lod) if m < len(dna.meshes)}
         self.numbers = sorted(self.level)
@@ -332,10 +332,10 @@ class _Thinning:
         self.rest = sk.world_matrices(dna, np.zeros((len(self.parents), 9)))[:, :3, 3] - middle
 
     def choose(self, joints: int, counts: Doubles) -> tuple[list[int], Leaving]:
-        """The joints to remove, and the object that knows their heirs.
+        """Chooses joints to remove; the returned object has the weights that others take over.
 
         Args:
-            joints: number to keep.
+            joints: number of joints to keep.
             counts: float64[poses], importance of each pose.
         """
         sizes = np.zeros(max(1, self.dna.lod_count))
@@ -358,7 +358,7 @@ class _Thinning:
     def made(
         self, gone: Sequence[int], leaving: Leaving, counts: Doubles, levels: Sequence[int]
     ) -> Dna:
-        """The face without some joints, with weights of some levels refitted."""
+        """The face without the joints `gone`, with refitted weights at the LODs `levels`."""
         stays = np.ones(len(self.parents), bool)
         stays[list(gone)] = False
         out, meshes = copy.copy(self.dna), list(self.dna.meshes)
@@ -377,14 +377,14 @@ class _Thinning:
         return keep_parts(out, joints=stays.tolist(), correctives=[True] * self.dna.psd_count)
 
     def largest(self, made: Dna) -> Doubles:
-        """float64[poses]: the largest error of a vertex of the finest level."""
+        """float64[poses]: the largest error of a vertex of LOD 0, in the file's unit."""
         own = Vertices(made, Rig(made), 0)
         ways = (self.goal.at(pose.raw) - own.at(pose.raw) for pose in self.poses)
         return np.array([np.linalg.norm(way, axis=1).max(initial=0.0) for way in ways])
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of a mesh after the removed joints' vertices were handed over."""
+    """float64[V, J]: weights of one mesh after its removed joints' heirs took over."""
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))
@@ -395,10 +395,10 @@ def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
 def _products(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], counts: Doubles, middle: Doubles
 ) -> Doubles:
-    """float64[J, 4, J, 4]: products of the motions of two joints, summed over all poses.
+    """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
-    For a joint that no pose moves, a shift of its descendants stands in, so that such joints
-    differ.
+    A joint that no pose moves gets the product of a small shift of its descendants, so that still
+    joints differ.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))
@@ -420,8 +420,8 @@ def _products(
 
 
 def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[tuple[Pose, Pose]]:
-    """Each pose of the source with the same pose of the face without some correctives; the input is
-    renumbered, -1 if it was removed."""
+    """Pairs of a source pose and the same pose of the face without the correctives `leaving`; the
+    latter's input is renumbered, -1 for a removed corrective."""
     raw, rows = len(source.raw_control_names), np.ones(source.psd_count, bool)
     rows[list(leaving)] = False
     place: Ints = np.where(rows, np.cumsum(rows) - 1, -1)
@@ -437,7 +437,7 @@ def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[t
 def _compare(
     source: Dna, made: Dna, mates: Sequence[tuple[Pose, Pose]], told: Told
 ) -> list[ExpressionError]:
-    """Errors of all poses, the largest first."""
+    """The errors of all poses, the largest first."""
     poses = [pose for pose, _ in mates]
     largest, rms = errors(source, made, (Rig(source), Rig(made)), poses, told)
     mm = MM.get(source.translation_unit, 10.0)

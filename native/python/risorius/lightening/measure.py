@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Measures the difference between a lighter face and its source, and the cost of each."""
+"""Measures errors between a lighter face and its source, and the speed of a face."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ..author.geometry.skeleton import Doubles
 from ..author.work import listed_meshes
 from .poses import Pose
 
-_ACTIVE = 60  # active controls in a timed pose, as in captures
-_TIMED = 400
+_ACTIVE = 60  # number of active controls in a timed pose, typical of captures
+_TIMED = 400  # evaluations of which the median is taken
 
 Told = Callable[[float], None]
 
 
 class Vertices:
-    """All vertices of a level, as the evaluator poses them."""
+    """All vertices of a LOD, posed by the evaluator."""
 
     def __init__(self, dna: Dna, rig: Rig, lod: int) -> None:
         """Args:
         dna: the face.
         rig: compiled from it.
-        lod: the level.
+        lod: number of the LOD.
         """
         self.meshes = [m for m in listed_meshes(dna, lod) if m < len(dna.meshes)]
         self.counts = [len(dna.meshes[m].positions) for m in self.meshes]
@@ -42,22 +42,22 @@ class Vertices:
         self._probe = Probe(self._skins, points.astype(np.uint32))
 
     def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
-        """float64[V, 3] with these raw controls."""
+        """float64[V, 3]: positions at these raw controls, in the file's unit."""
         return np.asarray(self._probe.positions(raw))
 
 
 def errors(
     before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
 ) -> tuple[Doubles, Doubles]:
-    """float64[poses, levels] each: the largest distance between the vertices of two faces, and its
-    root mean square, in the file's unit.
+    """The largest and the root mean square distance between the vertices of two faces, each
+    float64[poses, levels], in the file's unit.
 
     Args:
         before: one face.
-        after: the other, with the same levels and meshes.
-        rigs: compiled from them.
+        after: the other face, with the same LODs and meshes.
+        rigs: rigs compiled from the two faces.
         poses: poses of both faces.
-        told: called with the share of the work that is done.
+        told: called with the fraction of the work done, 0 to 1.
     """
     levels = max(1, before.lod_count)
     largest, square = np.zeros((2, len(poses), levels))
@@ -74,10 +74,10 @@ def errors(
 
 
 def microseconds(rig: Rig) -> float:
-    """Median time of one evaluation at the finest level with sixty active controls.
+    """Median duration in microseconds of one evaluation at LOD 0 with sixty active controls.
 
     Args:
-        rig: a face.
+        rig: the rig to time.
     """
     rng = np.random.default_rng(0)
     raw = rig.initial_raw_controls

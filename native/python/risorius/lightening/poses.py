@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The poses in which faces are compared: each expression, and each corrective with its controls."""
+"""Makes the poses in which faces are compared: each expression, and each corrective."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from ..rigs.joint_controls import joint_controls
 
-_AT_ONCE = 1 << 16  # joints that are posed at once: 1 kB each
+_AT_ONCE = 1 << 16  # joints that are posed at once, 1 kB of memory each
 
 Floats = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Controls of one pose.
+    """The raw controls of one pose.
 
     Attributes:
         name: name of the control, or of a corrective's controls joined by +.
         raw: float32[R].
-        input: the raw control or corrective, as an index of the control vector.
-        controls: number of raw controls in the pose.
+        input: index in the control vector of the raw control or corrective that the pose tests.
+        controls: number of controls in the pose; a joint's rotation counts as one.
     """
 
     name: str
@@ -37,10 +37,10 @@ class Pose:
 
 
 def poses_of(dna: Dna, rig: Rig) -> list[Pose]:
-    """Each raw control at 1, then each corrective with all of its controls at 1.
+    """A pose per raw control at 1, then a pose per corrective with all of its controls at 1.
 
-    Controls that hold the rotation of a joint have no pose of their own, because their values are
-    not amounts. A pose of a solver stands for the rotations at which it is reached.
+    Controls that are components of a joint's rotation get no pose, because their values are not
+    weights. For a corrective that a pose solver drives, the pose has the solver's rotations.
 
     Args:
         dna: the face.
@@ -64,7 +64,7 @@ def _pose(names: Sequence[str], rest: Floats, values: dict[int, float], source: 
     raw = rest.copy()
     for control, value in values.items():
         raw[control] = value
-    # A solver's pose is named by its joints; the four parts of each rotation would be too long.
+    # The name of a solver's pose has the names of joints, not of their four rotation controls.
     shown = dict.fromkeys(
         names[c].rpartition(".")[0] if names[c].rpartition(".")[2] in ("qx", "qy", "qz", "qw")
         else names[c] for c in values
@@ -73,7 +73,7 @@ def _pose(names: Sequence[str], rest: Floats, values: dict[int, float], source: 
 
 
 class Factors:
-    """The raw controls that make correctives fire."""
+    """Finds the raw controls that activate correctives."""
 
     def __init__(self, dna: Dna) -> None:
         """Args:
@@ -84,7 +84,7 @@ class Factors:
         self._solved = _solver_poses(dna)
 
     def of(self, control: int) -> dict[int, float]:
-        """Values of the raw controls at which a control is 1; empty if there are none."""
+        """Values of the raw controls at which `control` is 1; empty if there are none."""
         values: dict[int, float] = {}
         waiting, seen = [control], set()
         while waiting:
@@ -104,7 +104,7 @@ class Factors:
 
 
 def _solver_poses(dna: Dna) -> dict[int, dict[int, float]]:
-    """For each control that a solver's pose writes: the raw controls at that pose."""
+    """Control that a solver's pose writes -> values of the raw controls at that pose."""
     behavior = dna.rbf_behavior
     at_pose: dict[int, dict[int, float]] = {}
     for solver in behavior.solvers:
@@ -128,11 +128,11 @@ def _solver_poses(dna: Dna) -> dict[int, dict[int, float]]:
 
 
 def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
-    """float64[n, joints, 3, 4]: motions of points that are fixed to joints, about a middle.
+    """float64[n, joints, 3, 4]: motions of points fixed to joints, relative to an origin.
 
     Args:
-        dna: the neutral pose and the tree.
-        deltas: float64[n, joints, 9] relative to the neutral pose.
+        dna: face with the neutral pose and the joint hierarchy.
+        deltas: float64[n, joints, 9], joint transforms relative to the neutral pose.
         middle: float64[3], the origin of the points.
     """
     posed = sk.world_matrices(dna, deltas)
@@ -145,13 +145,13 @@ def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
 def motion_rows(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
 ) -> Iterator[Doubles]:
-    """The motions of joints in poses, in blocks of poses.
+    """The motions of joints in poses, a block of poses at a time; 0 at rest.
 
     Args:
         dna: the face.
         rig: compiled from it.
-        lod: the level that is evaluated.
-        poses: all of them.
+        lod: the LOD that is evaluated.
+        poses: all poses.
         middle: float64[3], the origin of the points.
 
     Yields:
@@ -167,11 +167,11 @@ def motion_rows(
 
 
 def descendants(parents: Ints, joint: int) -> Ints:
-    """The joint and all of its descendants.
+    """Indices of a joint and all of its descendants.
 
     Args:
-        parents: int64[J].
-        joint: an index.
+        parents: int64[J], parent of each joint.
+        joint: index of the joint.
     """
     below = np.zeros(len(parents), bool)
     below[joint] = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Corrects the errors of removed joints by blend shapes."""
+"""Adds blend shapes that correct the errors caused by removed joints."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .measure import Told, Vertices
 from .poses import Pose, motion_rows
 
-_LEAST_VALUE = 1e-3  # a corrective that fires less cannot hold a shape
+_LEAST_VALUE = 1e-3  # a control below this value cannot drive a blend shape
 
 
 def add_shapes(
     before: Dna, after: Dna, poses: Sequence[tuple[Pose, Pose]], tolerance: float, told: Told
 ) -> Dna:
-    """The lighter face with blend shapes where vertices have a larger error than a tolerance.
+    """Adds blend shapes to the lighter face for vertices with a larger error than the tolerance.
 
-    Expressions come first, then correctives of two controls, of three and so on: each holds the
-    remaining error. Only levels that have blend shapes get new ones.
+    Expressions come first, then correctives of two controls, then of more; each step corrects the
+    error that is left. Only LODs that have blend shapes get new ones.
 
     Args:
-        before: the source face, with the same levels and meshes.
+        before: the source face, with the same LODs and meshes.
         after: the lighter face; not changed.
         poses: each pose of before with the same pose of after.
-        tolerance: in the file's unit.
-        told: called with the share of the work that is done.
+        tolerance: allowed error in the file's unit.
+        told: called with the fraction of the work done, 0 to 1.
     """
     stages: dict[int, list[tuple[Pose, Pose]]] = {}
     raw = len(after.raw_control_names)
@@ -49,9 +49,9 @@ def add_shapes(
 def _add_stage(
     before: Dna, after: Dna, old: Rig, poses: Sequence[tuple[Pose, Pose]], tolerance: float
 ) -> Dna:
-    """Blend shapes for some poses, all computed from the same face."""
+    """Adds blend shapes for some poses, all computed from the same lighter face."""
     new = Rig(after)
-    found: dict[tuple[int, int], tuple[Ints, Doubles]] = {}  # mesh, input: vertices, deltas
+    found: dict[tuple[int, int], tuple[Ints, Doubles]] = {}  # (mesh, input) -> (vertices, deltas)
     for lod in range(after.lod_count):
         if not _has_shapes(after, lod):
             continue
@@ -85,7 +85,7 @@ def _has_shapes(dna: Dna, lod: int) -> bool:
 
 
 def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -> Dna:
-    """The face with these deltas added to its own."""
+    """The face with these deltas added to its blend shapes; missing channels are created."""
     out = copy.copy(dna)
     channels = dna.blend_shape_channels
     drives = {
@@ -106,7 +106,7 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 
 
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
-    """Add a channel for each of some inputs, in front, because a level has the first rows only."""
+    """Adds a channel for each input, at the front, because a LOD has only the first rows."""
     if not inputs:
         return {}
     first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names
@@ -129,7 +129,7 @@ def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
 
 
 def _more(mesh: Mesh, shapes: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with deltas added to some channels."""
+    """The mesh with deltas added to the targets of some channels."""
     out, targets = copy.copy(mesh), list(mesh.blend_shape_targets)
     at = {int(target.blend_shape_channel_index): n for n, target in enumerate(targets)}
     for channel, (vertices, deltas) in sorted(shapes.items()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Least squares with shares that are at least 0 and sum to 1."""
+"""Solves least squares problems for weights that are at least 0 and sum to 1."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import numpy as np
 
 from ..author.geometry.skeleton import Doubles
 
-_RIDGE = 1e-7  # of the largest square: makes two joints that move alike share evenly
-_LEAST = 1e-4  # smaller shares are dropped
+_RIDGE = 1e-7  # fraction of the largest diagonal element: joints that move alike get equal weights
+_LEAST = 1e-4  # smaller weights are dropped
 
 
 def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
-    """float64[n, k]: w of each row that minimises w^T G w - 2 b^T w with sum 1 and w >= 0.
+    """float64[n, k]: for each problem, weights w that minimise w^T G w - 2 b^T w.
 
-    Negative shares are removed, all of a row at once, and then the smallest beyond the limit. The
-    result is near the minimum, but not always exact.
+    They are at least 0 and sum to 1. Negative weights of a problem are removed all at once, then
+    the smallest beyond the limit, so the result is near the minimum but not always exact.
 
     Args:
-        grams: float64[n, k, k], symmetric.
-        rights: float64[n, k].
-        most: largest number of shares in a row.
+        grams: float64[n, k, k], G of each problem, symmetric.
+        rights: float64[n, k], b of each problem.
+        most: largest number of weights above 0 per problem.
     """
     count, size = rights.shape
     active = np.ones((count, size), bool)
@@ -45,7 +45,7 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """The minimum with sum 1 over active shares of any sign; others are 0."""
+    """Minimises with sum 1 over the active weights, which may be negative; the others are 0."""
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Refits skin weights to the remaining joints, so that vertices move as before."""
+"""Refits skin weights to the remaining joints, so that vertices move as in the source face."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
-_MOST = 12  # largest number of influences of a vertex, as usual for such faces
-_TAKEN_OVER, _NEAR = 14, 6  # joints that a vertex tries
-_AT_ONCE = 512  # vertices
-_EVEN = 3e-3  # pull towards the weights of the heirs, which are smooth
+_MOST = 12  # largest number of joints per vertex, usual for such faces
+_TAKEN_OVER, _NEAR = 14, 6  # joints that are tried per vertex: heirs, and nearest joints
+_AT_ONCE = 512  # number of vertices that are refitted together
+_EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth
 
 
 class Refit:
-    """Refits the weights of one mesh by products of joint motions over all poses."""
+    """Refits the weights of meshes of one LOD, from products of joint motions over all poses."""
 
     def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
         """Args:
-        products: float64[J, 4, J, 4] of the mesh's level, see joints.Leaving.
-        places: float64[J, 3], rest positions of the joints relative to the middle.
+        products: float64[J, 4, J, 4] at the LOD, see joints.Leaving.
+        places: float64[J, 3], rest positions of the joints relative to the face's middle.
         parents: int64[J].
-        kept: remaining joints that the level lists, ascending.
+        kept: indices of the remaining joints that the LOD lists, ascending.
         """
         self.products = np.ascontiguousarray(products.transpose(0, 2, 1, 3))
         self.places, self.parents, self.kept = places, parents, kept
 
     def refit(self, mesh: Mesh, points: Doubles, rows: Doubles) -> Mesh:
-        """The mesh with weights on the remaining joints.
+        """The mesh with weights of the remaining joints only.
 
-        Vertices whose joints all remain keep their weights to the last bit.
+        Vertices whose joints all remain keep their weights exactly.
 
         Args:
-            mesh: with its old weights.
-            points: float64[V, 3] relative to the middle.
-            rows: float64[V, J], weights after the heirs took over.
+            mesh: the mesh with its old weights.
+            points: float64[V, 3], vertices relative to the face's middle.
+            rows: float64[V, J], weights after other joints took over.
         """
         had = sk.dense_weights(mesh, len(self.places))
         stays = np.zeros(len(self.places), bool)
@@ -59,7 +59,7 @@ class Refit:
     def _some(
         self, points: Doubles, had: Doubles, rows: Doubles, most: int
     ) -> tuple[Ints, Doubles]:
-        """Joints and weights [n, k] of some vertices."""
+        """Joints and weights, both [n, k], of n vertices."""
         own = np.argsort(-had, axis=1, kind="stable")[:, : int((had > 0).sum(axis=1).max())]
         held = np.take_along_axis(had, own, axis=1)
         tried = self._tried(points, rows)
@@ -74,10 +74,10 @@ class Refit:
         )  # fmt: skip
         start = np.take_along_axis(rows, tried, axis=1)
         same = (tried[:, :, None] == tried[:, None]) & np.tri(tried.shape[1], k=-1, dtype=bool)
-        twice = same.any(axis=2)  # the joint is listed already
+        twice = same.any(axis=2)  # True for a joint that is already in the vertex's list
         start[twice] = 0
         start /= np.maximum(start.sum(axis=1, keepdims=True), 1e-30)
-        # Makes the second entry of a repeated joint useless.
+        # Makes the repeated entry so costly that its weight becomes 0.
         at = np.arange(tried.shape[1])
         diagonal = np.einsum("vkk->vk", gram)
         gram[:, at, at] += np.where(twice, 1e3 * diagonal.max(axis=1, keepdims=True) + 1e-12, 0)
@@ -87,7 +87,7 @@ class Refit:
         return tried, found
 
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
-        """int64[n, k]: heirs, near joints, and the parent of the first."""
+        """int64[n, k]: joints that took over, nearest joints, and the parent of the first one."""
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
         apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)
@@ -98,7 +98,7 @@ class Refit:
 
 
 def _with_rows(mesh: Mesh, rows: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with new weights of some vertices."""
+    """The mesh with new joints and weights of some vertices."""
     out = copy.copy(mesh)
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     joints = np.split(np.asarray(mesh.skin_joint_indices, np.int64), offsets[1:-1])

@@ -9,9 +9,9 @@ A packet is big-endian and has one of these versions:
     6      version u8, device, subject, frame i32, sub-frame f32, rate i32, denominator i32,
            count u8, count x f32
 
-A text is a length u32 and that number of bytes of UTF-8, without a final zero. Version 6 counts
-frames from midnight. While the app sees no face it sends only the head of the packet. The values
-are in the order of NAMES; 51 or 52 values are a face without rotations.
+A text is a u32 length and that number of UTF-8 bytes, without a final zero. Version 6 counts frames
+from midnight. While the app sees no face, the packet ends after the subject. Values are in the
+order of NAMES; packets of 51 or 52 values have no rotations.
 """
 
 from __future__ import annotations
@@ -28,26 +28,25 @@ _TURNS = ("yaw", "pitch", "roll")
 _ANGLES = [f"{part}.{turn}" for part in ("head", "eyeL", "eyeR") for turn in _TURNS]
 NAMES = (*arkit.order("live_link_face_packet"), *_ANGLES)
 _SHAPES = 52
-# Found in a recording of the app: an eye that looks down has a positive pitch, one that looks to
-# its own right a positive yaw, and its roll has the sign of an eye that turns only up and aside.
-# The axes therefore point out of the back of the head, to its own left and up; the head uses the
-# same axes.
+# Signs found in a recording of the app: pitch is positive for an eye that looks down, yaw for an
+# eye that looks to its own right. The app's axes therefore point out of the back of the head, to
+# the head's own left and up; the head's rotation uses the same axes.
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(NAMES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
-_LARGEST = 100.0  # no blend shape and no angle of a face is larger
+_LARGEST = 100.0  # larger values are no blend shapes or angles of a face
 
 
 class NoFace(LiveError):  # noqa: N818  not an error of the sender
-    """A valid packet of a phone that sees no face."""
+    """A valid packet without values, because the phone sees no face."""
 
 
 def decode(data: bytes) -> Packet:
-    """Decode a packet.
+    """Decodes a packet.
 
     Raises:
         NoFace: the packet has no values.
-        LiveError: not a packet of Live Link Face; the sentence says where it differs.
+        LiveError: not a packet of Live Link Face; the message names the difference.
     """
     if not data:
         raise LiveError("an empty packet")
@@ -99,7 +98,7 @@ def _of_timestamp(data: bytes, place: int) -> tuple[float | None, int]:
 def _of_timecode(data: bytes, place: int) -> tuple[float | None, int]:
     _need(data, place, 21)
     hours, minutes, seconds, frames = struct.unpack_from(">4i", data, place)
-    # Engines differ in sending the byte for drop frame: the length of the packet tells.
+    # Some engines send the drop-frame byte, others do not: the length of the packet shows it.
     place += 16 if _fits(data, place + 20) or not _fits(data, place + 21) else 17
     _need(data, place, 5)
     (rate,) = struct.unpack_from(">I", data, place)

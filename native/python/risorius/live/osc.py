@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Decodes faces over OSC: VMC, Face Cap and similar apps, and plain messages with a name and a
-value.
+"""Decodes faces over OSC: VMC, Face Cap and similar apps, and messages with a name and a value.
 
     /VMC/Ext/Blend/Val  name value      a blend shape; /VMC/Ext/Blend/Apply ends the face
     /VMC/Ext/Bone/Pos   name px py pz qx qy qz qw     Neck, Head, LeftEye and RightEye are used
     /W index value                      a unit by its index in FACE_CAP
     /HRQ x y z w, /HR x y z             the head, as a quaternion or in degrees
     /ELR x y, /ERR x y                  the eyes, in degrees
-    /any/path/name value                anything else
+    /any/path/name value                any other value, by the last part of the path
 
-Messages arrive singly or in bundles. A face is complete at its Apply. If the sender sends none, it
-is complete at the end of a bundle, when a message repeats one of its names, or when no further
-message arrives.
+Messages arrive singly or in bundles. A face is complete at its Apply message. If the sender sends
+no Apply, a face is complete at the end of a bundle, when a message repeats one of its names, or
+after a short silence.
 """
 
 from __future__ import annotations
@@ -40,12 +39,12 @@ _NEEDS = "OSC needs the package python-osc, which is not installed: pip install 
 
 
 def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
-    """The messages of a packet and of its bundles, in their order.
+    """The messages of a packet and of its nested bundles, in order.
 
-    The sizes inside are checked here, because python-osc loops for ever on a negative one.
+    Sizes of parts are checked here, because python-osc loops endlessly on a negative size.
 
     Args:
-        data: the packet.
+        data: bytes of the packet.
         depth: number of enclosing bundles.
 
     Raises:
@@ -69,7 +68,7 @@ def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
 
 
 def bundle_time(data: bytes) -> float | None:
-    """Seconds since 1970 in a bundle's time tag; None for "at once" and for a message."""
+    """Time tag of a bundle in seconds since 1970; None for "immediately" and for a message."""
     if not data.startswith(_BUNDLE) or len(data) < 16:
         return None
     whole, part = struct.unpack_from(">II", data, 8)
@@ -77,7 +76,7 @@ def bundle_time(data: bytes) -> float | None:
 
 
 def require() -> None:
-    """Raise an error early if python-osc is missing. Raises: LiveError."""
+    """Raises LiveError if python-osc is missing, so that the error comes before any packet."""
     try:
         import pythonosc  # noqa: F401
     except ImportError as error:
@@ -99,28 +98,28 @@ def _message(data: bytes) -> tuple[str, list[Any]]:
 
 
 class Decoder:
-    """Combines the messages of all senders into faces.
+    """Combines the messages of each sender into faces.
 
     Args:
-        wanted: whether a sender gets a place before all others and keeps it.
+        wanted: whether a sender's address has priority for a place and keeps it.
     """
 
     def __init__(self, wanted: Callable[[str], bool] = lambda _sender: False) -> None:
         self._faces: Roster[str, _Face] = Roster(lambda face: wanted(face.sender))
 
     def feed(self, data: bytes, sender: str, now: float | None = None) -> list[Packet]:
-        """Process a packet.
+        """Processes a packet.
 
         Args:
-            data: its bytes.
-            sender: its sender, the subject of its faces.
-            now: seconds of this machine's perf_counter; None: read it.
+            data: bytes of the packet.
+            sender: address of the sender, which becomes the subject of its faces.
+            now: time of arrival in seconds of perf_counter; None: the present time.
 
         Returns:
-            The faces that it completes.
+            The faces that the packet completes.
 
         Raises:
-            LiveError: not OSC, or an impossible value; earlier values stay.
+            LiveError: not OSC, or an impossible value; values of earlier messages are kept.
         """
         found = list(messages(data))
         now = perf_counter() if now is None else now
@@ -141,22 +140,22 @@ class Decoder:
         return done
 
     def pending(self) -> bool:
-        """Whether a face waits that only silence can complete."""
+        """Whether a face is incomplete whose end only silence can mark."""
         return any(face.fresh and not face.applies for face in self._faces)
 
     def flush(self) -> list[Packet]:
-        """The faces that only silence completes."""
+        """Completes the faces whose end only silence can mark, and returns them."""
         waiting = [face for face in self._faces if face.fresh and not face.applies]
         return [packet for face in waiting if (packet := face.finish())]
 
 
 class _Face:
-    """The latest values of one sender; a name that is not sent keeps its value."""
+    """The latest values of one sender; a name that the sender omits keeps its value."""
 
     def __init__(self, sender: str) -> None:
         self.sender = sender
         self.values: dict[str, float] = {}
-        self._age: dict[str, int] = {}  # name -> number of the last face with a value for it
+        self._age: dict[str, int] = {}  # name -> number of the last face that changed it
         self._number = 0
         self.bones: dict[str, tuple[float, ...]] = {}
         self.fresh: set[str] = set()
@@ -165,7 +164,7 @@ class _Face:
         self.quaternion = False
 
     def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
-        """Process a message. Returns: the face that ends before it, or with it."""
+        """Processes a message. Returns: the face that ends before it, or with it, or None."""
         if address == "/VMC/Ext/Blend/Apply":
             self.applies = True
             return self.finish()
@@ -188,7 +187,7 @@ class _Face:
         return done
 
     def _make_room(self, changes: dict[str, float]) -> None:
-        """Forget the names that were not sent for the longest time if there are too many."""
+        """If there are too many names, drops the names that were not sent for the longest time."""
         if len(self.values.keys() | changes.keys()) <= _MOST_NAMES:
             return
         others = sorted(self._age.keys() - changes.keys(), key=self._age.__getitem__)
@@ -197,7 +196,7 @@ class _Face:
             self.fresh.discard(name)
 
     def finish(self) -> Packet | None:
-        """The face with its present values, if any of them is new."""
+        """The face with the latest values, or None if no value is new."""
         if not self.fresh:
             return None
         self.fresh.clear()
@@ -207,7 +206,7 @@ class _Face:
 
 
 def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
-    """The first `count` values as numbers that a face may have."""
+    """The first `count` values as floats, if all are plausible for a face."""
     if len(values) < count:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
@@ -260,14 +259,15 @@ def _bone(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
 def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     face.quaternion = True
     x, y, z, w = _unit(_numbers(values, 4))
-    # ARKit's axes: own left, up, ahead. In own right, up, ahead two components are negated.
+    # ARKit's axes are own left, up, ahead; changing left to right negates y and z.
     yaw, pitch, roll = _angles((x, -y, -z, w))
     return "HRQ", {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
 
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    if face.quaternion:  # the same rotation, but without a defined order of angles
+    # the sender repeats the quaternion's rotation here, without a defined order of angles
+    if face.quaternion:
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}
 
@@ -288,7 +288,7 @@ def _unit(q: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _angles(q: Iterable[float]) -> tuple[float, float, float]:
-    """Yaw, pitch, roll of a quaternion in the axes own right, up, ahead."""
+    """Yaw, pitch, roll in radians of a quaternion x, y, z, w in the axes own right, up, ahead."""
     x, y, z, w = q
     right = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
     up = np.array([2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)])

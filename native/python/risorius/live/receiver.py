@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Receives faces on a thread: the latest frame of each subject, and recorded takes.
 
-The thread uses only its own data, under one lock that is held just while a frame is handed over.
-Viewers poll whenever they like.
+The thread shares its data under one lock, held only while a frame is handed over. Viewers may poll
+at any time.
 """
 
 from __future__ import annotations
@@ -28,65 +28,67 @@ _TEXT = resources.files(__package__).joinpath("sources.toml").read_text(encoding
 PORTS: dict[str, int] = {name: row["port"] for name, row in toml.parse(_TEXT).items()}
 SOURCES = tuple(PORTS)
 THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-_SILENCE = 0.004  # seconds without a packet that end a face whose sender does not mark its end
-_WINDOW = 0.05  # seconds over which packets are counted
-_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # per window: far more than phones send
-_BUSIEST = 0.02  # seconds per window for reading packets, because large packets take long
-_BACK = 1.0  # seconds; an older packet by less came late, by more: the sender's clock was set back
-_AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours
-_DRIFT = 0.001  # plus this share of the time since its first face, because clocks differ in speed
+_SILENCE = 0.004  # seconds without a packet that end a face if its sender does not mark the end
+_WINDOW = 0.05  # seconds of a window over which packets are counted
+_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # limit per window, far above the rate of phones
+_BUSIEST = 0.02  # seconds per window that reading may take, because large packets take long
+# seconds: a packet older by less came late; older by more, the sender's clock was set back
+_BACK = 1.0
+_AHEAD = 2.0  # seconds that a sender's clock may get ahead of this machine's
+_DRIFT = 0.001  # additional lead per second since its first face, because clocks differ in speed
 _DAY = 86400.0
 
 
-_Key = tuple[str, str, str]  # of a subject: address, device, name
+_Key = tuple[str, str, str]  # of a subject: address, device, subject name
 
 
 class Status(NamedTuple):
-    """Values for a panel or a status line."""
+    """Statistics of the reception, for a panel or a status line."""
 
     packets: int
-    """All packets since the start."""
+    """Number of all packets since the start."""
     frames: int
-    """Accepted faces of all subjects."""
+    """Number of accepted faces of all subjects."""
     per_second: float
-    """Accepted faces of the subject over the last second."""
+    """Accepted faces of the subject in the last second."""
     refused: int
-    """Packets that could not be used."""
+    """Number of packets that could not be used."""
     reasons: tuple[tuple[str, int], ...]
-    """The reasons, the most frequent first."""
+    """(reason, number of refused packets), the most frequent first."""
     late: int
-    """Dropped faces that arrived after a newer one of their subject."""
+    """Number of faces dropped because they arrived after a newer one of their subject."""
     lost: int
-    """Lost faces, estimated from the sender's times."""
+    """Estimated number of lost faces, from gaps in the senders' times."""
     faceless: int
-    """Packets of phones that saw no face."""
+    """Number of packets from phones that saw no face."""
     floods: int
     """Number of times that packets arrived faster than they were read."""
     subjects: tuple[str, ...]
     subject: str
-    """The subject of these values; "" if none was heard."""
+    """The subject that per_second and age belong to; "" if none was heard."""
     age: float | None
-    """Seconds since its last face."""
+    """Seconds since the subject's last face."""
     recording: int
-    """Faces in the running recordings."""
+    """Number of faces in the running recordings."""
 
 
 class _Subject:
-    """One subject: its clock and its latest frame."""
+    """The clock and the latest frame of one subject."""
 
     def __init__(self, label: str) -> None:
         self.label = label
         self.latest: Frame | None = None
         self.lost = 0
         self._offset = 0.0
-        self._sent = 0.0  # the sender's time of the latest frame, including days
+        # the sender's time of the latest frame, plus the days counted at midnights
+        self._sent = 0.0
         self._days = 0.0
-        self._began = (0.0, 0.0)  # time and arrival of the first frame
+        self._began = (0.0, 0.0)  # (time, arrival) of the first frame, seconds
         self._steps: deque[float] = deque(maxlen=31)
         self.arrivals: deque[float] = deque(maxlen=512)
 
     def accept(self, packet: Packet, arrival: float) -> Frame | None:
-        """The packet as a frame, or None if it came late."""
+        """The packet as the subject's next frame, or None if it came late."""
         time = self._own_time(packet.time, arrival)
         if time is None:
             return None
@@ -99,7 +101,7 @@ class _Subject:
         return self.latest
 
     def _own_time(self, sent: float | None, arrival: float) -> float | None:
-        """The sender's time without jumps; the time of arrival if it sends none."""
+        """The time of a frame without jumps, from the sender's time or else the arrival."""
         last = self.latest
         if sent is None:
             return arrival if last is None else max(arrival, last.time)
@@ -108,7 +110,8 @@ class _Subject:
             return sent
         passed = arrival - last.arrival
         step, days = sent + self._days - self._sent, 0.0
-        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:  # midnight
+        # the sender's time of day passed midnight
+        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:
             step, days = step + _DAY, _DAY
         if -_BACK <= step < 0.0:
             return None
@@ -122,10 +125,10 @@ class _Subject:
         return self._sent + self._offset
 
     def _lead(self, time: float, arrival: float) -> float:
-        """Seconds by which the sender's clock would be ahead of ours beyond the tolerance.
+        """Seconds by which the sender's clock is ahead of this machine's beyond the tolerance.
 
-        Counted from the first frame and not from the last one, because tolerances of single packets
-        would add up and make a recording longer than it took.
+        The lead counts from the first frame, because tolerances from frame to frame would add up
+        and make a recording longer than it took.
         """
         passed = arrival - self._began[1]
         return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
@@ -143,12 +146,12 @@ class _Subject:
 
 
 class Receiver:
-    """Listens on a UDP port.
+    """Receives faces on a UDP port in a thread, from `start` to `stop`.
 
     Args:
         source: "livelink" or "osc".
-        port: 0 for any free one; None for the source's own.
-        host: the address to listen on: THIS_MACHINE, or EVERYWHERE for phones.
+        port: number of the port; 0 for any free port; None for the source's usual port.
+        host: address to listen on: THIS_MACHINE, or EVERYWHERE for phones.
     """
 
     def __init__(
@@ -178,7 +181,7 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Start listening. Raises: LiveError: the port is not available or a package is missing."""
+        """Starts to listen. Raises: LiveError: the port is in use, or a package is missing."""
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -190,7 +193,7 @@ class Receiver:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop listening; the latest frames and takes stay."""
+        """Stops listening; the latest frames and takes are kept."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(2.0)
@@ -200,30 +203,30 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; by default of the known subject that was heard first."""
+        """The latest frame of a subject; for "", of the first one heard that still has a place."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
 
     def reserve(self, subjects: Iterable[str]) -> None:
-        """Reserve places for these subjects, independent of other senders.
+        """Reserves places for subjects, so that other senders cannot displace them.
 
-        A subject that is being recorded has a place anyway.
+        A subject that is being recorded keeps its place without a reservation.
 
         Args:
-            subjects: names in the app; they replace earlier reservations.
+            subjects: subject names in the app; they replace earlier reservations.
         """
         self._reserved = frozenset(subjects)
 
     def _kept(self, label: str) -> bool:
-        """Whether a subject keeps its place: a take would jump if its clock restarted."""
+        """Whether a subject keeps its place; a recording would jump if its clock restarted."""
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Record a subject, by default the one heard first, until `finish`.
+        """Records a subject until `finish`; for "", the subject heard first.
 
         Args:
-            limit: largest number of frames, by default half an hour at 60 per second.
+            limit: largest number of frames; the default is half an hour at 60 per second.
         """
         with self._lock:
             found = self._find(subject)
@@ -232,14 +235,14 @@ class Receiver:
         return take
 
     def finish(self, take: Take) -> Take:
-        """End a recording. Returns: the take."""
+        """Ends a recording, and returns its take."""
         with self._lock:
             if take in self._takes:
                 self._takes.remove(take)
         return take
 
     def status(self, subject: str = "") -> Status:
-        """The state of the reception."""
+        """The statistics of the reception, with the rate and age of a subject."""
         now = perf_counter()
         with self._lock:
             found = self._find(subject)
@@ -277,7 +280,7 @@ class Receiver:
             except TimeoutError:
                 self._keep(self._decoder.flush(), perf_counter())
                 continue
-            except OSError:  # Windows reports here that a packet we sent was refused
+            except OSError:  # Windows reports here that a packet sent from this socket was refused
                 continue
             now = perf_counter()
             if now - window >= _WINDOW:
@@ -285,7 +288,7 @@ class Receiver:
             self._take_in(data, sender[0], now)
             seen, spent = seen + 1, spent + perf_counter() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
-                # Further packets wait in the system's buffer and are dropped when it is full, so
+                # Further packets stay in the system's buffer and are dropped when it is full, so
                 # that a flood takes no time from the viewport.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - perf_counter()))
@@ -331,12 +334,12 @@ class Receiver:
                     take.add(frame)
 
     def _subject_of(self, packet: Packet, now: float, sender: str) -> _Subject | None:
-        """The subject of a face; None if there is no room for a new one.
+        """The subject of a packet; None if there is no room for a new one.
 
         Args:
-            packet: a face.
-            now: seconds.
-            sender: its address; for OSC the subject is the address.
+            packet: a decoded packet.
+            now: time of arrival in seconds of perf_counter.
+            sender: address of the sender; for OSC the subject's name is the address.
         """
         key = (sender or packet.subject, packet.device, packet.subject)
         with self._lock:
@@ -350,7 +353,7 @@ class Receiver:
         return subject if added else None
 
     def _free_label(self, packet: Packet, address: str) -> str:
-        """The label of a new subject: its name, or a variant if another subject has that."""
+        """A label for a new subject: its name, with additions if another subject has that label."""
         name, taken = (
             packet.subject or packet.device or "unnamed",
             {s.label for s in self._subjects},
@@ -363,10 +366,10 @@ class Receiver:
 
 
 def own_address() -> str:
-    """The address under which devices in the network find this machine; "" without a network."""
+    """The address of this machine in its network; "" without a network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # nothing is sent, only the route is looked up
+            probe.connect(("192.0.2.1", 9))  # sends nothing, only looks up the route
         except OSError:
             return ""
         found = str(probe.getsockname()[0])
@@ -378,8 +381,8 @@ def _bound(host: str, port: int) -> socket.socket:
         raise LiveError(f"a port of 0 to 65535 was expected, found {port}")
     listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        # SO_REUSEADDR is not set, because two programs could then share the port and one lose the
-        # packets.
+        # SO_REUSEADDR is not set, because two programs could then share the port, and one would
+        # lose the packets.
         listener.bind((host, port))
     except OSError as error:
         listener.close()

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""A bounded list of senders, and the rule by which a sender gives its place to a new one.
+"""A list of senders with limited places, and the rule by which a new sender takes a place.
 
-A flood of invented senders must not displace a phone. Therefore:
+A flood of forged senders must not displace a phone. Therefore:
     a wanted sender (named or recorded) always gets a place and keeps it
     the first sender of each address keeps its place once it has streamed, even while silent
-    an address with several more senders than the newcomer's address gives up one of them
-    any other sender gives way to a newcomer while it is silent
+    an address with at least two more senders than the newcomer's address gives up one of them
+    any other sender is displaced by a newcomer while it is silent
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ Item = TypeVar("Item")
 
 @dataclass
 class _Place(Generic[Item]):
-    """A sender with a place.
+    """A sender's place in the roster.
 
     Attributes:
-        item: its record.
-        address: its address.
+        item: the caller's record of the sender.
+        address: network address of the sender.
         heard: times of its last messages, in seconds.
         streamed: whether it ever sent _STREAM messages within a second.
     """
@@ -52,7 +52,7 @@ class Roster(Generic[Key, Item]):
     """The records of senders, in the order of their first packets.
 
     Args:
-        wanted: whether an item gets a place before all others and keeps it.
+        wanted: whether the sender of a record has priority for a place and keeps it.
         most: number of places.
     """
 
@@ -67,11 +67,11 @@ class Roster(Generic[Key, Item]):
         return (place.item for place in self._places.values())
 
     def hear(self, key: Key, now: float) -> Item | None:
-        """The record of a sender that was heard just now; None for an unknown one.
+        """Notes a message of a sender, and returns its record; None for an unknown sender.
 
         Args:
             key: key of the sender.
-            now: seconds, of a monotonic clock.
+            now: time of the message in seconds of a monotonic clock.
         """
         place = self._places.get(key)
         if place is None:
@@ -80,34 +80,34 @@ class Roster(Generic[Key, Item]):
         return place.item
 
     def move(self, key: Key, same: Callable[[Key], bool], now: float, address: str) -> None:
-        """Move the place of a sender to another key under which it is heard.
+        """Moves a sender's place to the new key under which it is heard.
 
         Args:
-            key: the new key; nothing changes if it is known.
-            same: whether another key belongs to the same sender, which was silent there for a
-                second.
-            now: seconds.
-            address: its new address.
+            key: the new key; nothing changes if the key has a place.
+            same: whether another key belongs to the same sender; that key must have been silent for
+                a second.
+            now: present time in seconds.
+            address: the sender's new network address.
         """
         if key in self._places:
             return
         for old, place in self._places.items():
             if same(old) and place.times(now) == 0:
                 place.address = address
-                # The order of the places stays, because it tells who came first.
+                # The order is kept, because it shows which sender came first.
                 self._places = {key if k == old else k: p for k, p in self._places.items()}
                 return
 
     def add(self, key: Key, item: Item, now: float, address: str = "") -> bool:
-        """Add a sender that was heard for the first time just now.
+        """Adds a sender after its first message.
 
         Args:
-            key, item: the sender and its record.
-            now: seconds.
-            address: its address.
+            key, item: key of the sender and its record.
+            now: time of the message in seconds.
+            address: network address of the sender.
 
         Returns:
-            Whether there was room.
+            Whether the sender got a place.
         """
         for old, place in list(self._places.items()):
             if place.heard[-1] < now - _FORGOTTEN and not self._wanted(place.item):
@@ -122,7 +122,7 @@ class Roster(Generic[Key, Item]):
         return True
 
     def _leaving(self, newcomer: Item, address: str, now: float) -> Key | None:
-        """The sender that gives its place to a newcomer, or None."""
+        """Key of the sender that a newcomer displaces, or None."""
         shares = Counter(place.address for place in self._places.values())
         firsts: dict[str, Key] = {}
         for key, place in self._places.items():

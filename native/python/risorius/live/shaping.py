@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a sender's values to raw controls: calibration, mapping, ranges, gain, smoothing."""
+"""Converts a sender's values to raw controls: calibration, mapping, ranges, gain, smoothing."""
 
 from __future__ import annotations
 
@@ -21,36 +21,36 @@ from .frame import Floats, Frame
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
-_LOOK_AT_ONE = math.radians(30.0)  # rotation of an eye for a look control at 1
-# Cutoff in Hz for a still face with almost no smoothing; a twentieth of it with full smoothing.
+_LOOK_AT_ONE = math.radians(30.0)  # radians of an eye's rotation at which a look control is 1
+# Hz: cutoff at rest with almost no smoothing; with full smoothing it is 5 % of this.
 _STILL = 12.0
 _LONGEST_GAP = 0.5  # seconds without a frame after which the filter restarts
 Row = dict[str, float]
-_SENDERS = "vrm"  # vocabulary of senders that send letters
+_SENDERS = "vrm"  # vocabulary whose one-letter names are accepted
 _ANGLES = {*HEAD, *_EYES, *_IGNORED}
 
 
 class Controls(NamedTuple):
-    """A frame for a rig."""
+    """The controls of one frame."""
 
     names: tuple[str, ...]
-    """Raw controls as a DNA spells them, and head.yaw, head.pitch, head.roll."""
+    """Raw control names as in a DNA file, and head.yaw, head.pitch, head.roll."""
     values: Floats
-    """float32[names]: controls 0 to 1, the head in radians."""
+    """float32[names]: controls from 0 to `Shaper.maximum`, head angles in radians."""
 
 
 class Plan:
-    """The conversion of a sender's names to controls, compiled once for a set of names.
+    """A matrix from a sender's names to controls, compiled once for a tuple of names.
 
     Attributes:
-        controls: the resulting controls.
+        controls: names of the resulting controls.
         matrix: float32[controls, names].
-        shares: index of a control, and of the control of which it takes back a share.
-        adjusted: (index of a control, adjustment of the mapping).
-        unmapped: names without a control that the mapping does not ignore either.
-        is_angle: bool[names].
-        head: bool[controls], the three angles of the head.
-        is_share: bool[controls].
+        shares: (index of a control, index of the control of which it takes back a share).
+        adjusted: (index of a control, its adjustment in the mapping).
+        unmapped: names without a control, except those that the mapping ignores.
+        is_angle: bool[names], whether a name is an angle.
+        head: bool[controls], True for the three angles of the head.
+        is_share: bool[controls], whether a control takes back a share of another.
     """
 
     def __init__(self, names: tuple[str, ...], mapping: Mapping) -> None:
@@ -79,7 +79,7 @@ class Plan:
 
 
 def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
-    """The controls of each name; empty for an ignored name, None for an unknown one."""
+    """{control: weight} of each name; empty for an ignored name, None for an unknown one."""
     find = mapping.finder()
     rows = [found[1] if (found := find(name)) else None for name in names]
     units = sum(bool(row) for row in rows)
@@ -99,12 +99,12 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
 
 
 def _row(said: Meaning, mapping: Mapping) -> Row:
-    """A meaning as controls; its units are converted by the mapping."""
+    """{control: weight} of a vocabulary's name; the mapping converts its ARKit units."""
     return _through(dict(said.units), mapping) if said.units else row_of(said)
 
 
 def _through(row: Row, mapping: Mapping) -> Row:
-    """A row of units as a row of controls."""
+    """Replaces each unit of a row by its controls in the mapping."""
     result: Row = {}
     for unit, weight in row.items():
         for control, share in mapping.rows.get(unit, {}).items():
@@ -113,12 +113,11 @@ def _through(row: Row, mapping: Mapping) -> Row:
 
 
 def _look(name: str, mapping: Mapping) -> Row:
-    """An eye's angle as look controls: one control takes the positive part, the other the
-    negative."""
+    """{look control: weight} of an eye's angle: one for its positive part, one for its negative."""
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):
         ahead, back = f"eyeLookUp{side}", f"eyeLookDown{side}"
-    else:  # to the own left: out for the left eye, in for the right
+    else:  # positive is the own left: out for the left eye, in for the right eye
         ahead, back = ("eyeLookOut", "eyeLookIn") if side == "Left" else ("eyeLookIn", "eyeLookOut")
         ahead, back = ahead + side, back + side
     weight = 1.0 / _LOOK_AT_ONE
@@ -130,23 +129,23 @@ def _new_filter() -> OneEuro:
 
 
 class Shaper:
-    """Turns frames into controls. Use one per subject and thread.
+    """Converts frames to controls. Use one Shaper per subject and thread.
 
     Args:
-        mapping: risorius.importing.Mapping, the name of a built-in one, or a file.
+        mapping: a risorius.importing.Mapping, the name of a built-in one, or the path of a file.
 
     Attributes:
-        mapping: the Mapping; other names may be raw controls, angles of the head, or names of any
+        mapping: the Mapping; names that it lacks may be raw controls, head angles, or names of any
             vocabulary.
-        gain: factor on all units except shares of another control: shut lips stay shut.
-        head_gain: factor on the head's angles; negative reverses them.
-        gains: factors for single units by their name in the frame, in addition to `gain`.
-        smoothing: 0 for none, to 1: a one-euro filter, which calms a still face and passes quick
-            moves.
-        maximum: upper limit of controls.
-        neutral: values of the face at rest, by name; see `capture`.
-        ranges: ranges of the person, applied to the controls before the gain; None: controls are as
-            captured. With `neutral` only their extremes are used.
+        gain: factor on all controls except shares of another control, so that shut lips stay shut.
+        head_gain: factor on the head's angles; a negative factor reverses them.
+        gains: name in the frame -> factor, in addition to `gain`.
+        smoothing: strength of the one-euro filter, 0 (none) to 1; it calms a still face and passes
+            quick movements.
+        maximum: upper limit of control values.
+        neutral: values of the face at rest, by name in the frame; see `capture`.
+        ranges: the person's ranges, applied to controls before the gain; None: no remapping. If
+            `neutral` is set, only the extremes of the ranges are used.
     """
 
     def __init__(
@@ -158,7 +157,7 @@ class Shaper:
         head_gain: float = 1.0,
         maximum: float = 1.0,
     ) -> None:
-        """Load the mapping. Raises: risorius.importing.MappingError."""
+        """Loads the mapping. Raises: risorius.importing.MappingError: it cannot be loaded."""
         self.mapping = load_mapping(mapping)
         self.smoothing = smoothing
         self.gain, self.head_gain, self.maximum = gain, head_gain, maximum
@@ -179,7 +178,7 @@ class Shaper:
         self._ranges, self._remap = ranges, None
 
     def plan(self, names: tuple[str, ...]) -> Plan:
-        """The plan for these names; kept because the next frame mostly has the same names."""
+        """The plan for these names, kept because the next frame usually has the same names."""
         if self._plan is None or names != self._names:
             self._plan, self._names = Plan(names, self.mapping), names
             self._filter, self._remap = _new_filter(), None
@@ -191,31 +190,31 @@ class Shaper:
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
-        """Use a frame as the face at rest; None forgets it."""
+        """Uses a frame as the face at rest; None removes it."""
         self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
 
     @property
     def unmapped(self) -> tuple[str, ...]:
-        """Names of the last frame that move nothing."""
+        """Names of the last frame that have no control."""
         return self._plan.unmapped if self._plan else ()
 
     def without_smoothing(self) -> Shaper:
-        """A Shaper with the same settings except smoothing, for a recording."""
+        """A Shaper with the same settings but without smoothing, for a recording."""
         other = Shaper(self.mapping, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
         other.gains, other.neutral = dict(self.gains), dict(self.neutral)
         other.ranges = self.ranges
         return other
 
     def apply(self, frame: Frame) -> Controls:
-        """The controls of a frame. Call it in the order of the frames' times."""
+        """The controls of a frame. Call it in ascending order of the frames' times."""
         plan = self.plan(frame.names)
         values = plain = self._calibrated(frame, plan.is_angle)
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
-        # Of the captured values, because a gain of the jaw must not part the lips.
+        # Shares use values before `gains`, because a gain of the jaw must not part the lips.
         for place, whole in plan.shares:
             result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:
@@ -231,7 +230,7 @@ class Shaper:
         return Controls(plan.controls, result)
 
     def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
-        """Values minus the face at rest, rescaled so that a unit still reaches 1."""
+        """Values minus the face at rest, rescaled so that a blend shape still reaches 1."""
         if not self.neutral:
             return frame.values
         rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)

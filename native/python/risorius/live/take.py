@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A recording: the frames of one subject, unchanged."""
+"""A recording of the unchanged frames of one subject."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .shaping import Plan, Shaper
 
 
 class Take:
-    """Frames of one subject with their times, in order; gaps are kept.
+    """The recorded frames of one subject, in order of time; gaps are kept.
 
     Attributes:
-        subject: whom it follows; "" until the first frame decides.
-        full: frames that came after the limit was reached, and are not in it.
+        subject: the recorded subject; "" until the first frame determines it.
+        full: number of frames that arrived after the limit was reached, and were dropped.
     """
 
     def __init__(self, subject: str = "", limit: int = 108_000) -> None:
@@ -28,7 +28,7 @@ class Take:
         return len(self._frames)
 
     def add(self, frame: Frame) -> None:
-        """Keep a frame of the subject; a frame with an unchanged time replaces the last one."""
+        """Appends a frame of the subject; a frame that is not later replaces the last one."""
         self.subject = self.subject or frame.subject
         if frame.subject != self.subject:
             return
@@ -40,14 +40,14 @@ class Take:
             self.full += 1
 
     def clip(self, shaper: Shaper | None = None) -> Clip:
-        """The take as a clip of raw controls, starting at 0.
+        """The take as a clip of raw controls that starts at 0 s.
 
         Args:
             shaper: converts values to controls; its smoothing is ignored, because it can be added
                 later but not removed.
 
         Returns:
-            A Clip with individual times. A control that arrived later than others is 0 before.
+            A Clip with a time per frame. Before a control first arrives its curve is 0.
         """
         shaper = (shaper or Shaper()).without_smoothing()
         rows = [shaper.apply(frame) for frame in self._frames]
@@ -66,13 +66,13 @@ class Take:
         return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
-        """Names in its frames that a shaper's mapping does not know."""
+        """Names in the take's frames that a shaper's mapping does not know."""
         kinds = dict.fromkeys(frame.names for frame in self._frames)
         plans = (Plan(names, shaper.mapping) for names in kinds)
         return sorted({name for plan in plans for name in plan.unmapped})
 
 
 def _rate(times: np.ndarray) -> float:  # type: ignore[type-arg]
-    """The frames per second of most frames; 60 for a take that is too short."""
+    """Frames per second from the median step; 60 for a take of fewer than two frames."""
     steps = np.diff(times)
     return round(1.0 / float(np.median(steps)), 3) if steps.size else 60.0

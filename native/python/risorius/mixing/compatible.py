@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks that faces can be mixed: they may differ only in numbers."""
+"""Checks that faces can be mixed: names, topology and behavior must be equal."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _TOPOLOGY = (
     "layout_normals",
 )
 _VALUES = ("texture_coordinates", "normals")
-_OTHERS = {  # layers that a mix takes from the first face, so that all faces must have the same
+_OTHERS = {  # a mix takes these layers from the first face, so they must be equal in all faces
     "blend_shape_channels": "drivers of blend shapes",
     "rbf_behavior": "RBF solvers",
     "rbf_behavior_ext": "poses of RBF solvers",
@@ -52,15 +52,15 @@ _OTHERS = {  # layers that a mix takes from the first face, so that all faces mu
     "machine_learned_behavior_ext": "operations and joints of neural networks",
     "joint_behavior_metadata": "kinds of joint rotations",
 }
-_QUATERNION = 1  # rotation in joint_representations
+_QUATERNION = 1  # value in joint_representations for quaternion rotation
 
 
 def difference(one: Dna, other: Dna) -> str | None:
-    """The reason why two faces cannot be mixed, in a few words; None if they can.
+    """The first reason why two faces cannot be mixed, in a few words; None if they can be mixed.
 
     Args:
         one: a face.
-        other: another one.
+        other: another face.
     """
     one, other = without_hair(one), without_hair(other)
     for tell in (_names, _system, _lists, _behavior, _meshes):
@@ -71,11 +71,12 @@ def difference(one: Dna, other: Dna) -> str | None:
 
 
 def check_compatible(faces: Sequence[Dna], names: Sequence[str]) -> None:
-    """Raises ValueError with the name of the first face that cannot be mixed with the first one.
+    """Raises ValueError for the first face that cannot be mixed with faces[0]; the message names
+    it.
 
     Args:
-        faces: at least one.
-        names: their names in errors, such as file names.
+        faces: faces to mix, at least one.
+        names: names of the faces in errors, such as file names.
     """
     for face, name in zip(faces[1:], names[1:], strict=True):
         why = difference(faces[0], face)
@@ -144,16 +145,16 @@ def _behavior(one: Dna, other: Dna) -> str | None:
 
 
 def alike(one: object, other: object) -> bool:
-    """Whether two parts of faces hold the same numbers and texts at every depth.
+    """Whether two parts of faces have equal numbers and texts at every depth.
 
     Args:
-        one: an array, a text, a number, a list of parts, or an object with parts as attributes.
+        one: an array, a text, a number, a list of parts, or an object whose attributes are parts.
         other: a value of the same kind.
     """
     if isinstance(one, np.ndarray):
         return bool(one.tobytes() == np.asarray(other).tobytes())
     if isinstance(one, str | bytes | int | float):
-        return repr(one) == repr(other)  # compares all digits, and NaN as equal
+        return repr(one) == repr(other)  # repr has all digits, and is equal for NaN
     if isinstance(one, Sequence):
         assert isinstance(other, Sequence)
         return len(one) == len(other) and all(map(alike, one, other))
@@ -162,7 +163,7 @@ def alike(one: object, other: object) -> bool:
 
 
 def turned_groups(dna: Dna) -> list[int]:
-    """Numbers of the joint groups that turn a joint by quaternions.
+    """Numbers of the joint groups that move a joint with quaternion rotation.
 
     Args:
         dna: a face.
@@ -179,8 +180,9 @@ def turned_groups(dna: Dna) -> list[int]:
 
 
 def _turned_lists(dna: Dna) -> list[tuple[bytes, ...]]:
-    """The lists of these groups, which must be equal: quaternions are multiplied in the order of
-    the columns, so that a mean of columns in two orders is meaningless."""
+    """(LODs, inputs, outputs) of the groups from turned_groups, as bytes. They must be equal,
+    because quaternions are multiplied in the order of the columns, so that a mean of columns in
+    different orders is meaningless."""
     groups = dna.joint_groups
     return [
         (g.lods.tobytes(), g.input_indices.tobytes(), g.output_indices.tobytes())

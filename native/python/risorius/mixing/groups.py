@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint groups of a mix: the mean of each row of the joint matrix."""
+"""Makes the joint groups of a mix: weighted means of the rows of the joint matrices."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .compatible import alike, turned_groups
 from .share import Share
 
-_DENSER = 4  # a joined group holds at most this many times the numbers of its parts
-Part = tuple[int, JointGroup]  # index of a parent, and one of its groups
+_DENSER = 4  # largest ratio of coefficients in a merged group to those of its source groups
+Part = tuple[int, JointGroup]  # (index of a parent face, one of its joint groups)
 
 
 def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     """The joint groups of a mix.
 
-    Groups with equal lists become one group with these lists. Otherwise groups that share a joint
-    are joined to one with the rows and columns of all, or to several if that would hold far more
-    numbers.
+    If all parents have groups with equal rows and columns, so has the mix. Otherwise groups that
+    share a joint are merged into one group with all their rows and columns, or into several if one
+    would have far more coefficients.
 
     Args:
         parents: compatible faces.
-        share: share of the joints.
+        share: weights of the parents for each joint.
     """
     groups = [list(p.joint_groups) for p in parents]
     if share.is_whole and all(alike(groups[0], own) for own in groups[1:]):
@@ -34,7 +34,7 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     lists = [[_lists(g) for g in own] for own in groups]
     if all(own == lists[0] for own in lists[1:]):
         return [_mean(row, share) for row in zip(*groups, strict=True)]
-    # For joints turned by quaternions the order of columns counts; it is the same in all parents.
+    # For joints with quaternion rotation the order of columns matters; all parents have the same.
     turned = [turned_groups(p) for p in parents]
     out = [
         _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)
@@ -56,7 +56,7 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """One group of the mix, from the parents' groups with equal rows and columns."""
+    """The weighted mean of groups with equal rows and columns, one of each parent."""
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
@@ -70,15 +70,14 @@ def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
 
 
 def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
-    """float64[n], weights of a parent's rows: translations are scaled, rotations and scales are
-    not."""
+    """float64[n]: weights of one parent for rows; only translations include the region's scale."""
     joints = rows // 9
     return np.where(rows % 9 < 3, share.scaled[joints, parent], share.weights[joints, parent])
 
 
 def _together(parts: Sequence[Part]) -> list[list[Part]]:
-    """The groups that share joints, directly or indirectly, in the order of their first joints."""
-    above: dict[int, int] = {}  # joint -> another joint of the same set
+    """Collects groups that share joints, directly or indirectly, by ascending first joint."""
+    above: dict[int, int] = {}  # joint -> a smaller or equal joint of the same set (union-find)
 
     def root(joint: int) -> int:
         while above[joint] != joint:
@@ -105,9 +104,9 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Joins several groups to one, or to several whose rows come from the same parts."""
-    levels_of: dict[int, int] = {}  # row -> number of levels that have it
-    of_row: dict[int, list[int]] = {}  # row -> numbers of the parts that have it
+    """Merges groups into one, or into one for each set of rows with the same source groups."""
+    levels_of: dict[int, int] = {}  # row -> number of LODs that evaluate it
+    of_row: dict[int, list[int]] = {}  # row -> indices of the source groups that have it
     used: list[_Source] = []
     for p, group in parts:
         rows = np.asarray(group.output_indices, np.int64)
@@ -139,7 +138,7 @@ def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup
 class _Source(NamedTuple):
     parent: int
     group: JointGroup
-    place: dict[int, int]  # index of its rows
+    place: dict[int, int]  # row of the matrix -> index in the group
 
 
 def _block(
@@ -149,7 +148,7 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """The group of some rows, with all columns of the sources; empty without columns."""
+    """Merges rows into one group with all columns of the sources; empty without columns."""
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Hair of mixed faces: each person has meshes of its own, so a mix has the hair of one parent.
+"""Gives a mixed face the hair of one parent, because each person has hair meshes of its own.
 
-Brows and lashes have the same topology in all people and are mixed like skin; hair and beards are
-not.
+Brows and lashes have the same topology in all people, and are mixed like the skin.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ from ..author.geometry.skeleton import Doubles, Ints
 from ..base.budget import BASE_BYTES, BYTES_PER_BYTE, Budget
 
 _OWN = re.compile(r"(hair|beard)_lod\d+_mesh")
-_NEAR = 4  # skin vertices that a vertex of hair follows
-_CELLS = 1 << 22  # distances that are held at once
+_NEAR = 4  # number of nearest skin vertices that a vertex of hair follows
+_CELLS = 1 << 22  # largest number of distances in memory at once
 _BASE_STEPS = 1 << 28
 _STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
-    """Numbers of the meshes of one person only: the last ones of the list, by their names.
+    """Numbers of the meshes that only this person has: trailing hair and beard meshes, by name.
 
     Args:
         dna: a face.
@@ -38,7 +37,7 @@ def hair_meshes(dna: Dna) -> list[int]:
 
 
 def without_hair(dna: Dna) -> Dna:
-    """The face without its own hair meshes; the face itself if it has none.
+    """The face without its hair and beard meshes; the same object if it has none.
 
     Args:
         dna: a face; not changed.
@@ -58,7 +57,7 @@ def without_hair(dna: Dna) -> Dna:
 
 
 def give_hair(out: Dna, leading: Dna) -> None:
-    """Give a mix one parent's hair, moved like the skin under it.
+    """Adds one parent's hair to a mix, moved with the skin under it.
 
     Args:
         out: the mix without hair; changed in place.
@@ -88,7 +87,7 @@ def give_hair(out: Dna, leading: Dna) -> None:
 
 
 def _skin(dna: Dna, listed: list[int]) -> int | None:
-    """The mesh of a level under the hair: the head, else the largest mesh."""
+    """Number of the mesh under the hair among the listed ones: the head, else the largest."""
     own = set(hair_meshes(dna))
     there = [m for m in listed if m not in own]
     heads = [m for m in there if "head" in dna.mesh_names[m].lower()]
@@ -96,7 +95,7 @@ def _skin(dna: Dna, listed: list[int]) -> int | None:
 
 
 def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles:
-    """float64[V, 3]: positions of hair, each moved like the nearest skin."""
+    """float64[V, 3]: positions of hair, each moved like the nearest skin vertices."""
     points = np.asarray(mesh.positions, np.float64)
     near = nearest(points, skin, min(_NEAR, len(skin)), budget)
     square = ((points[:, None] - skin[near]) ** 2).sum(axis=2)
@@ -106,7 +105,7 @@ def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles
 
 
 def budget_of(dna: Dna) -> Budget:
-    """The budget for mixing a face: as much as compiling it, see native/README.md.
+    """The budget for mixing a face, as large as for compiling it; see native/README.md.
 
     Args:
         dna: the face.
@@ -116,7 +115,7 @@ def budget_of(dna: Dna) -> Budget:
 
 
 def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Ints:
-    """int64[n, count]: the points of `others` nearest to each point, in any order.
+    """int64[n, count]: indices of the points of `others` nearest to each point, in any order.
 
     Args:
         points: float64[n, 3].

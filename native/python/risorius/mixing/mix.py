@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Mixes faces: numbers become weighted means, names and lists stay.
+"""Mixes faces: numeric values become weighted means, names and lists stay.
 
 Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
-weights of its vertices. A region from another face is scaled to the size of the whole mix and moved
-to the region's place there: a tall face's brow also fits a small face.
+weights of its vertices. A region from another face is scaled to the size of the mixed face and
+moved to the region's position there, so that a tall face's brow fits a small face.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from .share import Share, mean_of
 
 @dataclass
 class Mix:
-    """The shares of the parents: of the whole face, and different ones for some regions.
+    """The shares of the parents for the whole face, with exceptions for some regions.
 
-    In a region the parents named there have their shares; the rest is divided as on the whole face.
+    Parents listed for a region have their share there; the others divide the rest by `shares`.
     """
 
-    shares: Sequence[float]  # [P] of the whole face; normalised to sum 1
+    shares: Sequence[float]  # [P], for the whole face; normalised to sum 1
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the shares of the whole face, with sum 1. Raises ValueError as table."""
+        """float64[P]: the shares of the whole face, with sum 1. Raises: ValueError: as `table`."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
             raise ArgumentError("shares from 0 on were expected, one of them above 0")
         return np.asarray(whole / whole.sum())
 
     def table(self) -> Doubles:
-        """float64[regions, P]: the shares of each region; rows sum to 1.
+        """float64[regions, P]: the shares in each region; rows sum to 1.
 
         Raises:
             ValueError: an invalid share, shares that are all 0, or above 1 in a region.
@@ -71,20 +71,20 @@ class Mix:
 def mix_faces(
     parents: Sequence[Dna], mix: Mix, *, name: str | None = None, masks: Masks | None = None
 ) -> Dna:
-    """A face with the weighted mean of its parents.
+    """Makes the weighted mean of faces.
 
     Args:
-        parents: compatible faces, see check_compatible; not changed.
-        mix: their shares.
+        parents: compatible faces, see check_compatible; they are not changed.
+        mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
-        masks: masks of the first parent's regions, if known already.
+        masks: masks of the first parent's regions; None: they are computed.
 
     Returns:
-        If one parent has all shares, the result equals it in every bit. Metadata and hair come from
-        the parent with the largest share.
+        The mixed face. If one parent has all shares, it equals that parent bitwise. Metadata and
+        hair come from the parent with the largest share.
 
     Raises:
-        ValueError: invalid shares, a region that the first parent lacks.
+        ValueError: invalid shares, or a region without vertices in the first parent.
     """
     table = mix.table()
     most = int(np.argmax(mix.whole()))
@@ -113,7 +113,7 @@ def mix_faces(
 
 
 class Places:
-    """Shares of points by their regions; without regions no masks are needed."""
+    """Computes the shares of vertices and joints from the shares of their regions."""
 
     def __init__(self, parents: Sequence[Dna], mix: Mix, masks: Masks) -> None:
         self.table = mix.table()
@@ -125,14 +125,15 @@ class Places:
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        # Shares sum to 1 only up to rounding.
+        # Masks sum to 1 only up to rounding.
         face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
-        # Regions must fit at their borders, so that their rims coincide.
+        # Size and position of a region are measured at its rim, so that it fits its neighbours.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
-        for outer in ("neck", "skull"):  # the outer regions have the size of their rim at the face
+        # these surround the face: their scale is measured at their rim
+        for outer in ("neck", "skull"):
             at = REGIONS.index(outer)
             for own, p in zip(sizes, positions, strict=True):
                 own[at] = _spread(mixed, rims[:, at]) / _spread(p, rims[:, at])
@@ -141,17 +142,17 @@ class Places:
         self.shifts = _middles(mixed, rims) - self.sizes[:, :, None] * middles
 
     def of_mesh(self, mesh: int) -> Share:
-        """The shares of a mesh's vertices.
+        """The shares of the vertices of a mesh.
 
         Args:
-            mesh: its index.
+            mesh: index of the mesh.
         """
         if not self.own.any():
             return self._everywhere(len(self._first.meshes[mesh].positions))
         return self._of(self._masks.meshes[mesh])
 
     def of_joints(self) -> Share:
-        """The shares of the joints."""
+        """The shares of all joints."""
         if not self.own.any():
             return self._everywhere(len(self._first.joint_names))
         return self._of(_joint_masks(self._first, self._masks))
@@ -161,7 +162,7 @@ class Places:
         return Share(rows, rows, np.zeros((count, 3)))
 
     def _of(self, masks: Doubles) -> Share:
-        """Shares of points by their masks: float64[n, regions], rows sum to 1."""
+        """Shares of points from masks: float64[n, regions], rows sum to 1."""
         parts = masks * self.own
         rest = (1 - parts.sum(axis=1, keepdims=True)).clip(0) * self.whole
         inside = parts @ self.table
@@ -177,7 +178,7 @@ def _spread(points: Doubles, weights: Doubles) -> float:
 
 
 def _middles(points: Doubles, masks: Doubles) -> Doubles:
-    """float64[regions, 3]."""
+    """float64[regions, 3]: the mean of the points, weighted by each region's mask."""
     total = masks.sum(axis=0)[:, None]
     return np.asarray(masks.T @ points / np.maximum(total, 1e-30))
 
@@ -193,11 +194,11 @@ def _descriptor(
 
 
 def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
-    """The mean of the parents' meshes.
+    """The weighted mean of the parents' meshes.
 
     Args:
-        parents: meshes of one topology.
-        share: share of its vertices.
+        parents: meshes with the same topology.
+        share: weights of the mesh's vertices.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -213,8 +214,8 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
         setattr(out, values, mean_of([getattr(m, values) for m in parents], weights[vertex]))
     mixed = np.asarray(out.normals, np.float64)
     length = np.linalg.norm(mixed, axis=1, keepdims=True)
-    # Normals that all parents share, or of one parent only, stay unchanged, even if not of length
-    # 1.
+    # Normals that are equal in all parents or come from one parent stay unchanged, even if their
+    # length is not 1.
     alone = (weights == 1).any(axis=1).all()
     if not alone and not all(np.array_equal(first.normals, m.normals) for m in parents[1:]):
         out.normals = mixed / np.where(length > 0, length, 1)
@@ -226,7 +227,7 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
 
 def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget]:
-    """Blend shapes over all vertices that some parent moves."""
+    """Blend shape targets with all vertices that any parent moves."""
     own = [
         {int(t.blend_shape_channel_index): t for t in mesh.blend_shape_targets} for mesh in parents
     ]
@@ -254,7 +255,7 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Skin weights; unchanged if all parents have the same."""
+    """Sets the mixed skin weights; they stay unchanged if all parents have the same."""
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -263,13 +264,13 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
     ):
         return
     entries = [sk.skin_entries(mesh) for mesh in parents]
-    # One number for each vertex and joint, in their order.
+    # One key per pair of vertex and joint, sorted by vertex, then joint.
     keys = np.concatenate([vertex << 16 | joint for vertex, joint, _ in entries])
     parts = [weight * weights[vertex, p] for p, (vertex, _, weight) in enumerate(entries)]
     keys, place = np.unique(keys, return_inverse=True)
     weight = np.bincount(place.ravel(), weights=np.concatenate(parts))
     vertex, joint = keys >> 16, keys & 0xFFFF
-    # The smallest weights beyond the parents' largest number of influences are dropped.
+    # Each vertex keeps its largest weights, up to the parents' largest number of influences.
     most = max(int(mesh.maximum_influence_per_vertex) for mesh in parents)
     first = np.searchsorted(vertex, vertex)
     rank = np.zeros(len(keys), np.int64)
@@ -285,11 +286,11 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
 
 
 def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
-    """float64[J, regions]: the mean mask of each joint's vertices, at the finest level.
+    """float64[J, regions]: mean mask of the vertices of each joint, weighted, at LOD 0.
 
     Args:
         dna: the first parent.
-        masks: masks of its regions.
+        masks: masks of the first parent's regions.
     """
     count = len(dna.joint_names)
     sums, held = np.zeros((count, len(REGIONS))), np.zeros(count)
@@ -301,7 +302,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
         held += np.bincount(holds, weights=weight, minlength=count)
         for region, part in enumerate(masks.meshes[m].T):
             sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
-    # a joint without vertices takes the mask of its children.
+    # A joint without vertices takes the mask of its children.
     for joint in reversed(sk.parent_order(dna)):
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
@@ -309,13 +310,12 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
             held[parent] += 1e-9
     rest = np.eye(len(REGIONS))[-1]
     out = np.where(held[:, None] > 0, sums / np.maximum(held, 1e-30)[:, None], rest)
-    # Values of exactly one region are kept exact in spite of rounding.
+    # Removes rounding errors from masks that are 0 or 1.
     return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
 
 
 def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
-    """Neutral pose: joints at the mean of their world positions, with the mean of their
-    rotations."""
+    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations."""
     weights = share.weights
     shifts = [np.asarray(p.neutral_joint_translations, np.float64) for p in parents]
     turns = [np.asarray(p.neutral_joint_rotations, np.float64) for p in parents]
@@ -325,8 +325,8 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
     local = mean_of(shifts, weights)
-    # Without moved regions and different rotations, the mean of the positions is the mean of the
-    # translations.
+    # If no region is moved and all rotations are equal, the mean of local translations gives the
+    # same positions without rounding errors.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
     matrices = sk.rotation_matrices(Convention.of(out), rotations)
@@ -343,7 +343,7 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
 
 
 def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
-    """float64[J, 3]: the mean of rotations, as quaternions where they differ."""
+    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ."""
     convention = Convention.of(out)
     rows = turns[0].copy()
     for joint in range(len(rows)):
@@ -363,7 +363,7 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:
-    """Slopes and cuts of the conditional table of animated maps."""
+    """Sets the mean slopes and cuts of the conditional table of animated maps."""
     maps = copy.copy(parents[0].animated_maps)
     conditionals = copy.copy(maps.conditionals)
     own = [p.animated_maps.conditionals for p in parents]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Regions of a face as soft masks: by the controls that move a vertex; the neck consists of the
-vertices of its joints.
+"""Finds the regions of a face as soft masks, by the controls that move a vertex; the neck consists
+of the vertices of its joints.
 
-The masks of a vertex sum to 1. Rigid meshes (eyes, teeth, tongue) have one mask as a whole; meshes
-on the skin (lashes, films) have the mask of the skin beside them.
+The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
+the skin (lashes, films) have the mask of the nearest skin.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..base.budget import Budget
 from ..controls.regions import region_of
 from .hair import budget_of, nearest, without_hair
 
-# Region -> regions of controls, see controls/regions.toml.
+# Region -> regions of controls in controls/regions.toml.
 _CONTROLS = {
     "brow": ("brow",),
     "eyes": ("eye",),
@@ -32,10 +32,12 @@ _CONTROLS = {
     "neck": ("neck", "head"),
 }
 _NECK = re.compile(r"neck|spine|clavicle")
-REST = "skull"  # vertices that no control moves: forehead above the brows, ears, the back
+# region of vertices that no control moves: forehead above the brows, ears, back of the head
+REST = "skull"
 REGIONS = (*_CONTROLS, REST)
-_LEAST = 0.15  # of a control's largest motion: vertices that move less belong to the skull
-_REACH = 0.03  # share of the mesh's size over which masks are smoothed
+# fraction of a control's largest displacement; vertices that move less are of the skull
+_LEAST = 0.15
+_REACH = 0.03  # distance over which masks are smoothed, as a fraction of the mesh's size
 _MOST_ROUNDS = 60
 _RIGID = {
     re.compile(r"^eye_?(left|right|l|r)(_|$)", re.IGNORECASE): "eyes",
@@ -44,22 +46,22 @@ _RIGID = {
 
 
 class Masks:
-    """Soft masks of the regions on all meshes of a face, computed on first use.
+    """Soft masks of the regions on all meshes of a face, computed at first use.
 
     Attributes:
-        meshes: float64[V, regions] of each mesh, without hair_meshes.
-        skin: the face's own mesh of the finest level.
+        meshes: float64[V, regions] of each mesh, without hair and beard meshes.
+        skin: index of the face's skin: the largest mesh of LOD 0 that is not rigid.
     """
 
     def __init__(self, dna: Dna, budget: Budget | None = None) -> None:
         """Args:
         dna: the face.
-        budget: limit for computing them; None: from budget_of.
+        budget: limits the computation; None: from budget_of.
         """
         self._dna, self._budget = without_hair(dna), budget
         listed, count = self._dna.lod_mesh_mapping, len(self._dna.meshes)
         self._levels = [[int(m) for m in listed[lod] if m < count] for lod in range(len(listed))]
-        self._skins: dict[int, int] = {}  # level -> the largest mesh that is not rigid
+        self._skins: dict[int, int] = {}  # LOD -> the largest mesh that is not rigid
         for lod, rows in enumerate(self._levels):
             free = [m for m in rows if _rigid(self._dna.mesh_names[m]) is None]
             if free:
@@ -68,7 +70,7 @@ class Masks:
 
     @functools.cached_property
     def meshes(self) -> list[Doubles]:
-        """See the class. Raises: BudgetError: too much work for the face's size."""
+        """The masks of each mesh. Raises: BudgetError: too much work for the face's size."""
         dna, budget = self._dna, self._budget or budget_of(self._dna)
         skins = sorted(set(self._skins.values()))
         out = dict(
@@ -80,12 +82,13 @@ class Masks:
                     out[m] = _others(dna, m, skin, out[skin], budget)
         rest = np.eye(len(REGIONS))[-1]
         return [
-            out[m] if m in out else np.tile(rest, (len(mesh.positions), 1))  # in no level
+            # a mesh that no LOD lists
+            out[m] if m in out else np.tile(rest, (len(mesh.positions), 1))
             for m, mesh in enumerate(dna.meshes)
         ]
 
     def is_empty(self, region: str) -> bool:
-        """Whether a region has no vertices.
+        """Whether a region has no vertices with a mask above 0.5.
 
         Args:
             region: one of REGIONS.
@@ -95,7 +98,7 @@ class Masks:
 
 
 def _others(dna: Dna, mesh: int, skin: int, masks: Doubles, budget: Budget) -> Doubles:
-    """float64[V, regions] of a rigid mesh, or of a mesh on the skin."""
+    """float64[V, regions]: masks of a rigid mesh, or of a mesh on the skin."""
     positions = np.asarray(dna.meshes[mesh].positions, np.float64)
     region = _rigid(dna.mesh_names[mesh])
     if region is not None:
@@ -109,7 +112,7 @@ def _rigid(name: str) -> str | None:
 
 
 def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
-    """float64[V, regions] of the face's skin meshes, one for each level or for several."""
+    """float64[V, regions] of each skin mesh."""
     regions = _regions_of_controls(dna)
     most = [np.zeros((len(mesh.positions), len(REGIONS))) for mesh in meshes]
     movers = [Mover(dna, mesh) for mesh in meshes]
@@ -133,7 +136,7 @@ def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
 
 
 def _regions_of_controls(dna: Dna) -> dict[int, int]:
-    """Raw controls that have a region -> index of the region."""
+    """Index of a raw control -> index of its region, for controls with a region."""
     out = {}
     for number, control in enumerate(dna.raw_control_names):
         region = "cheek" if "cheek" in control.lower() else region_of(control)
@@ -144,7 +147,7 @@ def _regions_of_controls(dna: Dna) -> dict[int, int]:
 
 
 def _below_head(dna: Dna) -> list[int]:
-    """The joints below a neck or a spine, but not below a head."""
+    """Indices of the joints of neck and spine, and of their descendants but not below a head."""
     names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
     below = [False] * len(names)
     for joint in sk.parent_order(dna):
@@ -161,7 +164,7 @@ def _shares(amounts: Doubles) -> Doubles:
 
 
 def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
-    """Smooths masks over neighbours; then each vertex gets more of its main region."""
+    """Smooths masks over neighbouring vertices, then sharpens them towards the main region."""
     edges = sk.mesh_edges(mesh).astype(np.int64)
     if not len(edges):
         return masks
@@ -169,7 +172,7 @@ def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
     positions = np.asarray(mesh.positions, np.float64)
     length = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1).mean()
     reach = _REACH * np.ptp(positions, axis=0).max() / max(float(length), 1e-30)
-    # Not finite if a vertex has no position: then nothing is smoothed.
+    # The reach is not finite if a vertex has no finite position; nothing is smoothed then.
     rounds = round(min(_MOST_ROUNDS, 1.5 * reach**2)) if np.isfinite(reach) else 0
     for _ in range(rounds):
         around = masks.copy()

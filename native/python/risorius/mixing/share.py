@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The shares of points in each parent."""
+"""Weights of the parents for the points of a mix."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..author.geometry.skeleton import Doubles
 
 @dataclass
 class Share:
-    """The shares of points in each parent.
+    """Weights of the parents for n vertices or joints of a mix.
 
     Attributes:
         weights: float64[n, P], rows sum to 1.
-        scaled: float64[n, P], weights times the scale of each parent's lengths.
-        shift: float64[n, 3], added to positions.
+        scaled: float64[n, P], weights times the scale of each parent's region.
+        shift: float64[n, 3], added to mixed positions.
     """
 
     weights: Doubles
@@ -27,11 +27,11 @@ class Share:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is scaled or shifted."""
+        """Whether no region is scaled or shifted."""
         return self.scaled is self.weights
 
     def places(self, points: Sequence[object]) -> Doubles:
-        """float64[n, 3]: the mixed positions of the parents' points.
+        """float64[n, 3]: the mixed positions of corresponding points of the parents.
 
         Args:
             points: float64[n, 3] of each parent.
@@ -42,11 +42,11 @@ class Share:
 
 
 def mean_of(values: Sequence[object], weights: Doubles) -> Doubles:
-    """float64[n, ...]: the weighted mean of arrays of one shape; unchanged if all are equal.
+    """float64[n, ...]: the weighted mean of equally shaped arrays; unchanged if all are equal.
 
     Args:
         values: float64[n, ...] of each parent.
-        weights: float64[n, P] of the rows, sum 1.
+        weights: float64[n, P], rows sum to 1.
     """
     rows = [np.asarray(v, np.float64) for v in values]
     if all(np.array_equal(rows[0], row) for row in rows[1:]):

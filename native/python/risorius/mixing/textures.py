@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Textures of mixed faces: the parents' textures blended, if all have them.
+"""Makes textures of mixed faces: blends the parents' textures if all have them.
 
-Skin has one tone: its textures are mixed by the shares of the whole face, even if a region has
-others; textures of eyes use the shares of their region. Only images that this package wrote are
-mixed, and not those of hair, which comes from one parent; for other images the leading parent's
-file is used.
+Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of eyes
+use the shares of their region. Only images written by this package are mixed, and no hair textures,
+because hair comes from one parent. For other images the file of the parent with the largest share
+is used.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ WHY = {
     "format": "Risorius mixes its own kind of PNG alone",
     "size": "the faces have them in different sizes",
 }
-"""Reasons why images come from the leading parent alone."""
+"""Why an image comes from the leading parent alone: key -> reason."""
 _KEY = "texture:"
-_MOST_BYTES = 1 << 28  # largest image in bytes
-_MASKS = "*_msk.png"  # masks of wrinkles, which are recognised only by their names
+_MOST_BYTES = 1 << 28  # bytes: larger images are refused
+_MASKS = "*_msk.png"  # wrinkle masks, which have no metadata entry and are recognised by name
 
 
 def texture_folder(path: Path) -> Path:
-    """The folder of a DNA file's textures.
+    """The folder of a DNA file's textures: <name>_textures beside the file.
 
     Args:
-        path: path of the file.
+        path: path of the DNA file.
     """
     return path.with_name(path.stem + "_textures")
 
@@ -51,16 +51,17 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """The textures named in the leading parent's metadata.
+    """Mixes the textures that the leading parent's metadata names.
 
     Args:
         parents: compatible faces.
-        paths: of their files.
-        mix: their shares.
-        masks: masks of the first one's regions.
+        paths: paths of their DNA files.
+        mix: shares of the parents.
+        masks: masks of the first parent's regions.
 
     Returns:
-        File name -> bytes; and for images of the leading parent alone: name -> reason, see WHY.
+        File name -> bytes; and file name -> reason (see WHY) for images of the leading parent
+        alone.
 
     Raises:
         BudgetError: small files that declare huge images.
@@ -73,7 +74,7 @@ def mix_textures(
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        # Skips a second name for one file on some system, and a name that leads to another folder.
+        # Skips names that are equal on some file systems, and names that lead to other folders.
         if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
@@ -95,14 +96,14 @@ def mix_textures(
 
 
 def check_room(path: Path, pictures: Iterable[str]) -> None:
-    """Refuse to overwrite images that do not belong to a face of this name.
+    """Refuses to overwrite images that belong to no face of this name.
 
     Args:
-        path: path of the new DNA file; if it exists, its images may be replaced too.
+        path: path of the new DNA file; if it exists, its images may be replaced.
         pictures: file names from the parents' metadata.
 
     Raises:
-        ArgumentError: the file is new but an image exists; the error names it.
+        ArgumentError: the DNA file is new but an image exists; the error names the image.
     """
     for name in () if path.exists() else pictures:
         there = texture_folder(path) / name
@@ -114,7 +115,7 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: shares of a mesh's textures; a rigid mesh has those of its region."""
+    """float64[P]: the shares for a mesh's textures; a rigid mesh has those of its region."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())
@@ -126,7 +127,7 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 
 
 def _bytes(path: Path, name: str) -> bytes | None:
-    """A file in the folder of a DNA file or in its folder of textures, if it exists."""
+    """The bytes of a file in the texture folder or beside the DNA file; None if there is none."""
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError, ReadingError):
             return read_file(folder / name, _MOST_BYTES, found=True)
@@ -134,7 +135,7 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The reason why the parents' images do not fit together; empty if they do."""
+    """The key in WHY of the reason why images cannot be mixed; empty if they can."""
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"
@@ -148,7 +149,7 @@ def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
 
 
 def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
-    """The blend of the parents' matching images; empty if one is damaged."""
+    """The weighted mean of images with equal sizes; empty if one is damaged."""
     counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
         return next(iter(counted.values()))

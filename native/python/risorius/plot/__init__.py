@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws a rig: the joint matrix, the levels of detail, the face with its joints, the sizes.
+"""Draws figures of a rig: joint matrix, levels of detail, face with joints, file sizes.
 
 Dna + bytes of the file --facts--> Facts --draw_*--> figures --page | sheet--> .html | .png
 

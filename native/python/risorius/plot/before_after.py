@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix of one face before and after an edit."""
+"""Draws the joint matrix of one face before and after regrouping."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from .drawing import draw_matrix
 from .drawing.paper import INK, MUTED, settings
 from .sheet import panel, split
 
-# Inches.
+# Sizes in inches.
 WIDTH, HEAD, BODY = 23.0, 1.05, 9.0
 _EDGE = 0.35
 
 
 def render(before: Facts, after: Facts, kind: str, dpi: int) -> bytes:
-    """Both matrices side by side.
+    """Draws both joint matrices side by side.
 
     Args:
         before: the face with its old joint groups.
-        after: with the new ones.
+        after: the face with its new joint groups.
         kind: "png" or "svg".
-        dpi: resolution of the images.
+        dpi: resolution in dots per inch.
 
     Returns:
         The bytes of the picture.
@@ -58,7 +58,7 @@ def _caption(facts: Facts) -> str:
 
 
 def _draw_head(figure: SubFigure, facts: Facts) -> None:
-    """Who this is, and the legend of regions."""
+    """Draws the face's title, the file name, and the legend of regions."""
     edge, step = _EDGE / WIDTH, 1.75 / WIDTH
     title = textwrap.shorten(facts.title, 60, placeholder="...")
     figure.text(edge, 0.66, title, fontsize=22, fontweight="bold", va="center")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All four drawings as one self-contained HTML page."""
+"""Writes the four drawings of a rig as one self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from .drawing.paper import ACCENT, INK, MUTED, RULE, Canvas, settings
 from .page_parts import SCRIPT, STYLE
 
 _VARIABLES = {INK: "--ink", MUTED: "--muted", RULE: "--rule", ACCENT: "--accent"}
-WIDTH = 12.4  # inches
+WIDTH = 12.4  # width of the drawings in inches
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
-    """The page as HTML in UTF-8.
+    """The HTML page in UTF-8.
 
     Args:
         facts: facts of the face.
-        lod: the level to draw, from 0.
-        dpi: dots per inch of its pictures.
+        lod: number of the LOD to draw, from 0.
+        dpi: resolution of bitmaps in dots per inch.
     """
     bars = 0.75 + 0.3 * len(facts.layers)
     with settings():
@@ -56,16 +56,16 @@ def section(
     draw: Callable[[Canvas], None],
     after: str = "",
 ) -> str:
-    """A heading, a caption, the drawing `height` inches high, and optional HTML after it.
+    """A section of the page as HTML: heading, caption, drawing, and optional HTML after it.
 
     Args:
-        name: the section's id.
+        name: the section's id in the HTML.
         title: the heading.
-        caption: a sentence or two under it.
-        height: height of the drawing, inches.
-        dpi: resolution of its pictures.
-        draw: draws on the canvas.
-        after: HTML behind the drawing.
+        caption: a sentence or two below the heading.
+        height: height of the drawing in inches.
+        dpi: resolution of bitmaps in dots per inch.
+        draw: function that draws on the canvas.
+        after: HTML after the drawing.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=dpi)
     FigureCanvasSVG(figure)
@@ -77,7 +77,7 @@ def section(
 
 
 def _svg(figure: Figure, name: str, title: str) -> str:
-    """A drawing as inline SVG whose colours follow the page's theme."""
+    """A figure as inline SVG that uses the page's colour variables."""
     out = io.StringIO()
     figure.savefig(out, format="svg", dpi=figure.dpi, metadata={"Date": None, "Creator": None})
     text = out.getvalue()
@@ -115,12 +115,12 @@ def _tables(facts: Facts) -> str:
 
 
 def document(facts: Facts, sections: str, links: Sequence[tuple[str, str]]) -> str:
-    """The whole page.
+    """The complete HTML page.
 
     Args:
         facts: facts of the face.
         sections: HTML from `section`.
-        links: ids of the sections and the texts of their links.
+        links: (id of a section, text of its link).
     """
     title = html.escape(facts.title)
     legend = "".join(

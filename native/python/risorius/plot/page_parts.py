@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The page's style, and the script that enlarges a picture."""
+"""The HTML page's style sheet, and the script that enlarges a drawing."""
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d232b; --muted: #66707d; --rule: #d4dae1;

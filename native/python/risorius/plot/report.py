@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report of a rig made from expressions and its accuracy: one self-contained HTML page."""
+"""Writes a report on the accuracy of a rig made from expressions, as one HTML page."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from .page import WIDTH, document, section
 
 @dataclass(frozen=True)
 class LevelRow:
-    """The page's data on a level of detail."""
+    """One LOD in the report."""
 
     joints: int
     vertices: int
-    deltas: int
-    size: int  # bytes of a file with only this level
-    microseconds: float  # median time of a pose requested from Python
-    rms: float  # mm, with joints only
-    largest: float  # mm, with joints only
+    deltas: int  # blend shape deltas
+    size: int  # bytes of a file with only this LOD
+    microseconds: float  # median duration of one evaluation from Python
+    rms: float  # mm, RMS error with joints only
+    largest: float  # mm, largest error with joints only
     with_shapes: float  # mm, largest error with blend shapes
 
 
 @dataclass(frozen=True)
 class ExpressionRow:
-    """The page's data on an expression at LOD 0, in millimetres."""
+    """One expression at LOD 0 in the report; lengths in millimetres."""
 
     name: str
-    motion: float
-    rms: float
-    largest: float
-    between: float  # the largest at 0.25, 0.5 and 0.75
-    with_shapes: float
-    worst: str  # mesh and vertex
+    motion: float  # RMS displacement of the vertices
+    rms: float  # RMS error with joints only
+    largest: float  # largest error with joints only
+    between: float  # largest error at the weights 0.25, 0.5 and 0.75
+    with_shapes: float  # largest error with blend shapes
+    worst: str  # mesh and vertex of the largest error
 
 
 def render(
@@ -50,16 +50,16 @@ def render(
     worst: Sequence[draw_errors.Expression],
     dpi: int,
 ) -> bytes:
-    """The page as HTML in UTF-8.
+    """The report as HTML in UTF-8.
 
     Args:
         facts: facts of the new face.
         levels: one row per LOD.
         rows: one row per expression.
-        worst: the expressions to draw, with joints only.
-        dpi: dots per inch of its pictures.
+        worst: the expressions to draw, with their errors with joints only.
+        dpi: resolution of bitmaps in dots per inch.
     """
-    # A single large error would leave everything else colourless, so it may exceed the scale.
+    # The scale follows the median: a single large error would leave all others colourless.
     most = 1.25 * float(np.median([e.largest for e in worst] or [0.05]))
     lines = [
         f"{level.joints:,} joints, {level.vertices:,} vertices\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All four drawings on one sheet, as PNG."""
+"""Draws all four figures of a rig on one sheet, as PNG."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .content.regions import COLORS
 from .drawing import draw_face, draw_lods, draw_matrix, draw_sizes
 from .drawing.paper import INK, MUTED, RULE, Canvas, settings
 
-# Inches. The face is as wide as two views of a head with the height of the matrix.
+# Sizes in inches. LEFT fits two views of a head at the height of the joint matrix.
 WIDTH, HEAD, UPPER, LOWER = 22.0, 1.15, 9.6, 5.9
 LEFT = 10.8
 _EDGE = 0.35
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
-    """The sheet as the bytes of a PNG file.
+    """Draws the sheet, and returns the bytes of a PNG file.
 
     Args:
         facts: facts of the face.
-        lod: the level to draw, from 0.
-        dpi: dots per inch.
+        lod: number of the LOD to draw, from 0.
+        dpi: resolution in dots per inch.
     """
     with settings():
         figure = Figure(figsize=(WIDTH, HEAD + UPPER + LOWER), dpi=dpi, facecolor="white")
@@ -54,12 +54,12 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
 def split(
     figure: FigureBase, rows: Sequence[float] = (1,), columns: Sequence[float] = (1,)
 ) -> list[SubFigure]:
-    """Parts of a figure from top to bottom, or from left to right.
+    """Divides a figure into parts, from top to bottom or from left to right.
 
     Args:
         figure: a figure or a part of one.
-        rows: heights, in any unit.
-        columns: widths, in any unit.
+        rows: relative heights of the parts.
+        columns: relative widths of the parts.
     """
     parts = figure.subfigures(
         len(rows), len(columns), squeeze=False, height_ratios=rows, width_ratios=columns,
@@ -69,7 +69,7 @@ def split(
 
 
 def _draw_head(figure: SubFigure, facts: Facts) -> None:
-    """The character's name and the legend of regions."""
+    """Draws the character's name and the legend of regions."""
     edge = _EDGE / WIDTH
     title = textwrap.shorten(facts.title, 60, placeholder="...")
     figure.text(edge, 0.64, title, fontsize=22, fontweight="bold", va="center")
@@ -90,13 +90,13 @@ def _draw_head(figure: SubFigure, facts: Facts) -> None:
 
 
 def panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
-    """A heading with its caption above a canvas.
+    """Draws a heading with a caption, and returns the canvas below them.
 
     Args:
         figure: the part of the sheet to fill.
         title: the heading.
-        caption: a sentence under it, broken into lines.
-        width, height: of the part, inches.
+        caption: a sentence below the heading, broken into lines.
+        width, height: size of the part in inches.
     """
     edge = _EDGE / width
     lines = textwrap.wrap(caption, round(width * 13))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The range of each control in captures of a person: learned, stored in a file, and removed.
+"""Learns the range of each control from a person's captures, stores it, and rescales clips by it.
 
     found = learn(clip)                     a take in which the person goes to all extremes
     Path("ada.range.toml").write_text(ranges_text(found))
     clip = load_ranges("ada.range.toml").apply(clip)
 
 A capture app may report closed eyes as eyeBlink 0.67, and a face at rest as a smile of 0.05. A
-range holds a control's neutral and extreme values; they are mapped to 0 and 1.
+range holds a control's neutral and extreme value; rescaling maps them to 0 and 1.
 """
 
 from __future__ import annotations

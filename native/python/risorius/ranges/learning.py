@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Finds the neutral and extreme value of each control in a take.
+"""Learns the neutral and the extreme value of each control from a take.
 
-A control stays as captured if the take does not prove its range: if it hardly moves, is never at
+A control is not rescaled if the take does not prove its range: if it hardly moves, is never at
 rest, or does not come near its extreme. Both sides of a face get the same range.
 """
 
@@ -21,34 +21,35 @@ from .remap import WIDTHS, Learned, Range, Ranges, require_untouched
 Doubles = npt.NDArray[np.float64]
 
 MOST_GAIN = 1.6
-"""A range that needs a larger gain was not shown by the take."""
+"""Largest gain; a control that would need more did not reach its extreme in the take."""
 SHORTEST = 2.0
-"""Shortest take in seconds."""
-_LID_GAIN = 2.0  # of lids: everybody shuts them, so that a low peak means a weak capture
-_LEAST_RANGE = 0.15  # a smaller range counts as hardly moving
-_LEAST_OVER_NOISE = 8.0  # least range in standard deviations of the noise
-_REST_SHARE = 10  # least percentage of frames in which a control must be at rest
-_HIGHEST_REST = 0.25  # a control whose lowest tenth is higher is never at rest
-_SPIKE = 0.05  # seconds: shorter peaks are ignored
-_WIDEST = 4  # frames to either side: limits the memory for high frame rates
-_NEAR = 0.8  # share of the highest peak from which a peak counts as extreme
-_LOW_PEAKS = 25  # percentage of these peaks that may stay below 1
-_LOW_BLINKS = 10  # of lids: an incomplete blink is noticeable
-_CEILING = 0.85  # of a performance: at least half of the peaks reach this share of the highest
-_LEAST_PEAKS = 3  # least number of peaks
-_SAME = 0.7  # if the extremes of the sides differ more, both get the smaller one
+"""Seconds: shorter takes are refused."""
+# largest gain of lids, higher because everybody can shut the eyes: a low peak is a weak capture
+_LID_GAIN = 2.0
+_LEAST_RANGE = 0.15  # ranges below it count as hardly moving
+_LEAST_OVER_NOISE = 8.0  # smallest range in standard deviations of the noise
+_REST_SHARE = 10  # smallest percentage of frames in which a control must be at rest
+_HIGHEST_REST = 0.25  # a control whose lowest tenth of values is higher is never at rest
+_SPIKE = 0.05  # seconds of the median filter, so that shorter peaks are ignored
+_WIDEST = 4  # frames to either side: largest window of the median, which limits the memory
+_NEAR = 0.8  # fraction of the highest peak from which a peak counts as extreme
+_LOW_PEAKS = 25  # percentage of the extreme peaks that may stay below 1 after rescaling
+_LOW_BLINKS = 10  # the same for lids, because an incomplete blink is noticeable
+_CEILING = 0.85  # in a performance, half of the peaks must reach this fraction of the highest
+_LEAST_PEAKS = 3  # in a performance, smallest number of peaks
+_SAME = 0.7  # ratio of the extremes of both sides: above it both get the smaller one
 _PREFIX = "CTRL_expressions."
 
 
 @dataclass
 class _Measured:
-    """Properties of a control's curve.
+    """The measurements of a control's curve.
 
     Attributes:
-        neutral, extreme: values.
-        noise: standard deviation of random changes from frame to frame.
-        rests: whether it is near 0 for some time.
-        has_ceiling: whether its peaks end at one height.
+        neutral, extreme: values of the control at rest and at its extreme.
+        noise: standard deviation of the noise in a frame.
+        rests: whether it is near 0 in some frames.
+        has_ceiling: whether its peaks end at nearly the same height.
     """
 
     neutral: float
@@ -59,20 +60,20 @@ class _Measured:
 
 
 def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN) -> Ranges:
-    """The ranges of the person in a take.
+    """Learns the ranges of a person from a take.
 
     Args:
-        clip: raw controls as captured, without gain, smoothing or ranges.
-        performance: the take shows acting, not one extreme after another: a control counts only if
-            its peaks repeatedly end at one height.
-        most_gain: largest gain, 1 to 4; for lids at least 2.
+        clip: raw controls as captured, without gain, smoothing or rescaling.
+        performance: whether the take shows acting instead of one extreme after another; a control
+            is then used only if several peaks end at nearly the same height.
+        most_gain: largest gain, 1 to 4; lids get at least 2.
 
     Returns:
-        Ranges with the controls in the clip's order, without angles of head and gaze.
+        The ranges of all controls in the clip's order, without angles of the head.
 
     Raises:
-        ArgumentError: a take shorter than SHORTEST, no control of a face, a value that is not
-            finite, a clip whose ranges were removed before, a gain outside 1 to 4.
+        ArgumentError: a take shorter than SHORTEST, no raw controls, a value that is not finite, a
+            clip that was rescaled before, or a gain outside 1 to 4.
     """
     if not 1.0 <= most_gain <= 4.0:
         raise ArgumentError(f"a largest gain of 1 to 4 was expected, found {most_gain:g}")
@@ -102,8 +103,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """Measure one control. Args: curve  float64[frames]; rate  frames per second; name  its
-    name."""
+    """Measures a control. Args: curve: float64[frames]; rate: per second; name: the control."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)
@@ -124,7 +124,7 @@ def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
 
 
 def _without_spikes(curve: Doubles, rate: float) -> Doubles:
-    """The median around each frame over _SPIKE seconds, at least 3 frames."""
+    """The median over _SPIKE seconds around each frame, at least 3 frames."""
     half = min(max(1, round(0.5 * _SPIKE * rate)), _WIDEST)
     padded = np.pad(curve, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
@@ -133,7 +133,7 @@ def _without_spikes(curve: Doubles, rate: float) -> Doubles:
 
 
 def _peaks(curve: Doubles, neutral: float) -> Doubles:
-    """The maximum of each interval in which a curve is above half of its range."""
+    """The maximum of each interval in which the curve is above half of its range."""
     above = curve - neutral > 0.5 * (curve.max(initial=neutral) - neutral)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]]).astype(np.int8)))
     pairs = edges.reshape(-1, 2)
@@ -141,10 +141,11 @@ def _peaks(curve: Doubles, neutral: float) -> Doubles:
 
 
 def _together(pair: list[_Measured]) -> _Measured:
-    """One measurement for both sides, so that an even face stays even."""
+    """Combines the measurements of both sides, so that a symmetric face stays symmetric."""
     extremes = [side.extreme for side in pair]
     least, most = min(extremes), max(extremes)
-    # If both sides go equally far, both reach 1. Otherwise one side was not taken to its extreme.
+    # If the extremes are similar, the smaller one lets both sides reach 1. Otherwise one side did
+    # not reach its extreme.
     return _Measured(
         float(np.mean([side.neutral for side in pair])),
         least if least >= _SAME * most else most,
@@ -155,7 +156,7 @@ def _together(pair: list[_Measured]) -> _Measured:
 
 
 def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> Learned:
-    """The range of a control, or the reason why it is not used."""
+    """The range of a control, with the reason if it is not used."""
     moved = found.extreme - found.neutral
     gain = max(most_gain, _LID_GAIN) if _is_lid(name) else most_gain
     reasons = {
@@ -167,7 +168,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # Rounded down, so that a peak never ends a little below 1.
+    # Rounded down, so that the extreme maps to 1 and not slightly below.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Maps values of controls by the ranges of a person: neutral becomes 0, extreme becomes 1.
+"""Rescales controls by the ranges of a person: neutral becomes 0, extreme becomes 1.
 
     share = (value - neutral) / (extreme - neutral)         0 to 1
     result = share * (width + (1 - width) * share)          width = extreme - neutral
 
-The slope is 1 at neutral, so that noise at rest is not amplified.
+The slope is 1 at the neutral value, so that noise at rest is not amplified.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from ..base.errors import ArgumentError
 Floats = npt.NDArray[np.float32]
 
 NEUTRALS = (0.0, 0.9)
-"""Limits of a range's neutral value."""
+"""Smallest and largest neutral value of a range."""
 WIDTHS = (0.1, 1.9)
-"""Limits of extreme minus neutral; beyond them the mapping would not be ascending."""
+"""Smallest and largest width (extreme - neutral); others would make the mapping descend."""
 
 
-_APPLIED = "range"  # key in a clip's metadata for the source of removed ranges
-_CAPTURES = ("live_link_face", "csv", "json")  # kinds of files with captures
+_APPLIED = "range"  # key in a rescaled clip's metadata, with the source of the ranges
+_CAPTURES = ("live_link_face", "csv", "json")  # kinds of imported files that contain captures
 
 
 def is_captured(clip: Clip) -> bool:
-    """Whether a clip holds captured values: not speech, and without removed ranges."""
+    """Whether a clip is a capture that was not rescaled; speech is no capture."""
     is_capture = clip.metadata.get("kind") in _CAPTURES or "subject" in clip.metadata
     return is_capture and _APPLIED not in clip.metadata
 
 
 def require_untouched(clip: Clip) -> None:
-    """Raises: ArgumentError: ranges were removed from the clip before."""
+    """Checks a clip. Raises: ArgumentError: the clip was rescaled before."""
     if _APPLIED in clip.metadata:
         raise ArgumentError(
             "a capture as it came was expected, found one whose range was taken out before: "
@@ -47,24 +47,24 @@ def require_untouched(clip: Clip) -> None:
 
 
 class Range(NamedTuple):
-    """The range of one control."""
+    """The neutral and the extreme value of one control."""
 
     neutral: float
-    """The value of a face at rest, within NEUTRALS."""
+    """Value of the control for a face at rest, within NEUTRALS."""
     extreme: float
-    """The largest possible value; neutral plus a width within WIDTHS."""
+    """Largest value that the control reaches; neutral plus a width within WIDTHS."""
 
     @property
     def gain(self) -> float:
-        """The factor that maps the range to 1; 1 means no change."""
+        """The factor that scales the width of the range to 1."""
         return 1.0 / (self.extreme - self.neutral)
 
     def calibrated(self) -> Range:
-        """The range after the face at rest was subtracted, see process.calibrate."""
+        """The range of the control after process.calibrate subtracted the neutral face."""
         return Range(0.0, (self.extreme - self.neutral) / (1.0 - self.neutral))
 
     def trouble(self) -> tuple[str, str] | None:
-        """(field, expected and found value) of an invalid range; None if it is valid."""
+        """(field, message) for an invalid range; None if it is valid."""
         low, high = NEUTRALS
         if not low <= self.neutral <= high:
             return "neutral", f"{low:g} to {high:g} was expected, found {self.neutral:g}"
@@ -78,41 +78,41 @@ class Range(NamedTuple):
 
 
 class Learned(NamedTuple):
-    """The measurement of one control in a take."""
+    """The range of one control that was measured in a take."""
 
     range: Range
-    """The measured range, even if it is not used."""
+    """The measured range, whether used or not."""
     reason: str = ""
-    """Why the control stays as captured; "" if its range is used."""
+    """Why the control is not rescaled; "" if its range is used."""
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """The ranges of a person.
+    """The ranges of a person's controls.
 
     Attributes:
-        controls: raw control in the spelling of a DNA -> its measurement.
-        source: the take in which they were measured.
+        controls: name of a raw control in DNA spelling -> its measurement.
+        source: the take in which the ranges were measured.
     """
 
     controls: Mapping[str, Learned] = field(default_factory=dict)
     source: str = ""
 
     def __post_init__(self) -> None:
-        """Raises: ArgumentError: a used range is invalid."""
+        """Checks the ranges. Raises: ArgumentError: a used range is invalid."""
         for name, range_ in self.used().items():
             if trouble := range_.trouble():
                 raise ArgumentError(f"{name}: {trouble[0]}: {trouble[1]}")
 
     def used(self) -> dict[str, Range]:
-        """The ranges of the controls that change."""
+        """The ranges of the controls that are rescaled."""
         return {name: found.range for name, found in self.controls.items() if not found.reason}
 
     def apply(self, clip: Clip) -> Clip:
-        """A clip of raw controls with the ranges removed; other curves keep their bits.
+        """Rescales a clip of raw controls; other curves stay bitwise equal.
 
         Raises:
-            ArgumentError: ranges were removed from the clip before.
+            ArgumentError: the clip was rescaled before.
         """
         require_untouched(clip)
         remap = Remap(clip.names, self.used())
@@ -121,25 +121,25 @@ class Ranges:
         return clip.replaced(curves=remap(clip.curves.T).T, metadata=self.noted(clip.metadata))
 
     def noted(self, metadata: Mapping[str, str]) -> dict[str, str]:
-        """Metadata of a clip from which these ranges are removed."""
+        """The metadata with a note of these ranges, for a rescaled clip."""
         return {**metadata, _APPLIED: self.source or "without a source"}
 
     def rows(self) -> Iterable[tuple[str, str, str, str, str]]:
-        """For a table: control, neutral, extreme, gain, reason why it is not used."""
+        """Rows of a table: control, neutral, extreme, gain, reason why it is not used."""
         for name, (range_, reason) in self.controls.items():
             gain = "" if reason else f"{range_.gain:.2f}"
             yield name, f"{range_.neutral:.3f}", f"{range_.extreme:.3f}", gain, reason
 
 
 class Remap:
-    """Ranges compiled for values in the order of given names.
+    """Rescales values in the order of given names; the ranges are compiled once.
 
     Args:
         names: names of the controls.
-        ranges: by name; names without a range keep their values.
+        ranges: name -> range; values of names without a range are kept.
 
     Attributes:
-        changes: whether any value may change.
+        changes: whether any name has a range.
     """
 
     def __init__(self, names: Sequence[str], ranges: Mapping[str, Range]) -> None:
@@ -151,11 +151,11 @@ class Remap:
         self._width = self._extreme - self._neutral
 
     def __call__(self, values: Floats) -> Floats:
-        """The values with the ranges removed.
+        """The rescaled values.
 
         Args:
-            values: float32[..., names]. A value below 0 stays, and so does one above 1 that exceeds
-                the extreme, for overdrive.
+            values: float32[..., names]. Values below 0 are kept, and so are values above both 1 and
+                the extreme, so that exaggerated captures stay exaggerated.
 
         Returns:
             float32[..., names], a copy.

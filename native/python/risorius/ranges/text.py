@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ranges as an editable text file: NAME.range.toml.
+"""Reads and writes ranges as an editable text file NAME.range.toml.
 
 format = "risorius range 1"
 source = "rom.csv"
@@ -21,7 +21,7 @@ from .remap import Learned, Range, Ranges
 
 _FORMAT = "risorius range 1"
 _PREFIX = "CTRL_expressions."
-_LARGEST = 100.0  # no captured value is larger
+_LARGEST = 100.0  # no captured value is larger; larger numbers are errors
 _KEYS = {"format", "source", "controls"}
 _HEAD = """\
 # How far the controls of a person's face go in captures. The value "neutral" becomes 0, "extreme"
@@ -31,7 +31,7 @@ _HEAD = """\
 
 
 def ranges_text(ranges: Ranges) -> str:
-    """The text of a file; lines end in LF."""
+    """Ranges as the text of a file; lines end in LF."""
     lines = [f"{_HEAD}format = {json.dumps(_FORMAT)}", f"source = {_quoted(ranges.source)}"]
     lines += ["", "[controls]"]
     for name, (range_, reason) in ranges.controls.items():
@@ -47,11 +47,11 @@ def _quoted(text: str) -> str:
 
 
 def load_ranges(path: str | os.PathLike[str]) -> Ranges:
-    """A file of ranges.
+    """Reads a file of ranges.
 
     Raises:
-        AnimationFileError: missing, not TOML, or an unusable field; the sentence names the file,
-            the field and the value.
+        AnimationFileError: missing, not TOML, or an invalid field; the message names file, field
+            and value.
     """
     name = os.fspath(path)
     try:
@@ -66,14 +66,14 @@ def load_ranges(path: str | os.PathLike[str]) -> Ranges:
 
 
 def parse_ranges(text: str, where: str) -> Ranges:
-    """The ranges in a text.
+    """Parses a file of ranges.
 
     Args:
-        text: TOML.
-        where: its name in errors.
+        text: content of the file.
+        where: name of the file in errors.
 
     Raises:
-        AnimationFileError: as load_ranges.
+        AnimationFileError: not TOML, or an invalid field.
     """
     try:
         table = toml.parse(text)

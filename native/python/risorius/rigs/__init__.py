@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""DNA files and compiled rigs: loading, checking, editing, the cache of compiled faces."""
+"""Loads, checks and edits DNA files, and caches compiled rigs."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A cache of compiled faces on the disk."""
+"""A cache of compiled rigs on the disk."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ def compile_cached(
     rotation: str = "euler",
     simd: str | None = None,
 ) -> Rig:
-    """Rig(load(path)), taken from a cache if it was compiled before.
+    """Compiles a DNA file, or loads its rig from the cache if it was compiled before.
 
     The cache file is named by a hash of the DNA's bytes, the options, this version and the byte
-    order, so that an edited DNA gets another file. The hash of its content is checked each time,
+    order, so an edited DNA gets another file. A hash of the cached content is checked each time,
     and a damaged file is replaced. If the folder cannot be written, the face is compiled each time
     without an error. Nothing is ever deleted; users may delete files.
 
     Args:
         path: path of a DNA file.
-        cache_dir: default is a folder among the user's caches; made if missing. If others may write
-            to it, its files are checked like DNA files, see Rig.load: a hash finds damage, not
-            forgery.
-        precision, rotation, simd: as in Rig.
+        cache_dir: folder of the cache, created if missing; None: a folder in the user's caches. If
+            others may write to it, its files are checked like DNA files (see Rig.load), because a
+            hash detects damage but not forgery.
+        precision, rotation, simd: see Rig.
 
     Raises:
-        DnaError: as load(path) and Rig.
+        DnaError: see load and Rig.
         ValueError: an unknown option.
     """
     try:
         data = read_file(path, FACE)
-    except (OSError, ReadingError):  # load() below fails too, and its error names the file
+    except (OSError, ReadingError):  # load below fails too, with an error that names the file
         dna = load(path)
         return Rig(dna, precision=precision, rotation=rotation, simd=simd)
     file = Path(cache_dir) if cache_dir is not None else cache_folder() / "rigs"
@@ -54,11 +54,11 @@ def compile_cached(
     try:
         dna = load(data)
     except DnaError as error:
-        if not os.path.isfile(path):  # a pipe can be read only once
+        if not os.path.isfile(path):  # not read again, because a pipe can be read only once
             named = DnaError(f"{os.fspath(path)}: {error}")
             named.code, named.where, named.offset = error.code, error.where, error.offset
             raise named from None
-        dna = load(path)  # its error names the file
+        dna = load(path)  # raises the error again, with the name of the file
     rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
     with contextlib.suppress(OSError, DnaError):
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -67,7 +67,7 @@ def compile_cached(
 
 
 def _key(data: bytes, precision: str, rotation: str) -> str:
-    what = hashlib.sha256(data)  # CPUs have instructions for SHA-256: twice as fast as blake2b
+    what = hashlib.sha256(data)  # faster than blake2b, because CPUs have instructions for SHA-256
     versions = (version.__version__, rig_block_version(), compile_version())
     about = (*versions, sys.byteorder, precision, rotation)
     what.update(repr(about).encode())

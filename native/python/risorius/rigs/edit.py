@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Operations from Dna to Dna.
-
-regroup rebuilds the joint groups densely and without outliers.
-"""
+"""Rebuilds the joint groups of a face densely, optionally without small coefficients."""
 
 from __future__ import annotations
 
@@ -29,31 +26,31 @@ def regroup(
     seed: int = 0,
     timed: int = 1000,
 ) -> tuple[Dna, RegroupReport]:
-    """The same face with dense joint groups.
+    """A copy of the face with dense joint groups.
 
-    Joints that the same controls drive form a region. Each region becomes one dense group in which
-    rows of coarser LODs come first. Small coefficients of controls that are foreign to a region are
+    Joints that the same controls drive form a region. Each region becomes one dense group, with the
+    rows of coarser LODs first. Small coefficients of controls that are foreign to a region are
     removed.
 
     Args:
-        dna: not changed.
-        regions: joints of each region, by name or index, in a mapping by region name or in a list;
-            a name stands for all joints that have it. Joints that no region lists are grouped by
-            the controls that drive them; None: all joints.
-        threshold: (mm, degrees, scale): a coefficient whose effect at control value 1 is below it
-            is small; x is (x mm, x degrees, x per cent of scale). 0 removes nothing, and the result
-            is the same function, on the scalar path to the last bit.
+        dna: the face; not changed.
+        regions: joints of each region, by name or index, as a mapping by region name or a list; a
+            name means all joints with that name. Joints that no region lists are grouped by the
+            controls that drive them; None: all joints are.
+        threshold: (mm, degrees, scale): a coefficient is small if its effect at control value 1 is
+            below this; a number x means (x mm, x degrees, x per cent of scale). 0 removes nothing,
+            and results stay equal, on the scalar path bitwise.
         foreign_share: a control is foreign to a region if it moves at most this share of the
             region's joints.
-        combinations: number of random poses that the report compares, in addition to each raw
-            control at 1.
+        combinations: number of random poses, besides each raw control at 1, in which the report
+            compares the faces.
         seed: seed of the random poses.
-        timed: number of evaluations to time before and after; 0 for none.
+        timed: number of timed evaluations before and after; 0 for none.
 
     Returns:
-        The new Dna and a report: sizes before and after, the regions' joint indices, the largest
-        change of any joint at any LOD, the median time of an evaluation. Coefficients of joints
-        that quaternions turn are never removed.
+        The new Dna and a report: sizes before and after, joint indices of the regions, largest
+        change of a joint at any LOD, median duration of an evaluation. Coefficients of joints with
+        quaternion rotation are never removed.
 
     Raises:
         DnaError: an inconsistent Dna; a joint that does not exist or is in two regions; a region
@@ -86,10 +83,10 @@ def _three(threshold: float | Sequence[float]) -> tuple[float, float, float]:
 
 
 def _indices(dna: Dna, regions: Regions) -> list[list[int]]:
-    """Joint indices of each region.
+    """Converts regions to lists of joint indices.
 
     Raises:
-        ValueError: no joint has that name.
+        ValueError: no joint has the name or index.
     """
     known: dict[str, list[int]] = {}
     for index, name in enumerate(dna.joint_names):

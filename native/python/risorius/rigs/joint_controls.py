@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Raw controls that hold the rotation of a joint.
+"""Finds the raw controls that hold the rotation of a joint, and computes their values.
 
 A MetaHuman head has twelve: `neck_01`, `neck_02` and `head`, each with `.qx .qy .qz .qw`. Its RBF
-poses, which repair neck and jaw when the head turns, read them. The evaluator neither turns these
-joints nor sets these controls: the host turns the joints and sets the controls before evaluation
+poses, which correct neck and jaw when the head turns, read them. The evaluator neither rotates
+these joints nor sets these controls: the host must do both before evaluation
 (EpicGames/MetaHuman-DNA-Calibration, issue 51). The four controls hold the rotation of their joint
 relative to the neutral pose, about the joint's own axes, in the file's coordinate system.
 """
@@ -26,9 +26,9 @@ ANGLES = {
     "neck": ("neck.yaw", "neck.pitch", "neck.roll"),
     "head": ("head.yaw", "head.pitch", "head.roll"),
 }
-"""Curves of a clip that turn neck and head, in radians, see head_turns."""
-_NOTHING = 1e-7  # a part of a quaternion below it is 0 up to rounding
-# In a face's own axes: x to its left, y to its back, z up.
+"""Names of curves in a clip that rotate neck and head, in radians; see head_turns."""
+_NOTHING = 1e-7  # quaternion components smaller than this count as 0
+# File axis -> direction in the face's own axes: x to its left, y to its back, z up.
 _FACE_AXES = {
     "right": (1.0, 0.0, 0.0),
     "left": (-1.0, 0.0, 0.0),
@@ -41,13 +41,13 @@ _FACE_AXES = {
 
 @dataclass(frozen=True)
 class JointControl:
-    """The four raw controls of one joint.
+    """The four raw controls that hold the rotation of one joint.
 
     Attributes:
-        joint: its index; name: its name in the file.
+        joint: index of the joint; name: its name in the file.
         controls: indices of the raw controls of x, y, z and w.
-        axes: float64[3, 3]; converts the vector part of a rotation about the face's axes (x to the
-            face's left, y to its back, z up) to the same rotation about the joint's axes.
+        axes: float64[3, 3], converts a rotation's vector part from the face's axes (x to the face's
+            left, y to its back, z up) to the joint's axes.
     """
 
     joint: int
@@ -56,11 +56,11 @@ class JointControl:
     axes: Doubles
 
     def values(self, turns: npt.ArrayLike) -> Doubles:
-        """The values of the four controls.
+        """The values of the four controls for rotations of the joint.
 
         Args:
-            turns: [..., 4], x, y, z, w of unit quaternions about the face's axes: the rotation of
-                the joint relative to its neutral pose.
+            turns: float[..., 4], unit quaternions x, y, z, w: rotation of the joint relative to its
+                neutral pose, about the face's axes.
 
         Returns:
             float64[..., 4], see one_sign.
@@ -70,12 +70,12 @@ class JointControl:
 
 
 def one_sign(turns: Doubles) -> Doubles:
-    """Of q and -q, which are the same rotation, the one whose last nonzero part is positive.
+    """Of q and -q, which are the same rotation, the quaternion whose last nonzero part is positive.
 
     RBF solvers with Euclidean distances distinguish q from -q.
 
     Args:
-        turns: float64[..., 4].
+        turns: float64[..., 4], quaternions x, y, z, w.
     """
     there = np.abs(turns) > _NOTHING
     last = 3 - np.argmax(there[..., ::-1], axis=-1)
@@ -84,10 +84,10 @@ def one_sign(turns: Doubles) -> Doubles:
 
 
 def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
-    """Find the raw controls that hold rotations of joints.
+    """Finds the raw controls that hold rotations of joints.
 
     Args:
-        dna: with definition and behavior.
+        dna: face with definition and behavior.
 
     Returns:
         A JointControl for each joint that has all four controls, in the order of the controls; and
@@ -117,12 +117,12 @@ def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
 
 
 def _what_is_wrong(stem: str, by_part: dict[str, list[int]], where: dict[str, int]) -> str:
-    """A sentence on raw controls that cannot all be set; empty if they can.
+    """A sentence if the four raw controls of a rotation are incomplete or ambiguous, else empty.
 
     Args:
-        stem: their name before the dot.
+        stem: name of the controls before the dot.
         by_part: "x", "y", "z", "w" -> indices of the controls.
-        where: joints by their names.
+        where: name of a joint -> its index.
     """
     missing = ", ".join(part for part in PARTS if part not in by_part)
     kept = "the controls stay as they are set"
@@ -136,7 +136,7 @@ def _what_is_wrong(stem: str, by_part: dict[str, list[int]], where: dict[str, in
 
 
 def _read_by_solvers(dna: Dna) -> set[int]:
-    """Raw controls that RBF solvers, twists and swings read as quaternions."""
+    """Indices of raw controls that RBF solvers, twists and swings read as quaternions."""
     behavior = dna.twist_swing_behavior
     read = [solver.raw_control_indices for solver in dna.rbf_behavior.solvers]
     read += [setup.input_control_indices for setup in (*behavior.twists, *behavior.swings)]
@@ -144,11 +144,11 @@ def _read_by_solvers(dna: Dna) -> set[int]:
 
 
 def turn_axes(dna: Dna, joint: int) -> Doubles:
-    """The axes of a joint, float64[3, 3], see JointControl.axes.
+    """float64[3, 3]: the axes of a joint, see JointControl.axes.
 
     Args:
         dna: the face.
-        joint: its index.
+        joint: index of the joint.
     """
     convention, parents = Convention.of(dna), dna.joint_parents
     chain = [joint]
@@ -159,27 +159,27 @@ def turn_axes(dna: Dna, joint: int) -> Doubles:
         rest = product(rest, convention.quaternion(dna.neutral_joint_rotations[link]))
     known = all(word in _FACE_AXES for word in dna.coordinate_system)
     words = dna.coordinate_system if known else ("right", "up", "front")
-    face = np.array([_FACE_AXES[word] for word in words]).T  # file -> face
+    face = np.array([_FACE_AXES[word] for word in words]).T  # converts file axes to face axes
     sign = -1.0 if np.linalg.det(face) < 0.0 else 1.0
     return sign * matrix(rest).T @ face.T
 
 
 def matrix(q: Doubles) -> Doubles:
-    """float64[3, 3] of a unit quaternion (x, y, z, w), for column vectors."""
+    """float64[3, 3]: rotation matrix of a unit quaternion (x, y, z, w), for column vectors."""
     x, y, z, w = q
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
 
 
 def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
-    """The joints that turn as neck and head, by their usual names in any letter case.
+    """The joints that rotate as neck and head, by their usual names in any letter case.
 
     Args:
         names: names of the file's joints.
 
     Returns:
-        Joint -> "neck" or "head", and its share of the rotation: `neck_01` and `neck_02` divide the
-        neck's rotation.
+        Index of a joint -> ("neck" or "head", fraction of that rotation which the joint gets);
+        `neck_01` and `neck_02` divide the neck's rotation.
     """
     where: dict[str, int] = {}
     for index, name in enumerate(names):
@@ -194,7 +194,7 @@ def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
 
 
 def shared(turns: Doubles, share: float) -> Doubles:
-    """A share of rotations, the short way round.
+    """The fraction `share` of rotations, along the shorter way.
 
     Args:
         turns: float64[..., 4], x, y, z, w of unit quaternions; share: 0 to 1.
@@ -207,14 +207,14 @@ def shared(turns: Doubles, share: float) -> Doubles:
 
 
 def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doubles | None:
-    """The rotation of the neck or the head in a clip.
+    """The rotation of the neck or the head in each frame of a clip.
 
     Args:
         bone: "neck" or "head".
-        curves: float32[frames] by name, of the whole clip.
+        curves: name -> float32[frames], all curves of the clip.
 
     Returns:
-        float64[frames, 4] as in head_turns; None if the clip has no such curve.
+        float64[frames, 4], see head_turns; None if the clip has no such curve.
     """
     rows = [curves.get(name) for name in ANGLES.get(bone, ())]
     some = next((row for row in rows if row is not None), None)
@@ -225,18 +225,18 @@ def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doub
 
 
 def head_turns(angles: npt.NDArray[Any]) -> Doubles:
-    """Rotations of a head or a neck from a clip's angles.
+    """Quaternions of a head or a neck from a clip's angles.
 
     Args:
-        angles: [n, 3] radians: yaw to the face's own left, pitch up, roll towards its own left
-            shoulder; applied in this order, each about the axes after the one before.
+        angles: float[n, 3], radians: yaw to the face's own left, pitch up, roll towards its own
+            left shoulder; applied in this order, each about the already rotated axes.
 
     Returns:
         float64[n, 4], x, y, z, w about the face's axes (see JointControl.axes).
     """
     half = np.asarray(angles, np.float64) / 2.0
     (sy, sp, sr), (cy, cp, cr) = np.sin(half.T), np.cos(half.T)
-    # The product of yaw about z, pitch about -x and roll about y.
+    # The product of rotations: yaw about z, pitch about -x, roll about y.
     return np.stack(
         [
             -cp * sr * sy - cr * cy * sp,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the bytes of a DNA file into a Dna, or into a list of all its faults."""
+"""Loads the bytes of a DNA file as a Dna, and checks files for errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .._native import (
 from ..base import signatures
 from ..base.errors import ArgumentError
 
-# The format's data layers that each name of `layers` loads.
+# Name for the argument `layers` -> the layers of the file that it loads.
 _LAYERS = {
     "descriptor": set[str](),
     "definition": {"definition"},
@@ -36,14 +36,14 @@ _LAYERS["all"] = {"unknown_layers"}.union(*_LAYERS.values())
 
 
 class Finding(NamedTuple):
-    """One fault of a file: an error (the file is refused) or a warning."""
+    """An error, for which load refuses the file, or a warning."""
 
     is_error: bool
     code: str
     where: str
-    """The DNA field, e.g. behavior.joint_groups[3].values[7]."""
+    """Path of the field in the Dna, e.g. behavior.joint_groups[3].values[7]."""
     offset: int | None
-    """Byte offset in the file."""
+    """Byte offset in the file, or None."""
     message: str
 
     def __str__(self) -> str:
@@ -60,7 +60,7 @@ def load(
     unknown_layers: str = "preserve",
     limits: Limits | None = None,
 ) -> Dna:
-    """Read a DNA file of version 2.1 to 2.8 (or a newer minor version).
+    """Loads a DNA file of version 2.1 to 2.8 (or a newer minor version).
 
     Args:
         source: a path, or the bytes of a file.
@@ -112,7 +112,7 @@ def load(
 
 
 def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = None) -> list[Finding]:
-    """All errors and warnings of a file, in its order; a bad layer does not hide others.
+    """All errors and warnings of a file, in file order; a bad layer does not hide others.
 
     Args:
         source: a path, or the bytes of a file.

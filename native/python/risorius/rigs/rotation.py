@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rotations in double precision. Quaternions are (x, y, z, w); see CONVENTIONS.md."""
+"""Euler angles and quaternions (x, y, z, w) in double precision; see CONVENTIONS.md."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
 class Convention:
-    """Order, signs and unit of Euler angles. Values of a file that the format does not define are
-    taken like the evaluator does: x y z, positive signs, degrees."""
+    """Order, signs and unit of a file's Euler angles. Undefined values mean, as for the evaluator,
+    x y z, positive signs and degrees."""
 
     def __init__(self, sequence: str, signs: tuple[int, ...], unit: str) -> None:
         known = sequence if sequence in SEQUENCES else SEQUENCES[0]
@@ -30,7 +30,7 @@ class Convention:
         return cls(dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit)
 
     def quaternion(self, angles: Doubles) -> Doubles:
-        """float64[3] in the file's unit -> float64[4]"""
+        """Euler angles float64[3] in the file's unit -> quaternion float64[4]"""
         q = np.array([0.0, 0.0, 0.0, 1.0])
         half = np.asarray(angles, float) * self.signs * self.radians / 2
         for axis in self.order:
@@ -40,7 +40,8 @@ class Convention:
         return q
 
     def angles(self, q: Doubles) -> Doubles:
-        """float64[4] -> float64[3] in the file's unit; in gimbal lock the last angle is 0."""
+        """Quaternion float64[4] -> Euler angles float64[3] in the file's unit; in gimbal lock the
+        last angle is 0."""
         m = _matrix(q)
         i, j, k = self.order
         parity = 1 if j == (i + 1) % 3 else -1
@@ -56,13 +57,13 @@ class Convention:
 
 
 def product(a: Doubles, b: Doubles) -> Doubles:
-    """a * b: turns by b first, then by a."""
+    """The quaternion a * b, which rotates by b first, then by a."""
     v = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
     return np.array([*v, a[3] * b[3] - a[:3] @ b[:3]])
 
 
 def angle_degrees(a: Doubles, b: Doubles) -> float:
-    """The angle between the rotations a and b, 0 to 180 degrees.
+    """The angle between two rotations in degrees, 0 to 180.
 
     Args:
         a, b: float64[4], unit quaternions (x, y, z, w).
@@ -72,7 +73,7 @@ def angle_degrees(a: Doubles, b: Doubles) -> float:
 
 
 def _matrix(q: Doubles) -> Doubles:
-    """Rows are the images of the axes."""
+    """float64[3, 3]: rotation matrix of a quaternion; its rows are the images of the axes."""
     x, y, z, w = q / np.linalg.norm(q)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return (np.eye(3) + 2 * w * cross + 2 * cross @ cross).T

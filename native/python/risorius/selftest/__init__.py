@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks an installation: evaluates faces in the wheel and compares them with a reference."""
+"""Checks an installation: evaluates faces from the wheel and compares them with a reference."""
 
 from .checks import Row, run
 from .report import failed, text

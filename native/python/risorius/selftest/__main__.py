@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""python -m risorius.selftest [FACE.dna]: prints the report; exit code 0 only if all checks
-pass."""
+"""python -m risorius.selftest [FACE.dna]: prints the report; exits with 0 if all checks pass."""
 
 import sys
 
@@ -8,7 +7,7 @@ from . import failed, run, text
 
 
 def main() -> int:
-    """Run the checks; if a face is named, its frame is timed."""
+    """Runs the checks; a face named as argument is used for the timing."""
     rows = run(sys.argv[1] if len(sys.argv) > 1 else None)
     print(text(rows))
     return 1 if failed(rows) else 0

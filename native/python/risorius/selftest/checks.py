@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The checks, one row each: load, evaluate with every instruction set, write and read, time a
-frame.
+"""The checks of the self-test: load, evaluate with every instruction set, write and read files,
+time an evaluation.
 
-The faces and their values (golden/) are synthetic and come from OpenRigLogic, an independent
-implementation (tests/data/golden/README.md of the project). tests/python/support/make_selftest.py
-selects the compared values.
+The faces and their reference values (golden/) are synthetic. The values come from OpenRigLogic, an
+independent implementation (tests/data/golden/README.md); tests/python/support/make_selftest.py
+selects them.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ from ..base.errors import RisoriusError
 from ..files import fileio
 
 FACES = ("core", "units", "solvers")
-TOLERANCE = 2e-4  # times max(1, |value|); float32 sums in another order may differ by this
-TIMED = 0.2  # seconds of timing
-_NAME = "Prüfung 面.dna"  # a name that fails in code with narrow file names
+# largest error relative to max(1, |value|); float32 sums in another order may differ by this
+TOLERANCE = 2e-4
+TIMED = 0.2  # duration of the timing in seconds
+_NAME = "Prüfung 面.dna"  # a file name that fails in code with narrow file names
 
 
 class Row(NamedTuple):
-    """The result of one check."""
+    """The result of one check: its name, whether it passed, and a text."""
 
     name: str
     passed: bool
@@ -44,14 +45,14 @@ class Row(NamedTuple):
 
 
 class _Failed(RisoriusError):  # noqa: N818  never leaves this file
-    """A failed check; the text has the reason."""
+    """A failed check; its message is the reason."""
 
 
 def run(face: str | os.PathLike[str] | None = None) -> list[Row]:
-    """Run every check; an exception is a failed row.
+    """Runs every check; an exception gives a failed row.
 
     Args:
-        face: a DNA file whose frame is timed; None takes one of the wheel's.
+        face: path of a DNA file to time; None: a face of the wheel.
     """
     rows = [_guarded("machine", _machine)]
     rows += [_guarded(f"load {name}", partial(_load, name)) for name in FACES]
@@ -69,19 +70,19 @@ def _guarded(name: str, check: Callable[[], str]) -> Row:
         return Row(name, True, check())
     except _Failed as error:
         return Row(name, False, str(error))
-    except OSError as error:  # without the path, because reports are sent to strangers
+    except OSError as error:  # without the path, because users send reports to strangers
         return Row(name, False, f"{type(error).__name__}: {error.strerror or 'no reason given'}")
     except Exception as error:  # noqa: BLE001  unexpected errors belong in the report
         return Row(name, False, f"{type(error).__name__}: {error}")
 
 
 def content(name: str) -> bytes:
-    """The bytes of a file of golden/."""
+    """The bytes of a file in the folder golden/."""
     return resources.files(__package__).joinpath("golden", name).read_bytes()
 
 
 class _Case(NamedTuple):
-    """Raw controls at a LOD, and the reference's results."""
+    """A pose at a LOD, and the results of the reference implementation."""
 
     lod: int
     raw: npt.NDArray[np.float32]
@@ -91,9 +92,9 @@ class _Case(NamedTuple):
 
 
 def _cases(name: str) -> Iterator[_Case]:
-    """The cases of a face: golden/NAME.f32, little-endian float32, one row each.
+    """The cases of a face from golden/NAME.f32: little-endian float32, one row per case.
 
-    A row is lod, raw controls, joints (9 each), blend shapes, animated maps.
+    A row contains LOD, raw controls, joints (9 values each), blend shapes, animated maps.
     """
     dna = load(content(f"{name}.dna"))
     sizes = [1, len(dna.raw_control_names), 9 * len(dna.joint_names)]
@@ -105,7 +106,7 @@ def _cases(name: str) -> Iterator[_Case]:
 
 
 def _system() -> str:
-    """The system's name and version; on Windows without WMI, which wine lacks."""
+    """Name and version of the operating system; not from platform on Windows, which needs WMI."""
     if sys.platform == "win32":
         version = sys.getwindowsversion()
         return f"Windows {version.major}.{version.minor}.{version.build}"
@@ -163,7 +164,7 @@ def _evaluate(simd: str) -> str:
 
 
 def scalar_hash() -> str:
-    """SHA-256 of the scalar path's results for all cases of the face `core`, in hexadecimal."""
+    """SHA-256 in hexadecimal of the scalar path's results for all cases of the face `core`."""
     rig = Rig(load(content("core.dna")), simd="scalar")
     out = hashlib.sha256()
     for case in _cases("core"):
@@ -195,7 +196,7 @@ def _files() -> str:
     whole = content("solvers.dna")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / _NAME
-        for _ in range(2):  # the second time it replaces the first file
+        for _ in range(2):  # the second save replaces the first file
             load(whole).save(str(path))
             if path.read_bytes() != whole:
                 raise _Failed("the file that was read differs from the file that was written")

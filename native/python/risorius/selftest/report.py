@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report: text that a user sends back; it names the machine and nobody's folders."""
+"""The text of the self-test's report, which names the machine but no folders of the user."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def failed(rows: Iterable[Row]) -> list[Row]:
 
 
 def text(rows: Iterable[Row]) -> str:
-    """A line for each row, and one that says how it went."""
+    """A line of text for each check, and a last line with the number of failed checks."""
     rows = list(rows)
     bad = len(failed(rows))
     width = max(len(row.name) for row in rows)

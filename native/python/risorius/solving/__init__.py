@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Solves for controls from target positions: a drag on the skin, or a moving mesh.
+"""Finds the controls for target positions: of points dragged on the skin, or of a moving mesh.
 
-Raw controls --Surface--> vertices; dragged vertices --solve_drag--> raw controls.
+Surface: raw controls -> positions of vertices; solve_drag: dragged vertices -> raw controls.
 """

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Control curves from a moving mesh: the solver of a drag applied to the whole face, frame by
-frame.
+"""Finds the control curves that reproduce a moving mesh.
 
-First each frame is solved alone, starting from the frame before it: the controls that bring the
-mesh nearest, few of them and within their limits. Each control has a price, a multiple of the value
-that noise alone would give it. Then the selected controls are solved without that price, for all
-frames together, with a price on sudden changes of speed. The noise is measured: a clean mesh gives
-its curves back, and a noisy one gives quiet curves.
+First each frame is solved alone, starting from the solution of the frame before: few controls
+within their limits that bring the mesh nearest. Each control has a price, a multiple of the value
+that noise alone would give it. Then the selected controls are solved without this price, all frames
+together, with a price on sudden changes of speed. The noise is measured, so that curves of a clean
+mesh are exact, and those of a noisy mesh are calm.
 """
 
 from __future__ import annotations
@@ -28,55 +27,56 @@ from .controls import Bounds, ControlLimits, LimitFields, check_keywords, struct
 from .surface import Doubles, Floats, Surface, numbers
 
 Progress = Callable[[float], object]
-_CHUNK = 24  # frames that are solved in sequence
-_AROUND = 8  # frames before and after a chunk that take part in its smoothing
-_FLOOR_MM = 0.004  # smallest noise that is assumed
-_WORTH = 3.0  # price of a control, in standard errors of its value
-_LEAST = 0.01  # a control with a smaller range is not used
-_SUDDEN = (0.004, 0.5)  # smallest and largest usual second difference, at 30 frames per second
-_SOON = 0.1  # change of a control after which derivatives are recomputed
-_ENOUGH = 5e-4  # a smaller change of all controls ends the iteration
+_CHUNK = 24  # number of frames that are solved in sequence, starting from the frame before
+_AROUND = 8  # frames before and after a chunk that are smoothed with it
+_FLOOR_MM = 0.004  # mm: smallest noise that is assumed
+_WORTH = 3.0  # price of a control in standard errors of its value
+_LEAST = 0.01  # a control whose curve has a smaller range is not used
+# smallest and largest usual second difference of a control at 30 frames per second
+_SUDDEN = (0.004, 0.5)
+_SOON = 0.1  # change of a control above which derivatives are recomputed
+_ENOUGH = 5e-4  # a smaller change of all controls ends an iteration
 
 
 class CancelledError(RisoriusError):
-    """progress returned False."""
+    """The solve was cancelled because progress returned False."""
 
     code = "cancelled"
 
 
 class SolvedClip(NamedTuple):
-    """A moving mesh as curves, and the remaining error."""
+    """The curves that reproduce a moving mesh, and the remaining errors."""
 
     clip: Clip
     frame_residual: Floats
-    """float32[F]: root of the mean square of the vertices' distances, in the file's unit."""
+    """float32[F]: root mean square distance of the vertices per frame, in the file's unit."""
     vertex_residual: dict[int, Floats]
-    """By mesh, float32[V]: the same over the frames."""
+    """Mesh -> float32[V]: root mean square distance of each vertex over all frames."""
     largest: float
-    """Of all vertices in all frames, in the file's unit."""
+    """Largest distance of a vertex in any frame, in the file's unit."""
     noise: float
-    """Assumed noise of the mesh: a standard deviation in the file's unit."""
+    """Measured noise of the mesh: a standard deviation in the file's unit."""
 
 
 @dataclass
 class _Job:
-    """The constants of all frames."""
+    """The input of a solve, equal for all frames, and its progress."""
 
     surface: Surface
-    points: npt.NDArray[np.int64]  # [P, 2]: the compared vertices
-    targets: Floats  # [F, P, 3]
-    low: Doubles  # [R]
+    points: npt.NDArray[np.int64]  # [P, 2]: mesh and vertex of each compared point
+    targets: Floats  # [F, P, 3]: target positions
+    low: Doubles  # [R]: limits of the controls
     high: Doubles
-    free: npt.NDArray[np.bool_]
-    rest: Doubles
-    sparse: float
+    free: npt.NDArray[np.bool_]  # [R]: whether a control may change
+    rest: Doubles  # [R]: initial values
+    sparse: float  # price factors, see solve_clip
     smooth: float
     rate: float
-    sigma: float  # expected error of a vertex, in the file's unit
+    sigma: float  # expected error of a coordinate, in the file's unit
     told: Progress | None
-    share: float  # of the whole, for each frame and pass
-    done: float = 0.0
-    stop: list[bool] = field(default_factory=list)
+    share: float  # fraction of the work that one frame is in one pass
+    done: float = 0.0  # fraction of the work done
+    stop: list[bool] = field(default_factory=list)  # not empty after a cancellation
 
     def tell(self) -> None:
         self.done += self.share
@@ -86,7 +86,7 @@ class _Job:
 
 
 class _Frame:
-    """One frame: derivatives at a nearby pose, and the residual."""
+    """Derivatives of the points at a pose near that of a frame, and residuals."""
 
     def __init__(self, job: _Job) -> None:
         self._job = job
@@ -95,7 +95,10 @@ class _Frame:
         self.matrix = np.zeros((0, 0))
 
     def linearise(self, raw: Doubles, within: float) -> bool:
-        """Compute derivatives at a pose unless those of a near pose exist. Returns: computed."""
+        """Computes derivatives at a pose, unless they exist for a pose within a distance.
+
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of
+        raw."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -104,18 +107,18 @@ class _Frame:
         return True
 
     def is_at(self, raw: Doubles) -> bool:
-        """Whether the derivatives belong to the pose."""
+        """Whether the derivatives were computed at exactly this pose."""
         return self._at is not None and bool((raw == self._at).all())
 
     def forget(self) -> None:
-        """Force new derivatives."""
+        """Discards the derivatives, so that linearise computes new ones."""
         self._at = None
 
     def missing(self, raw: Doubles, frame: int) -> Doubles:
         return np.asarray(self._job.targets[frame] - self._probe.positions(raw))
 
     def pull(self, missing: Doubles) -> Doubles:
-        """The gradient of each control: J^T missing."""
+        """float64[R]: the gradient J^T missing of each control."""
         return self._probe.gradient(missing)
 
 
@@ -134,31 +137,31 @@ def solve_clip(
     progress: Progress | None = None,
     **keywords: Unpack[LimitFields],
 ) -> SolvedClip:
-    """The control curves that reproduce a moving mesh.
+    """Finds the control curves that reproduce a moving mesh.
 
     Args:
-        surface: the face.
-        frames: float32[F, V, 3] of meshes by index in dna.meshes; a single array is the first mesh
-            of the LOD. In the file's unit and axes, without motion of the head.
+        surface: surface of the face.
+        frames: index in dna.meshes -> float32[F, V, 3], vertices of the moving mesh; a single array
+            is the first mesh of the LOD. In the file's unit and axes, without motion of the head.
         rate: frames per second.
-        start: seconds, the time of the first frame.
-        neutral: float[V, 3] of the moving mesh at rest, by mesh as frames: then its displacements
-            are used instead of its shape, as for another face of the same topology. None: the
+        start: time of the first frame in seconds.
+        neutral: float[V, 3], the moving mesh at rest, as a mapping like frames: its displacements
+            are then used instead of its shape, for another face with the same topology. None: the
             face's own neutral.
-        sparse: price of a control's amount; 0: none, 1: the default.
-        smooth: price of a sudden change; 0: none, 1: the default.
-        limits: the controls that may move, and their ranges; None: all except parts of rotations,
-            from 0 to 1.
-        most_points: number of vertices to compare; the residual covers all vertices.
-        threads: number of threads; 0: all cores. The result does not depend on it.
-        progress: called with the share of the work, 0 to 1; returning False stops.
-        keywords: fields of `limits`, if it is None.
+        sparse: factor of the price of a control's value; 0 means no price, 1 is the default.
+        smooth: factor of the price of a sudden change; 0 means no price, 1 is the default.
+        limits: the controls that may change, and their ranges; None: all except rotation
+            components, from 0 to 1.
+        most_points: largest number of compared vertices; residuals cover all vertices.
+        threads: number of threads; 0: all cores. It does not influence the result.
+        progress: called with the fraction of the work done, 0 to 1; returning False cancels.
+        keywords: fields of ControlLimits, if `limits` is None.
 
     Returns:
-        The clip has a curve for each control that moves.
+        The clip with a curve for each control that changes, and the errors.
 
     Raises:
-        ValueError: an invalid argument; the sentence names it.
+        ValueError: an invalid argument; the message names it.
         CancelledError: progress returned False.
     """
     check_keywords("solve_clip", keywords, ControlLimits)
@@ -190,22 +193,23 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: target positions of points int64[P, 2]."""
+    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`."""
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )
 
 
 def _curves(job: _Job, count: int, workers: int) -> Doubles:
-    """float64[F, R]: solved frame by frame, then together."""
+    """float64[F, R]: controls of all frames, solved frame by frame, then together."""
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
-    job.sigma = max(job.sigma, float(np.sqrt(left)))  # another face is never reproduced exactly
+    # includes the error of another face, which is never reproduced exactly
+    job.sigma = max(job.sigma, float(np.sqrt(left)))
     return _together(job, _alone(job, count, begins, workers), workers)
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
-    """float64[R] of the first frame of each chunk, in sequence."""
+    """First frame of a chunk -> float64[R], its controls; chunks are solved in sequence."""
     frame, at, out = _Frame(job), job.rest, {}
     for begin in range(0, count, _CHUNK):
         at = out[begin] = _nearest(job, frame, begin, at, 12)
@@ -214,7 +218,7 @@ def _begins(job: _Job, count: int) -> dict[int, Doubles]:
 
 
 def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> Doubles:
-    """float64[F, R]: each frame solved alone."""
+    """float64[F, R]: controls of all frames, each frame solved alone."""
     curves = np.tile(job.rest, (count, 1))
 
     def chunk(begin: int) -> None:
@@ -229,12 +233,12 @@ def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> D
 
 
 def _prices(job: _Job, matrix: Doubles) -> Doubles:
-    """float64[R]: the prices, a multiple of the gradient that noise alone gives each control."""
+    """float64[R]: price per unit of each control, a multiple of the gradient from noise alone."""
     return job.sparse * _WORTH * np.sqrt(np.maximum(np.diag(matrix), 0)) / job.sigma
 
 
 def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) -> Doubles:
-    """float64[R]: the controls of one frame solved alone."""
+    """float64[R]: the controls of one frame, solved alone."""
     at, missing = start, frame.missing(start, index)
     scale = job.sigma**-2
     for _ in range(rounds):
@@ -263,10 +267,10 @@ def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) 
 
 
 def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
-    """float64[F, R]: all frames with a price on sudden changes, by chunks with their surroundings.
+    """float64[F, R]: all frames with a price on sudden changes, in overlapping chunks.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that moved there move here, without their price.
+    controls that changed in that solution change here, without their price.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
@@ -299,11 +303,11 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
 
 
 def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
-    """float64[F - 2, used]: price of a sudden change of each control, around each frame.
+    """float64[F - 2, used]: price of a sudden change of each control, at each frame.
 
-    It is 1 over the squared usual second difference: that of the control's curve minus the part
-    caused by noise, or the local one where it is clearly larger. A blink therefore stays sharp
-    while a slow jaw is kept quiet.
+    It is 1 / (usual second difference)^2. The usual value is that of the control's curve minus
+    noise, or the local value if that is clearly above the noise. A blink therefore stays sharp
+    while a slow jaw is smoothed.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))
@@ -317,7 +321,8 @@ def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Double
     near = plain.copy()
     near[1:] = np.maximum(near[1:], plain[:-1])
     near[:-1] = np.maximum(near[:-1], plain[1:])
-    usual = np.median(sudden, axis=0) / 0.455 - noise  # of a normal distribution's square
+    # 0.455 is the median of a squared standard normal variable
+    usual = np.median(sudden, axis=0) / 0.455 - noise
     least, most = (limit * (30.0 / job.rate) ** 2 for limit in _SUDDEN)
     return job.smooth / np.clip(np.maximum(near, usual), least**2, most**2)
 
@@ -330,7 +335,8 @@ def _smoothed(
     matrices: list[Doubles],
     aims: list[Doubles],
 ) -> Doubles:
-    """float64[n, used]: sweeps forwards and backwards through the frames until nothing changes."""
+    """float64[n, used]: curves after sweeps forwards and backwards through the frames, until no
+    control changes."""
     count = len(curves)
     bend = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
     bends = np.einsum("ti,tc,tj->ijc", bend, stiff, bend)  # [n, n, used]
@@ -376,13 +382,13 @@ def _result(
 
 
 def _left(job: _Job, raw: Doubles, frame: int) -> float:
-    """The mean squared residual of a coordinate."""
+    """The mean squared residual per coordinate of a frame."""
     probe = job.surface.probe(job.points)
     return float(((job.targets[frame] - probe.positions(raw)) ** 2).mean())
 
 
 def _noise(targets: Floats) -> float:
-    """The standard deviation of random changes from frame to frame.
+    """The standard deviation of the noise of a coordinate, in the file's unit.
 
     Fourth differences remove most of a movement and multiply the noise by sqrt(70).
     """
@@ -395,7 +401,7 @@ def _noise(targets: Floats) -> float:
 def _points(
     surface: Surface, wanted: dict[int, Floats], bounds: Bounds, most: int
 ) -> npt.NDArray[np.int64]:
-    """int64[P, 2]: an even selection of the vertices that some control moves at rest."""
+    """int64[P, 2]: mesh and vertex of evenly selected vertices that some control moves."""
     if most < 1:
         raise ArgumentError(f"most_points: 1 or more was expected, found {most}")
     rest = surface.rig.initial_raw_controls
@@ -426,7 +432,7 @@ def _meshes(
             end = len(surface.vertex_counts)
             raise ArgumentError(f"{name}: meshes below {end} were expected, found {shown(mesh)}")
         is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
-        # Values beyond float32 become infinite and are refused below.
+        # Values beyond float32 become infinite, and are refused below.
         with np.errstate(over="ignore"):
             array = np.asarray(value if is_real else numbers(name, value), np.float32)
         count = surface.vertex_counts[mesh]
@@ -455,7 +461,7 @@ def _moved(
     wanted: dict[int, Floats],
     neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None,
 ) -> dict[int, Floats]:
-    """Target positions of the face's own vertices, float32[F, V, 3] by mesh."""
+    """Mesh -> float32[F, V, 3]: target positions for the face's own vertices."""
     if neutral is None:
         return wanted
     own = _meshes("neutral", surface, neutral, 2)
@@ -466,7 +472,7 @@ def _moved(
 
 
 def _usual(surface: Surface) -> npt.NDArray[np.bool_]:
-    """bool[R]: all controls except parts of rotations."""
+    """bool[R]: True except for components of rotations."""
     parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
     names = surface.rig.raw_control_names
     return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arguments for the controls of a solver: their limits, and the way in which they share a drag."""
+"""Argument classes of the solvers: limits of controls, and how controls share a drag."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from .surface import Doubles, limits, vector
 
 
 class Bounds(NamedTuple):
-    """Checked limits: the range of each control of a face."""
+    """Checked limits of all controls of a face."""
 
     low: Doubles
-    """float64[R]"""
+    """float64[R]: smallest values."""
     high: Doubles
-    """float64[R]"""
+    """float64[R]: largest values."""
     free: npt.NDArray[np.bool_]
-    """bool[R]; for all other controls low and high equal the pose."""
+    """bool[R], controls that may change; for the others low and high equal the pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class ControlLimits:
     """The controls that a solver may change, and their ranges.
 
-    A control that starts outside of its range may keep its value.
+    A control whose initial value is outside its range may keep that value.
     """
 
     free: npt.ArrayLike | None = None
-    """bool[R], controls that may change; None: all, for a clip all except parts of rotations."""
+    """bool[R], controls that may change; None: all, in solve_clip all but rotation components."""
     lowest: npt.ArrayLike | None = None
-    """float[R] or one number; None is 0."""
+    """float[R] or one number, smallest values; None: 0."""
     highest: npt.ArrayLike | None = None
-    """float[R] or one number; None is 1."""
+    """float[R] or one number, largest values; None: 1."""
 
     def around(self, pose: Doubles, usual: npt.ArrayLike = True) -> Bounds:
-        """The limits of a face's controls, widened to contain the pose.
+        """Checks the limits for a face, and widens them to contain the pose.
 
         Args:
-            pose: float64[R], the initial values.
+            pose: float64[R], initial values of the controls.
             usual: bool or bool[R], used if `free` is None.
 
         Raises:
@@ -58,22 +58,21 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class ControlSharing:
-    """How controls share a drag: their ease, partners and opposites."""
+    """How the controls of a face share a drag: their ease, partners and opposites."""
 
     ease: npt.ArrayLike | None = None
-    """float[R] above 0, how readily each control changes: 0.1 costs ten times as much as 1. Of two
-    partners the larger ease counts. None: 1."""
+    """float[R] above 0, how readily each control changes: 0.1 costs ten times as much as 1. Two
+    partners have the larger ease of both. None: 1."""
     partners: npt.ArrayLike | None = None
-    """int[R], each control's partner, or itself: partners change by the same amount, like left and
-    right of a symmetric drag. None: no partners."""
+    """int[R], index of each control's partner, or its own index: partners change by the same
+    amount, such as left and right in a symmetric drag. None: no partners."""
     opposites: Sequence[tuple[int, int]] = ()
     """Pairs of controls of which at most one may be on, such as mouthLeft and mouthRight. On an
-    asymmetric face both together would fit best, but look wrong. Opposites that are partners too
-    are not affected."""
+    asymmetric face both together would fit best but look wrong. Pairs of partners are ignored."""
 
 
 class LimitFields(TypedDict, total=False):
-    """The fields of ControlLimits as keywords."""
+    """The fields of ControlLimits as keyword arguments."""
 
     free: npt.ArrayLike | None
     lowest: npt.ArrayLike | None
@@ -81,7 +80,7 @@ class LimitFields(TypedDict, total=False):
 
 
 class DragFields(LimitFields, total=False):
-    """The fields of ControlLimits and of ControlSharing as keywords."""
+    """The fields of ControlLimits and of ControlSharing as keyword arguments."""
 
     ease: npt.ArrayLike | None
     partners: npt.ArrayLike | None
@@ -94,16 +93,16 @@ _Structure = TypeVar("_Structure", ControlLimits, ControlSharing)
 def structure(
     name: str, given: _Structure | None, kind: type[_Structure], keywords: Mapping[str, object]
 ) -> _Structure:
-    """The structure that a caller gave, or one made from its fields among the keywords.
+    """The given structure, or one made from the keywords that are fields of its class.
 
     Args:
-        name: name of the argument.
+        name: name of the structure's argument, for errors.
         given: the structure; None if it was not given.
-        kind: its class.
-        keywords: keywords of the call; may have others.
+        kind: class of the structure.
+        keywords: keyword arguments of the call; other keywords are ignored.
 
     Raises:
-        ArgumentError: both the structure and some of its fields were given.
+        ArgumentError: both the structure and one of its fields were given.
     """
     make: Callable[..., _Structure] = kind
     own = {field.name for field in fields(kind)} & keywords.keys()
@@ -120,10 +119,10 @@ def check_keywords(
     keywords: Mapping[str, object],
     *kinds: type[ControlLimits] | type[ControlSharing],
 ) -> None:
-    """Refuse unknown keywords like Python does.
+    """Refuses unknown keywords with Python's own error.
 
     Args:
-        function: its name.
+        function: name of the function, for the error.
         keywords: keywords of the call.
         kinds: structures whose fields are valid keywords.
 

@@ -33,24 +33,24 @@ from .surface import Doubles, Floats, Surface, numbers, vector, wholes
 
 METHODS = ("least_squares", "transpose", "sparse")
 LOCAL = 0.12
-"""The effect of a control here is compared with its largest effect anywhere. If this ratio is below
-LOCAL times that of the most local control, the control belongs elsewhere: gaze belongs to the eyes,
-although lids and brows follow it."""
+"""A control belongs elsewhere if the ratio of its effect at the dragged points to its largest
+effect anywhere is below LOCAL times the largest such ratio of any control. Gaze belongs to the
+eyes, although lids and brows follow it."""
 ELSEWHERE = 0.001
-"""The ease of controls that belong elsewhere."""
+"""Ease of controls that belong elsewhere."""
 
 
 class Solved(NamedTuple):
-    """The result of a drag."""
+    """The pose that a drag leads to, and its error."""
 
     raw: Floats
-    """float32[R]"""
+    """float32[R], values of the raw controls."""
     positions: Floats
-    """float32[P, 3]: the resulting positions of the points, in the file's units."""
+    """float32[P, 3]: positions of the points at this pose, in the file's unit."""
     error: float
-    """Weighted root mean square of the remaining distances along the axes, in file units."""
+    """Weighted root mean square of the remaining distances along the axes, in the file's unit."""
     change: float
-    """The length of the change of the controls."""
+    """Euclidean length of the change of the controls."""
 
 
 def solve_drag(
@@ -68,31 +68,32 @@ def solve_drag(
     rounds: int = 4,
     **keywords: Unpack[DragFields],
 ) -> Solved:
-    """The smallest change of the controls that moves points to targets.
+    """Finds the smallest change of the controls that moves points to targets.
 
     Args:
-        surface: the face.
-        raw: float[R], the pose at the begin of the drag.
-        points: (mesh, vertex) of each dragged or pinned point.
-        targets: float[P, 3] in the file's units; a pin has its present position.
-        axes: float[P, k, 3]: unit vectors along which each point counts, e.g. the two of a screen,
-            which leave the depth free; None: all three.
-        weights: float[P], the importance of each point; None: 1.
+        surface: surface of the face.
+        raw: float[R], raw controls at the beginning of the drag.
+        points: (mesh, vertex) of each dragged or pinned point; pinned points have their present
+            position as target.
+        targets: float[P, 3], target positions in the file's unit.
+        axes: float[P, k, 3]: unit vectors along which the distance of each point counts, such as
+            the two axes of a screen, which leave the depth free; None: all three axes.
+        weights: float[P], importance of each point; None: 1.
         limits: the controls that may change, and their ranges; None: all, from 0 to 1.
-        sharing: ease, partners and opposites of the controls; None: all are equal.
-        method: "least_squares"; "transpose", which uses controls in proportion to their effect on
-            the points and changes less elsewhere; or "sparse", which uses few controls, about one
-            for each direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
-            controls that belong elsewhere (an ease below a tenth) only if they bring the points
-            clearly nearer. If few controls do not reach the targets it adds more, until it is less
-            than 1.3 mm behind least squares without ease.
-        smallest: price of a change relative to the reach of the strongest control; a larger value
-            gives up some of the target.
+        sharing: ease, partners and opposites of the controls; None: all controls are equal.
+        method: "least_squares"; "transpose", which changes controls in proportion to their effect
+            on the points and moves less elsewhere; or "sparse", which changes few controls, about
+            one per direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
+            controls that belong elsewhere (an ease below a tenth of the largest) only if they bring
+            the points clearly nearer. If few controls do not reach the targets, more are added
+            until the points are less than 1.3 mm farther away than with least squares without ease.
+        smallest: price of a change, relative to the effect of the strongest control; a larger value
+            misses the target by more.
         rounds: largest number of linearisations.
-        keywords: fields of `limits` and `sharing`, if these are None.
+        keywords: fields of ControlLimits and ControlSharing, if these arguments are None.
 
     Raises:
-        ValueError: an invalid argument; the sentence names it.
+        ValueError: an invalid argument; the message names it.
     """
     check_keywords("solve_drag", keywords, ControlLimits, ControlSharing)
     limits = structure("limits", limits, ControlLimits, keywords)
@@ -119,7 +120,7 @@ def _solved(
     smallest: float,
     rounds: int,
 ) -> Doubles:
-    """float64[R]: the pose that a method finds, with at most one of two opposites."""
+    """float64[R]: the pose found by a method, with at most one control of each opposite pair on."""
 
     def exactly(drag: Drag, start: Doubles) -> Doubles:
         return least_squares(drag, begin, start, smallest, rounds)
@@ -140,7 +141,7 @@ def _solved(
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
-    """int64[N, 2]"""
+    """int64[N, 2]: checked pairs of indices of controls."""
     found = wholes("opposites", opposites)
     pairs = found if found.size else np.empty((0, 2), np.int64)
     if pairs.shape[1:] != (2,) or not ((pairs >= 0) & (pairs < count)).all():
@@ -154,9 +155,9 @@ def _kept_apart(
     opposites: npt.NDArray[np.int64],
     solve: Callable[[Drag, Doubles], Doubles],
 ) -> Doubles:
-    """The result of `solve` with only one of two opposites: the one that it uses more.
+    """The pose from `solve` with only one control on of each opposite pair: the one used more.
 
-    An opposite that was on goes back to rest before the other one starts.
+    An opposite that was on at the beginning returns to 0 before the other one starts.
     """
     partner = np.arange(len(begin))
     partner[drag.unknowns.first] = drag.unknowns.second
@@ -179,9 +180,9 @@ def _kept_apart(
 def _both_on(
     opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Of the pairs that are both on, further than before: the weaker and the stronger ones.
+    """The pairs of which both controls are on, and further than before: (weaker, stronger).
 
-    The weaker one was on less before, or, if both rested, is on less now.
+    The weaker control was less on before, or is less on now if both had equal values.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -191,7 +192,7 @@ def _both_on(
 
 
 def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
-    """Gradient descent within the limits; each step is the best by the derivatives."""
+    """Gradient descent within the limits; each step's length minimises the linearised error."""
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
         toward = drag.unknowns.columns(jacobian).T @ missing
@@ -206,23 +207,23 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 
 
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
-    """The ease of each control at dragged points, for solve_drag: float64[R].
+    """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    A control gets ELSEWHERE if its effect here, relative to its largest effect anywhere, is below
-    LOCAL times that of the most local control: a dragged brow then does not turn the eyes, although
-    turning eyes move the brow. The others cost in proportion to their effect on the whole face
-    relative to the effect here: the brow lowers before the whole face is screwed up, which would
-    lower it as well. The readiest control has ease 1.
+    Controls that belong elsewhere (see LOCAL) get ELSEWHERE, so that a dragged brow does not turn
+    the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of their
+    effect here to their effect on the whole face, so that the brow lowers before the whole face
+    contracts, which would lower it too. The largest ease is 1.
 
     Args:
-        surface: the face.
-        reach: float[P, 3, R], effect of each control on the points, from surface.jacobian.
+        surface: surface of the face.
+        reach: float[P, 3, R], displacement of the points per unit of each control, from
+            surface.jacobian.
     """
     here = np.linalg.norm(numbers("reach", reach), axis=1).max(axis=0, initial=0.0)
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
-    # solve_drag squares the cost of a change, so the root makes it proportional to lengths.
+    # solve_drag squares the cost of a change; with the root, the change is proportional to `alone`.
     readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
     return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 
@@ -238,24 +239,24 @@ def best_controls(
     count: int = 8,
     **keywords: Unpack[LimitFields],
 ) -> list[tuple[int, float, float]]:
-    """The controls that bring a point nearest to a target when used alone, best first.
+    """The controls that alone bring a point nearest to a target, best first.
 
     Args:
-        surface: the face.
-        raw: float[R], the pose at the begin of the drag.
-        point: (mesh, vertex).
-        target: float[3] in the file's units.
-        axes: float[k, 3]: unit vectors along which the point counts; None: all three.
+        surface: surface of the face.
+        raw: float[R], raw controls at the beginning of the drag.
+        point: (mesh, vertex) of the point.
+        target: float[3], target position in the file's unit.
+        axes: float[k, 3]: unit vectors along which the distance counts; None: all three axes.
         limits: the controls that may change, and their ranges; None: all, from 0 to 1.
         count: largest number of results.
-        keywords: fields of `limits`, if it is None.
+        keywords: fields of ControlLimits, if `limits` is None.
 
     Returns:
-        (control, its value, the remaining distance of the point along the axes in the file's
-        units); controls that bring no improvement are left out.
+        (control, its value, remaining distance of the point along the axes in the file's unit) of
+        each; controls that bring no improvement are left out.
 
     Raises:
-        ValueError: an invalid argument; the sentence names it.
+        ValueError: an invalid argument; the message names it.
     """
     check_keywords("best_controls", keywords, ControlLimits)
     limits = structure("limits", limits, ControlLimits, keywords)
@@ -275,8 +276,8 @@ def best_controls(
 
 
 def _alone(drag: Drag, begin: Doubles, control: int) -> tuple[int, float, float]:
-    """The best value of one control and the remaining distance, by secants because the face
-    bends."""
+    """The control, its best value, and the remaining distance; solved by secants, because the face
+    is not linear."""
     low, high = float(drag.low[control]), float(drag.high[control])
     places = np.linspace(low, high, 5)
     at = begin.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Selects few controls for a drag, and adds more if these end too far behind all controls."""
+"""The method "sparse" of solve_drag: selects few controls, and adds more if necessary."""
 
 from __future__ import annotations
 
@@ -13,39 +13,42 @@ from .pull import ON, Drag, least_squares, seen_from
 from .sparse import cheapest_change, cheapest_to
 from .surface import Doubles
 
-_HARD = 0.1  # of the largest ease: controls with less belong elsewhere
-# A sparse drag may miss this share of the way, or this many mm, to use fewer controls; and controls
-# that belong elsewhere must bring the points nearer by at least these amounts together.
+_HARD = 0.1  # fraction of the largest ease below which a control belongs elsewhere
+# Distance that a sparse drag may miss to use fewer controls, as a fraction of the way and in mm;
+# and gain in distance that controls which belong elsewhere must bring together.
 _MISSING, _MISSING_MM = 0.02, 0.6
 _HELP, _HELP_MM = 0.02, 1.3
-_DEAR = 100.0  # price of controls that belong elsewhere: they come after all others
-# Least effect of a control relative to the strongest one, here and elsewhere.
+_DEAR = 100.0  # price of controls that belong elsewhere, so that all others are selected first
+# Smallest effect of a selectable control relative to the strongest one; the second number is for
+# controls that belong elsewhere.
 _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
-# More controls are added if few end farther from the targets than all would by this distance. Below
-# it the solution of all controls is not computed.
+# mm: more controls are added if few end farther from the targets than all by this distance. If few
+# end nearer than this, the solution with all controls is not computed.
 BEHIND_MM = 1.3
-_MORE = 3  # attempts to add controls by derivatives before all are taken
-_NOTHING_MM = 0.02  # an attempt that brings the points less near is the last one
-_WEAKEST = 0.01  # of the strongest's reach: weaker controls are not selected
-_STILL = 1e-4  # an iteration that changes controls less is the last one
-_GONE = 0.01  # price of a control that moved already
-_HALVES = 5  # bisections on the way to another pose
-_FEW = 2  # controls: if more were selected, fewer are tried
-_FREED = 4.0  # room of a selected control during the fit, relative to its change
+# attempts to add controls by derivatives before the way to the solution with all controls
+_MORE = 3
+_NOTHING_MM = 0.02  # mm: an attempt that brings the points nearer by less is the last one
+_WEAKEST = 0.01  # fraction of the strongest control's effect below which a control is not added
+_STILL = 1e-4  # a smaller change of all controls ends the iteration
+_GONE = 0.01  # price of a control that has already changed
+_HALVES = 5  # number of bisections between two poses
+_FEW = 2  # if more controls were selected, fewer are tried
+_FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 
 
 def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The cheapest change that comes near enough, then the best pose of the selected controls.
+    """Selects the cheapest change that comes near enough, then fits the selected controls.
 
-    A control costs the root of its effect on the points, by its ease: of several controls in one
-    direction a strong one is preferred to weak ones at their limits. Controls are selected once, by
-    the derivatives at the begin, so that the selection depends continuously on the targets, except
-    for controls that prove superfluous on the bent face.
+    The price of a control is divided by its ease and multiplied by the root of its effect on the
+    points, so that of several controls in one direction a strong one is preferred to weak ones at
+    their limits. Controls are selected once, by the derivatives at the beginning, so that the
+    selection depends continuously on the targets; only controls that prove superfluous are then
+    dropped.
 
     Args:
-        drag: the drag.
-        begin: float64[R], the pose at the begin.
-        smallest, rounds: as in solve_drag.
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        smallest, rounds: see solve_drag.
     """
     price, elsewhere = prices(drag)
     units = drag.unknowns.alike()
@@ -76,10 +79,10 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
 
 
 def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The best pose near a change float64[U], using only the controls that it moves.
+    """The best pose near a change float64[U] that uses only the controls that change there.
 
-    Full Gauss-Newton steps, whose result is continuous in the targets; if it ends far from them,
-    halved steps are used if they end nearer.
+    It uses full Gauss-Newton steps, whose result is continuous in the targets. If the result is far
+    from the targets, halved steps are tried, too, and the nearer result is used.
     """
     units, change = drag.unknowns, drag.unknowns.change(x, len(begin))
     drag = drag.held([*map(int, np.flatnonzero(change == 0))], begin)
@@ -106,10 +109,10 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """The price of each unknown by its ease, and whether it belongs elsewhere: float64[U], bool[U].
+    """float64[U], bool[U]: the price of each unknown by its ease, and whether it belongs elsewhere.
 
     Args:
-        drag: the drag.
+        drag: equations of the drag.
     """
     eases = drag.unknowns.ease
     elsewhere = eases < _HARD * eases.max()
@@ -124,15 +127,15 @@ def nearer(
     every: Doubles,
     pairs: npt.NDArray[np.int64],
 ) -> Doubles:
-    """Adds controls until the points are as near as with all controls, up to BEHIND_MM.
+    """Adds controls until the points are at most BEHIND_MM farther away than with all controls.
 
     Args:
-        drag: with unknowns of equal ease.
-        price: float64[U].
-        begin: the pose at the begin.
-        few: the pose with few controls.
-        every: the pose with all controls.
-        pairs: pairs of opposites.
+        drag: equations of the drag, with unknowns of equal ease.
+        price: float64[U], price of each unknown.
+        begin: float64[R], the pose at the beginning.
+        few: float64[R], the pose with few controls.
+        every: float64[R], the pose with all controls.
+        pairs: int64[N, 2], pairs of opposites.
     """
     aim = drag.far(every) + BEHIND_MM
     if drag.far(few) <= aim:
@@ -151,7 +154,7 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """The drag and a pose without the opposites of controls that are on in `every`."""
+    """Holds the opposites of controls that are on in `every`, at the smaller value of two poses."""
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
         int(pair[1 - side])
@@ -165,9 +168,9 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with as many additional controls as the derivatives need to come near enough.
+    """A pose with the additional controls that the linearised drag needs to come near enough.
 
-    Controls that moved already are nearly free.
+    Controls that have already changed are nearly free.
     """
     units, count = drag.unknowns, len(begin)
     jacobian, missing = units.columns(drag.jacobian(at)), drag.residual(drag.positions(at))
@@ -188,7 +191,7 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """A pose without as many of its weakest controls as half of the tolerance allows."""
+    """The pose `every` without its weakest controls, as many as half of the tolerance allows."""
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))
@@ -207,7 +210,7 @@ def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Dou
 
 
 def _towards(drag: Drag, at: Doubles, other: Doubles, aim: float) -> Doubles:
-    """The first of some poses on the way to another pose that is near enough."""
+    """A pose on the line to another pose, near the first one that is near enough to the targets."""
     if drag.far(at) <= aim:
         return at
     none, whole = 0.0, 1.0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Places handles for dragging: few vertices that reach as many controls as possible.
+"""Places handles for dragging: few vertices that control as many controls as possible.
 
-From optimal handles: Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
+The idea is from Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
 Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles
-are chosen one after the other, each for controls that the earlier ones cannot reach.
+are chosen one after the other, each for controls that the earlier ones cannot move.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy.typing as npt
 from ..base.given import MOST, checked, whole
 from .surface import Doubles, Floats, Surface
 
-_MOST_CANDIDATES = 3000
-_CHUNK = 1024  # vertices whose Jacobian is computed at a time
+_MOST_CANDIDATES = 3000  # largest number of vertices that are considered
+_CHUNK = 1024  # vertices whose Jacobian is computed together
 
 
 def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[np.int64]:
@@ -24,8 +24,8 @@ def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[n
     On a symmetric face the handles are symmetric too.
 
     Args:
-        surface: the face.
-        mesh: an index into dna.meshes.
+        surface: surface of the face.
+        mesh: index in dna.meshes.
         count: largest number of handles.
 
     Raises:
@@ -60,12 +60,12 @@ def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[n
 
 
 def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int64]:
-    """The vertices that are visible from the front, without the inside of the mouth.
+    """int64[n]: vertices that are visible from the front, without the inside of the mouth.
 
     Args:
-        places: float64[V, 3].
-        surface: knows the axes.
-        size: size of the mesh.
+        places: float64[V, 3], positions at rest.
+        surface: surface of the face, which knows the file's axes.
+        size: largest extent of the mesh.
     """
     depth = places @ surface.front
     flat = places[:, [surface.side, surface.up]]
@@ -77,20 +77,20 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
 
 
 def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floats:
-    """float32[n, 3, R]: the effect of each control at rest."""
+    """float32[n, 3, R]: displacement of each vertex per unit of each control, at rest."""
     rest = surface.rig.initial_raw_controls
     parts = [vertices[i : i + _CHUNK] for i in range(0, len(vertices), _CHUNK)]
     return np.concatenate([surface.jacobian(rest, mesh, part) for part in parts])
 
 
 def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
-    """int64[V]: the vertex on the other side, itself in the middle, -1 if there is none.
+    """int64[V]: the mirrored vertex; itself on the middle line, -1 without a mirrored vertex.
 
     Args:
-        places: float64[V, 3].
-        side: index of the axis from side to side.
-        up: index of the upward axis.
-        size: size of the mesh.
+        places: float64[V, 3], positions at rest.
+        side: index of the axis from left to right.
+        up: index of the vertical axis.
+        size: largest extent of the mesh.
     """
     near = size / 300
     middle = (places[:, side].min() + places[:, side].max()) / 2
@@ -112,13 +112,13 @@ def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[n
 
 
 def _leave_out(reach: Floats, surface: Surface, mesh: int, vertices: list[int]) -> None:
-    """Remove from all rows the directions that dragging these vertices already controls.
+    """Removes from all rows the directions of controls that these vertices can already drag.
 
     Args:
-        reach: float32[n, 3, R], changed in place.
-        surface: the face.
-        mesh: an index into dna.meshes.
-        vertices: the chosen ones.
+        reach: float32[n, 3, R], displacements by controls; changed in place.
+        surface: surface of the face.
+        mesh: index in dna.meshes.
+        vertices: the new handles.
     """
     rows = surface.jacobian(surface.rig.initial_raw_controls, mesh, np.array(vertices))
     _, values, directions = np.linalg.svd(rows.reshape(-1, rows.shape[2]), full_matrices=False)

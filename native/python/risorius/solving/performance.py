@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads moving meshes from files and aligns them with a face."""
+"""Reads moving meshes from files, and aligns them with a face."""
 
 from __future__ import annotations
 
@@ -17,42 +17,44 @@ from ..base.errors import RisoriusError
 from ..base.npz import DAMAGED, hold_arrays
 from .surface import Doubles, Floats
 
-_SCALES = 10.0 ** np.arange(-3, 4)
-_FARTHEST = 1e9  # in any unit; squares of larger values overflow
-# Of a face's size: an axis-aligned placement with a smaller error is assumed to be meant.
+_SCALES = 10.0 ** np.arange(-3, 4)  # scales that a difference of units explains
+_FARTHEST = 1e9  # largest coordinate; squares of larger values would overflow
+# Fraction of the face's size: an axis-aligned placement with a smaller error is preferred.
 _NEAR = 0.03
 
 
 class PerformanceError(RisoriusError):
-    """A performance that cannot be used."""
+    """A file with a moving mesh that cannot be used."""
 
     code = "performance"
 
 
 class Performance(NamedTuple):
-    """The vertices of one mesh over time."""
+    """The vertices of one moving mesh."""
 
     frames: Floats
-    """float32[F, V, 3]"""
+    """float32[F, V, 3]: positions in each frame."""
     rate: float
-    """Frames per second."""
+    """Frames per second of the file."""
     start: float
-    """Seconds, the time of the first frame."""
+    """Time of the first frame in seconds."""
     neutral: Floats | None
-    """float32[V, 3]: the mesh at rest, if the file has it."""
+    """float32[V, 3]: the mesh at rest, or None if the file has none."""
     note: str = ""
-    """The alignment that was applied, or empty."""
+    """A note on the alignment by `fitted`, or ""."""
 
 
 def read_performance(
     path: str | os.PathLike[str], name: str | None = None, counts: Mapping[int, int] | None = None
 ) -> Performance:
-    """Read an Alembic file (.abc) or an .npz with vertices [F, V, 3], perhaps rate and neutral.
+    """Reads an Alembic file (.abc), or an .npz with `vertices` [F, V, 3], and optionally `rate` and
+    `neutral`.
 
     Args:
-        path: the file.
-        name: name of the mesh in an Alembic file; None: the first that fits.
-        counts: numbers of vertices that fit, by mesh; None: any.
+        path: path of the file.
+        name: name of the mesh in an Alembic file; None: the first mesh that fits.
+        counts: mesh of the face -> its number of vertices; a mesh fits if its number is among
+            these. None: any mesh fits.
 
     Raises:
         PerformanceError: an unknown kind of file, a damaged file, an unknown mesh.
@@ -104,7 +106,8 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
     rate = float(given.item()) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
-    with np.errstate(over="ignore"):  # values beyond float32 become infinite and are refused
+    # values beyond float32 become infinite and are refused by the caller
+    with np.errstate(over="ignore"):
         own = None if neutral is None else neutral.astype(np.float32)
         return Performance(frames.astype(np.float32), rate, 0.0, own)
 
@@ -166,15 +169,15 @@ def _samples(path: str | os.PathLike[str], schema: Any, library: Any) -> Perform
 
 
 def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
-    """The performance in a face's unit and axes.
+    """Converts the performance to a face's unit and axes.
 
-    Vertices correspond, so that the rotation, scale and translation that bring the first frame
-    nearest to the face are known. If a rotation by right angles, a scale by a power of ten and no
-    translation fit almost as well, these are used.
+    Vertices correspond, so the rotation, scale and translation that bring the first frame nearest
+    to the face can be computed. If right angles, a power of ten as scale and no translation fit
+    almost as well, these are used.
 
     Args:
-        take: the performance.
-        positions: float[V, 3], the face at rest.
+        take: performance with the face's topology.
+        positions: float[V, 3], the face's vertices at rest.
     """
     own = np.asarray(positions, np.float64)
     first = np.asarray(take.frames[0] if take.neutral is None else take.neutral, np.float64)
@@ -201,8 +204,8 @@ def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
 
 
 def _similarity(source: Doubles, target: Doubles) -> tuple[Doubles, float, Doubles]:
-    """The rotation, scale and translation that minimise |scale turn source + move - target|
-    (Umeyama 1991).
+    """The rotation, scale and translation that minimise |scale rotation source + translation -
+    target| (Umeyama 1991).
 
     Args:
         source, target: float64[V, 3].

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drag as equations: target coordinates, the effect of controls on them, and their least
-squares."""
+"""A drag as equations: residuals of target coordinates, derivatives by controls, least squares."""
 
 from __future__ import annotations
 
@@ -15,59 +14,60 @@ from ..base.errors import ArgumentError
 from .controls import ControlLimits, ControlSharing
 from .surface import Doubles, Surface, numbers, vector, wholes
 
-ON = 1e-6  # a smaller change of a control counts as none
-_GAIN = 1e-5  # of the squared distance: a smaller gain ends the iteration
+ON = 1e-6  # smaller changes of a control count as none
+_GAIN = 1e-5  # fraction of the squared distance: a smaller gain ends the iteration
 
 
 @dataclass
 class Drag:
-    """A checked drag; its m rows are target coordinates."""
+    """The checked equations of a drag; their m = P k rows are target coordinates."""
 
     probe: Probe
-    free: npt.NDArray[np.bool_]  # [R]
-    targets: Doubles  # [P, 3]
-    axes: Doubles  # [P, k, 3]
+    free: npt.NDArray[np.bool_]  # [R]: controls that may change
+    targets: Doubles  # [P, 3]: target positions
+    axes: Doubles  # [P, k, 3]: directions that count
     roots: Doubles  # [P]: square roots of the weights
-    low: Doubles  # [R]
-    high: Doubles  # [R]
-    ease: Doubles  # [R]
+    low: Doubles  # [R]: smallest values
+    high: Doubles  # [R]: largest values
+    ease: Doubles  # [R]: how readily each control changes
     unknowns: Unknowns
-    mm: float  # millimetres in the file's unit
+    mm: float  # millimetres per unit of the file
 
     def held(self, controls: Sequence[int], at: Doubles) -> Drag:
-        """The same drag with some controls fixed. Args: controls; at  their values, [R]."""
+        """The same drag with some controls fixed. Args: controls: their indices; at: float64[R], a
+        pose with their values."""
         low, high, free = self.low.copy(), self.high.copy(), self.free.copy()
         low[controls] = high[controls] = at[controls]
         free[controls] = False
         return replace(self, low=low, high=high, free=free)
 
     def positions(self, raw: Doubles) -> Doubles:
-        """float64[P, 3]: where the points are. Args: raw  a pose, float64[R]."""
+        """float64[P, 3]: positions of the points. Args: raw: float64[R], a pose."""
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: the weighted distances. Args: positions  of the points, float64[P, 3]."""
+        """float64[m]: the weighted distances. Args: positions: float64[P, 3], of the points."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 
     def left(self, raw: Doubles) -> float:
-        """The squared distance. Args: raw  a pose, float64[R]."""
+        """The sum of squared weighted distances. Args: raw: float64[R], a pose."""
         missing = self.residual(self.positions(raw))
         return float(missing @ missing)
 
     def far(self, raw: Doubles) -> float:
-        """Root mean square distance in mm. Args: raw  a pose, float64[R]."""
+        """Weighted root mean square distance in mm. Args: raw: float64[R], a pose."""
         return self.error(self.residual(self.positions(raw))) * self.mm
 
     def jacobian(self, raw: Doubles) -> Doubles:
-        """The derivatives, float64[m, R]. Args: raw  a pose, float64[R]."""
+        """float64[m, R]: derivatives by the controls. Args: raw: float64[R], a pose."""
         self.probe.linearise(raw, self.high, self.free)
         out = self.probe.jacobian()
         along = np.einsum("pki,pir->pkr", self.axes, out) * self.roots[:, None, None]
         return np.asarray(along.reshape(-1, len(raw)))
 
     def error(self, residual: Doubles) -> float:
-        """Root mean square in file units. Args: residual  float64[m]."""
+        """Weighted root mean square in the file's unit. Args: residual: float64[m]."""
         return float(np.sqrt(residual @ residual / max(1e-300, float(self.roots @ self.roots))))
 
 
@@ -81,10 +81,10 @@ def make_drag(
     limits: ControlLimits,
     sharing: ControlSharing,
 ) -> Drag:
-    """Check the arguments and make a drag.
+    """Checks the arguments, and makes the equations of a drag.
 
     Args:
-        surface, raw, points, targets, axes, weights, limits, sharing: as in solve_drag.
+        surface, raw, points, targets, axes, weights, limits, sharing: see solve_drag.
 
     Raises:
         ArgumentError: an invalid argument.
@@ -109,7 +109,8 @@ def make_drag(
     probe = surface.probe(dragged)
     easy = vector("ease", 1.0 if sharing.ease is None else sharing.ease, len(raw))
     unknowns = _unknowns(len(raw), sharing.partners, easy)
-    # A pair has the larger ease of its two halves, because the other half alone would hold it back.
+    # Both partners have the larger ease of the two, because otherwise the slower one would hold
+    # back the other.
     pair = easy.copy()
     pair[unknowns.first] = pair[unknowns.second] = unknowns.ease
     return Drag(probe, free, wanted, along, np.sqrt(weight), low, high, pair, unknowns, surface.mm)
@@ -117,11 +118,11 @@ def make_drag(
 
 @dataclass
 class Unknowns:
-    """The unknowns: each is the change of one control, or of a control and its partner together."""
+    """The unknowns of a drag: changes of single controls, or of two partners together."""
 
-    first: npt.NDArray[np.int64]  # [U] controls
-    second: npt.NDArray[np.int64]  # [U] their partners, or the controls themselves
-    ease: Doubles  # [U]: of two partners the larger ease
+    first: npt.NDArray[np.int64]  # [U]: indices of controls
+    second: npt.NDArray[np.int64]  # [U]: indices of their partners, or of the controls themselves
+    ease: Doubles  # [U]: the larger ease of two partners
     scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
@@ -129,22 +130,22 @@ class Unknowns:
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
-        """The derivatives by unknowns, float64[m, U]. Args: jacobian  float64[m, R]."""
+        """float64[m, U]: derivatives by the unknowns. Args: jacobian: float64[m, R]."""
         both = jacobian[:, self.second] * (self.first != self.second)
         return np.asarray((jacobian[:, self.first] + both) * self.scale)
 
     def change(self, values: Doubles, count: int) -> Doubles:
-        """A change of the controls, float64[R]. Args: values  float64[U]; count  R."""
+        """float64[R]: the change of the controls. Args: values: float64[U]; count: R."""
         out = np.zeros(count)
         out[self.first] = out[self.second] = values * self.scale
         return out
 
     def values(self, change: Doubles) -> Doubles:
-        """The unknowns, float64[U]. Args: change  float64[R], alike in partners."""
+        """float64[U]: the unknowns. Args: change: float64[R], equal for partners."""
         return np.asarray(change[self.first] / self.scale)
 
     def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:
-        """Limits of the unknowns, float64[U] each. Args: low, high  of a change, float64[R]."""
+        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], of a change."""
         lowest = np.maximum(low[self.first], low[self.second]) / self.scale
         return lowest, np.minimum(high[self.first], high[self.second]) / self.scale
 
@@ -168,13 +169,13 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> Unkn
 def least_squares(
     drag: Drag, begin: Doubles, start: Doubles, smallest: float, rounds: int
 ) -> Doubles:
-    """Gauss-Newton with halved steps; keeps the whole change from the begin small.
+    """Minimises distances and change by Gauss-Newton with halved steps.
 
     Args:
-        drag: the drag.
-        begin: float64[R], the pose from which changes are counted.
-        start: float64[R], the initial pose.
-        smallest, rounds: as in solve_drag.
+        drag: equations of the drag.
+        begin: float64[R], the pose from which changes are measured.
+        start: float64[R], the pose where the iteration starts.
+        smallest, rounds: see solve_drag.
     """
     at = np.clip(start, drag.low, drag.high)
     missing = drag.residual(drag.positions(at))
@@ -182,7 +183,7 @@ def least_squares(
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
-        if price < 0:  # constant, so that no round gives up the gain of another
+        if price < 0:  # constant, so that a later round does not give up the gain of an earlier one
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
         here = drag.unknowns.values(at - begin)
@@ -203,13 +204,13 @@ def least_squares(
 
 
 def seen_from(drag: Drag, begin: Doubles, at: Doubles) -> tuple[Doubles, Doubles]:
-    """The derivatives at a pose, float64[m, U], and the residual in terms of changes from the
-    begin.
+    """Derivatives float64[m, U] at a pose, and the residual as a function of changes from the
+    beginning.
 
     Args:
-        drag: the drag.
-        begin: float64[R], the pose at its begin.
-        at: float64[R], the pose.
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        at: float64[R], the pose of the derivatives.
     """
     jacobian = drag.unknowns.columns(drag.jacobian(at))
     here = drag.unknowns.values(at - begin)

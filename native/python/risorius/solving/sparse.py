@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Finds the cheapest sparse change for a task: which controls a drag moves, and which stay.
+"""Finds the cheapest sparse solution of least squares: which controls a drag changes.
 
-Basis pursuit with bounds, by the path of the lasso: M. R. Osborne, B. Presnell and B. A. Turlach,
-"A new approach to variable selection in least squares problems", IMA Journal of Numerical Analysis
-20 (3), 2000. The cheapest change is a continuous function of the target, so that a stroke does not
-jump from one set of sliders to another, and it has at most about as many sliders as rows.
+Basis pursuit with bounds, by following the path of the lasso: M. R. Osborne, B. Presnell and B. A.
+Turlach, "A new approach to variable selection in least squares problems", IMA Journal of Numerical
+Analysis 20 (3), 2000. The solution is a continuous function of the target, so that a drag does not
+jump from one set of controls to another, and it changes at most about as many controls as there are
+rows.
 """
 
 from __future__ import annotations
@@ -17,33 +18,35 @@ import numpy.typing as npt
 
 from .surface import Doubles
 
-_REST, _MOVES, _BOUND = 0, 1, 2
-_MOST_STEPS = 600
-_MOST_MORE = 60  # steps of a path to a given distance; the result of a longer path is not cheap
-_END = 1e-6  # of the first price: the path ends here
-_FAR = 0.1  # of the whole way: a target that stays farther away is out of reach
-_LITTLE = 0.1  # of the possible gain: may be given up there to use fewer controls
-_CALM = 0.12  # of the first price: below it controls hardly help with such a target
-_LEVEL = 1e-9  # a smaller difference of slopes counts as none
+_REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: 0, moving, at a bound
+_MOST_STEPS = 600  # largest number of steps of a path
+# largest number of steps to a given distance; the result of a longer path is not sparse
+_MOST_MORE = 60
+_END = 1e-6  # fraction of the first price at which a path ends
+_FAR = 0.1  # fraction of the first residual: a target that stays farther away is out of reach
+# fraction of the possible gain that may be given up to use fewer controls, for such a target
+_LITTLE = 0.1
+_CALM = 0.12  # fraction of the first price below which controls hardly help, for such a target
+_LEVEL = 1e-9  # smaller differences of slopes count as none
 
 
 @dataclass
 class _Path:
-    """The path from no change to the nearest point, by a falling price per unit of change.
+    """The lasso path from x = 0 to the nearest point to the target, with a falling price.
 
-    All values are scaled so that each price is 1.
+    Columns and bounds are scaled so that the price per unit is equal for all unknowns.
     """
 
-    a: Doubles  # [m, n]
-    missing: Doubles  # [m]
-    low: Doubles  # [n], at most 0
-    high: Doubles  # [n], at least 0
-    x: Doubles = field(init=False)
-    state: npt.NDArray[np.int64] = field(init=False)
-    sign: Doubles = field(init=False)
-    pull: Doubles = field(init=False)
+    a: Doubles  # [m, n], the matrix
+    missing: Doubles  # [m], the residual
+    low: Doubles  # [n], lower bounds, at most 0
+    high: Doubles  # [n], upper bounds, at least 0
+    x: Doubles = field(init=False)  # [n], the unknowns
+    state: npt.NDArray[np.int64] = field(init=False)  # [n], _REST, _MOVES or _BOUND
+    sign: Doubles = field(init=False)  # [n], direction of each unknown from 0
+    pull: Doubles = field(init=False)  # [n], negative gradient of the squared residual / 2
     price: float = field(init=False)
-    left: int = -1  # came to rest in the last step
+    left: int = -1  # unknown that came to rest or to a bound in the last step, or -1
 
     def __post_init__(self) -> None:
         count = self.a.shape[1]
@@ -53,15 +56,15 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: the pull on each resting unknown that has room in that direction."""
+        """float64[n]: size of the gradient of each resting unknown that may follow it."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
     def step(self, end: float) -> int:
-        """Follow the path until an unknown begins to move, stops, or leaves a bound.
+        """Follows the path until an unknown begins to move, stops, or leaves a bound.
 
         Args:
-            end: the price at which to end.
+            end: price at which the path ends.
 
         Returns:
             The unknown that began to move from rest, or -1.
@@ -108,7 +111,7 @@ class _Path:
         self.state[which], self.sign[which] = _MOVES, np.sign(self.pull[which])
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
-        """Where each moving unknown stops, and after which decrease of the price."""
+        """The value at which each moving unknown stops, and the price's decrease until then."""
         stop = np.where(rate > 0, self.high, self.low)
         back = (self.x * rate < 0) | ((self.x == 0) & (rate * self.sign < 0))
         stop = np.where(back, 0.0, stop)
@@ -117,8 +120,7 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """The decrease of the price after which each resting unknown begins to move, and its
-        direction."""
+        """The price's decrease until each resting unknown begins to move, and its direction."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -132,7 +134,7 @@ class _Path:
         return np.minimum(up, down), np.where(up <= down, 1.0, -1.0)
 
     def _moves_again(self, slope: Doubles) -> Doubles:
-        """The decrease of the price after which each unknown at a bound leaves it."""
+        """The decrease of the price until each unknown at a bound leaves it."""
         falls = self.sign * slope - 1
         there = (self.state == _BOUND) & (falls > _LEVEL)
         if self.left >= 0:
@@ -151,16 +153,16 @@ def cheapest_change(
     tolerance: float,
     worth: float,
 ) -> Doubles:
-    """The cheapest x that brings a x near to b: float64[n], mostly 0.
+    """float64[n]: the cheapest x with a x near b; mostly 0.
 
     Args:
-        a: float64[m, n].
-        b: float64[m].
-        low, high: float64[n]; low is at most 0, high at least 0.
-        price: float64[n] above 0, price per unit.
-        elsewhere: bool[n], unknowns with a price so high that the others come first.
-        tolerance: allowed distance beyond the nearest possible one.
-        worth: improvement that unknowns elsewhere must bring.
+        a: float64[m, n], the matrix.
+        b: float64[m], the target.
+        low, high: float64[n], bounds of x; low is at most 0, high at least 0.
+        price: float64[n] above 0, price per unit of x.
+        elsewhere: bool[n], unknowns that should be used only if they help enough.
+        tolerance: allowed distance beyond the smallest possible one.
+        worth: decrease of the distance that the unknowns elsewhere must bring.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end, alone = [(path.x.copy(), path.missing)], _END * path.price, -1.0
@@ -177,22 +179,22 @@ def cheapest_change(
     aim = aim + tolerance if alone < 0 else min(alone + tolerance, aim + max(worth, tolerance))
     way, near = float(np.linalg.norm(b)), nearest if alone < 0 else alone
     if nearest > _FAR * way and near - nearest <= _FAR * way:
-        # Out of reach: controls that hardly help are left out.
+        # The target is out of reach: controls that hardly help are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
-    return np.clip(_where(nodes, aim) / price, low, high)  # rounding must not exceed the bounds
+    return np.clip(_where(nodes, aim) / price, low, high)  # because of rounding errors
 
 
 def cheapest_to(
     a: Doubles, b: Doubles, low: Doubles, high: Doubles, price: Doubles, aim: float
 ) -> Doubles:
-    """The cheapest x that brings a x within a distance of b, or as near as possible: float64[n].
+    """float64[n]: the cheapest x with a x within a distance of b, or as near as possible.
 
     Args:
-        a: float64[m, n].
-        b: float64[m].
-        low, high: float64[n]; low is at most 0, high at least 0.
-        price: float64[n] above 0, price per unit.
+        a: float64[m, n], the matrix.
+        b: float64[m], the target.
+        low, high: float64[n], bounds of x; low is at most 0, high at least 0.
+        price: float64[n] above 0, price per unit of x.
         aim: the distance.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
@@ -206,7 +208,7 @@ def cheapest_to(
 
 
 def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:
-    """The residual at the point of the path with this price."""
+    """The length of the residual at the point of the path with this price."""
     for (_, long), (_, short), before, after in zip(
         nodes, nodes[1:], prices, prices[1:], strict=False
     ):
@@ -217,7 +219,7 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """The first point of a path whose residual is at most `aim`."""
+    """float64[n]: the first point of a path whose residual has at most the length `aim`."""
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vertices of a face as a function of its raw controls, and their derivatives."""
+"""Positions of a face's vertices as a function of its raw controls, and their derivatives."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from ..base.given import LARGEST, MOST, shown
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
-MM = {"cm": 10.0, "m": 1000.0}
-_LOOKED_AT = 2000  # number of vertices that is enough to find a control's largest effect
+MM = {"cm": 10.0, "m": 1000.0}  # millimetres per unit
+_LOOKED_AT = 2000  # number of vertices that is enough to find a control's largest displacement
 
 
 class Surface:
-    """The meshes of a face, skinned and shaped by the evaluated rig.
+    """The meshes of a face, as the evaluated rig moves them.
 
-    Positions are in the file's units and axes, in the space of the head: turns of neck and head
-    outside of the face's own controls are not included.
+    Positions are in the file's unit and axes, and relative to the head: rotations of neck and head
+    by bones are not included.
 
     Attributes:
-        rig: the compiled face.
+        rig: rig of the face.
         lod: the level of detail that is evaluated.
         mesh_indices: the meshes of that LOD, as indices into dna.meshes.
-        vertex_counts: vertex counts of each mesh of the file.
-        mm: millimetres in the file's unit.
-        side, up: indices of the axis from side to side and of the vertical axis.
-        front: float64[3], the direction of the face.
+        vertex_counts: vertex count of each mesh of the file.
+        mm: millimetres per unit of the file.
+        side, up: index of the axis from left to right, and of the vertical axis.
+        front: float64[3], unit vector from the face to the front.
     """
 
     def __init__(self, dna: Dna, rig: Rig, lod: int = 0) -> None:
-        """Copy the needed parts of a face.
+        """Copies the needed parts of a face.
 
         Args:
-            dna: the file, with its geometry.
-            rig: compiled from it, with Euler angles as rotation.
-            lod: from 0, below the number of LODs.
+            dna: the face with its geometry.
+            rig: compiled from it, with rotations as Euler angles.
+            lod: number of the LOD, from 0.
 
         Raises:
-            DnaError: inconsistent lists, a rig that does not fit the file.
+            DnaError: inconsistent lists, or a rig that does not fit the file.
             ValueError: an unknown LOD.
         """
         _below("lod: a LOD", lod, max(1, rig.lod_count))
@@ -53,7 +53,7 @@ class Surface:
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
         mapping = dna.lod_mesh_mapping
         listed = mapping[lod].tolist() if lod < len(mapping) else []
-        # A file may name meshes without holding them.
+        # A file may list meshes whose geometry it lacks.
         self.mesh_indices = [m for m in listed if m < len(self.vertex_counts)]
         self._size = dna.size_in_bytes()
         self.mm = MM.get(dna.translation_unit, 10.0)
@@ -61,7 +61,7 @@ class Surface:
         self._look_at_axes(dna.coordinate_system)
 
     def _look_at_axes(self, directions: Sequence[str]) -> None:
-        """The meaning of the file's axes: left and right, up, and float64[3] to the front."""
+        """Sets side, up and front from the names of the file's axes."""
         kinds = {"left": 0, "right": 0, "up": 1, "down": 1, "front": 2, "back": 2}
         axes = [kinds.get(name, -1) for name in directions]
         if sorted(axes) != [0, 1, 2]:
@@ -73,12 +73,12 @@ class Surface:
     def positions(
         self, raw: npt.ArrayLike, mesh: int, vertices: npt.ArrayLike | None = None
     ) -> Floats:
-        """Positions of vertices under raw controls: float32[V, 3].
+        """float32[V, 3]: positions of vertices at a pose.
 
         Args:
-            raw: float[R].
-            mesh: an index into dna.meshes.
-            vertices: int[V]; None is all.
+            raw: float[R], values of the raw controls.
+            mesh: index in dna.meshes.
+            vertices: int[V], indices of vertices; None: all.
 
         Raises:
             ValueError: an index out of range, a value that is not a number.
@@ -95,16 +95,16 @@ class Surface:
         lowest: npt.ArrayLike | None = None,
         highest: npt.ArrayLike | None = None,
     ) -> Floats:
-        """The derivatives of vertices by each control at a pose: float32[V, 3, R].
+        """float32[V, 3, R]: derivatives of vertex positions by each control at a pose.
 
-        Differences of the evaluated rig, so that correctives, solvers and networks are included;
-        taken towards the side that the limits allow.
+        They are differences of evaluated poses, so that correctives, solvers and networks are
+        included; controls at their upper limit are decreased.
 
         Args:
             raw: float[R], the pose.
-            mesh: an index into dna.meshes.
-            vertices: int[V].
-            lowest, highest: float[R] or one number; None is 0 and 1.
+            mesh: index in dna.meshes.
+            vertices: int[V], indices of vertices.
+            lowest, highest: float[R] or one number, limits of the controls; None: 0 and 1.
 
         Raises:
             ValueError: an index out of range, a value that is not a number.
@@ -118,19 +118,20 @@ class Surface:
         return probe.jacobian()
 
     def strongest(self) -> Doubles:
-        """The largest displacement by each control, per unit from rest: float64[R].
+        """float64[R]: largest displacement of a vertex per unit of each control, from rest.
 
-        Measured once, on some thousand vertices spread evenly over the meshes of the level.
+        It is measured once, on about two thousand vertices spread evenly over the meshes of the
+        LOD.
         """
         return self._far().max(axis=0, initial=0.0)
 
     def spread(self) -> Doubles:
-        """Root mean square displacement of these vertices by each control: float64[R]."""
+        """float64[R]: root mean square displacement of these vertices per unit of each control."""
         far = self._far()
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 
     def _far(self) -> Doubles:
-        """float64[V, R]: displacement of some thousand vertices by each control."""
+        """float64[V, R]: displacement of about two thousand vertices per unit of each control."""
         if self._moved is None:
             count = self.control_count
             every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)
@@ -144,10 +145,10 @@ class Surface:
         return self._moved
 
     def probe(self, points: npt.NDArray[np.int64]) -> Probe:
-        """Points of the surface for repeated queries.
+        """A Probe, which evaluates the given points repeatedly.
 
         Args:
-            points: int64[P, 2], mesh and vertex.
+            points: int64[P, 2], (mesh, vertex) of each point.
 
         Raises:
             ValueError: an index out of range.
@@ -163,20 +164,20 @@ class Surface:
         return Probe(self._skins, points.astype(np.uint32))
 
     def check_size(self, points: int) -> None:
-        """Check the size of derivatives of points by all controls, and of their products.
+        """Checks the memory for derivatives of points by all controls, and for their products.
 
         Args:
-            points: their number.
+            points: number of points.
 
         Raises:
-            BudgetError: far larger than the face, as with very many raw controls.
+            BudgetError: far more memory than the face, as with very many raw controls.
         """
         count = self.control_count
         place = f"what {count:,} raw controls do to {points:,} points"
         Budget.of(self._size).hold(12 * points * count + 8 * count**2, place)
 
     def controls(self, raw: npt.ArrayLike) -> Floats:
-        """The caller's controls as float32[R].
+        """Checks raw controls, and returns them as float32[R].
 
         Raises:
             ValueError: a wrong shape, a value that is not a number.
@@ -185,7 +186,7 @@ class Surface:
 
     @property
     def control_count(self) -> int:
-        """R, the raw controls."""
+        """Number of raw controls R."""
         return len(self.rig.initial_raw_controls)
 
     def _points(self, mesh: int, vertices: npt.ArrayLike | None) -> npt.NDArray[np.int64]:
@@ -203,18 +204,19 @@ def _below(what: str, found: object, end: int) -> None:
 
 
 def numbers(name: str, values: npt.ArrayLike) -> Doubles:
-    """A caller's numbers as float64[...].
+    """Converts an argument to float64[...].
 
     Args:
         name: name of the argument.
         values: numbers of any shape.
 
     Raises:
-        ValueError: not numbers, or beyond float32.
+        ValueError: not numbers, not finite, or beyond float32.
     """
     try:
         out = np.asarray(values, np.float64)
-    except (TypeError, ValueError, OverflowError):  # NumPy raises each of them
+    # NumPy raises each of these errors for arguments that are no numbers
+    except (TypeError, ValueError, OverflowError):
         raise ArgumentError(f"{name}: numbers were expected") from None
     if not (np.abs(out) <= LARGEST).all():
         raise ArgumentError(f"{name}: finite numbers were expected")
@@ -222,7 +224,7 @@ def numbers(name: str, values: npt.ArrayLike) -> Doubles:
 
 
 def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
-    """A caller's integers as int64[...].
+    """Converts an argument to int64[...].
 
     Args:
         name: name of the argument.
@@ -240,15 +242,15 @@ def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
 
 
 def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
-    """A caller's numbers as float64[count].
+    """Converts an argument to float64[count].
 
     Args:
         name: name of the argument.
-        values: one number for all, or one for each.
-        count: the required number.
+        values: one number for all elements, or count numbers.
+        count: number of elements.
 
     Raises:
-        ValueError: a wrong shape, a value that is not a number.
+        ValueError: a wrong shape, or a value that is not a finite number.
     """
     out = numbers(name, values)
     if out.shape not in ((), (count,)):
@@ -259,12 +261,12 @@ def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
 def limits(
     count: int, lowest: npt.ArrayLike | None, highest: npt.ArrayLike | None
 ) -> tuple[Doubles, Doubles]:
-    """float64[R] twice: the range of each control.
+    """Checks ranges of controls, and returns lowest and highest as float64[R].
 
     Args:
-        count: R.
-        lowest: float[R] or one number; None is 0.
-        highest: float[R] or one number; None is 1.
+        count: number of controls R.
+        lowest: float[R] or one number; None: 0.
+        highest: float[R] or one number; None: 1.
 
     Raises:
         ValueError: a wrong shape, not a number, a lowest above its highest.

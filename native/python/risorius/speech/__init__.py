@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Animation from a voice.
+"""Animates a face from the recording of a voice.
 
 sound file --listen--> phonemes with times --viseme_weights--> visemes --controls--> Clip
 
@@ -25,7 +25,7 @@ from .phones import Phoneme
 __all__ = ["AudioError", "CancelledError", "Heard", "Phoneme", "animate", "listen", "mouth",
            "phonemes", "sheets", "speak"]  # fmt: skip
 
-_TAIL = 0.3  # seconds after the sound in which the mouth closes
+_TAIL = 0.3  # seconds after the sound until the end of the clip, in which the mouth closes
 
 
 def phonemes(
@@ -35,13 +35,13 @@ def phonemes(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> list[Phoneme]:
-    """The phonemes of a voice with their times, in order and without gaps; pauses are SIL.
+    """The phonemes of a sound file with their times, in order and without gaps; pauses are SIL.
 
     Args:
-        path, transcript, progress, cancel: as in speak.
+        path, transcript, progress, cancel: see speak.
 
     Raises:
-        AudioError, MissingError, CancelledError: as speak does.
+        AudioError, MissingError, CancelledError: see speak.
     """
     return listen(path, transcript, progress=progress, cancel=cancel).phonemes
 
@@ -60,30 +60,31 @@ def speak(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Clip:
-    """Animates a face that says the words of a sound file.
+    """Makes a clip of a face that speaks the words of a sound file.
 
     Args:
-        path: a WAV file, or any file that an ffmpeg on PATH can read.
-        transcript: the spoken words in English, if known: the mouth is much better with it.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
+        transcript: the spoken words in English, if known; the mouth is much better with them.
         rate: frames per second of the clip.
-        seed: seed of the blinks. The same file and arguments always give the same clip.
-        intensity: scales mouth shapes, brows and nods; lips still close completely.
-        blinks: add blinks.
-        accents: let brows and head follow stressed syllables.
-        correctable: add the data to the metadata that `mouth` needs in addition to the phonemes.
-        library: the face's own expressions by name: its visemes replace ours.
-        progress: called with 0 to 1 from time to time.
-        cancel: called from time to time; if it returns true, CancelledError is raised.
+        seed: seed of the blinks' times; equal files and arguments give equal clips.
+        intensity: factor on mouth shapes, brows and nods, 0 to 4; lips still close completely.
+        blinks: whether to add blinks.
+        accents: whether brows and head follow stressed syllables.
+        correctable: whether to add metadata that `mouth` needs besides the phonemes.
+        library: the face's own expressions by name, whose visemes replace the built-in ones.
+        progress: called repeatedly with the fraction of the work done, 0 to 1.
+        cancel: called repeatedly; if it returns true, CancelledError is raised.
 
     Returns:
         A clip of raw controls and head.pitch, from the beginning of the sound to 0.3 s after its
-        end. Its events "word" and "phoneme" have the word or phoneme as value. Metadata: source,
-        transcript, speech ("aligned" or "recognised"), and notes about deviations; with correctable
-        also seconds (length of the sound) and openness (integers, thousandths).
+        end. Values of its events "word" and "phoneme" are the word or phoneme. Metadata: source,
+        transcript, speech ("aligned" or "recognised"), notes about deviations; if correctable also
+        seconds (duration of the sound) and openness (integers, in thousandths).
 
     Raises:
         AudioError: an unusable file. ValueError: a transcript without English words, a rate or an
-            intensity out of range, or PocketSphinx is not installed. CancelledError.
+            intensity out of range. MissingError: PocketSphinx is not installed. CancelledError:
+            cancel() returned true.
     """
     _check(rate, intensity)
     heard = listen(path, transcript, progress=progress, cancel=cancel)
@@ -108,11 +109,11 @@ def animate(
     correctable: bool = False,
     library: Mapping[str, Expression] | None = None,
 ) -> Clip:
-    """The clip of a heard voice.
+    """Makes the clip of a voice from its phonemes and samples.
 
     Args:
         heard: from `listen`.
-        rate, seed, intensity, blinks, accents, correctable, library: as in speak.
+        rate, seed, intensity, blinks, accents, correctable, library: see speak.
 
     Raises:
         ValueError: an invalid rate or intensity.
@@ -146,20 +147,20 @@ def mouth(
     intensity: float = 1.0,
     library: Mapping[str, Expression] | None = None,
 ) -> dict[str, npt.NDArray[np.float64]]:
-    """The curves of lips, jaw and tongue only.
+    """The curves of lips, jaw and tongue.
 
     Args:
-        phonemes: in order, without gaps; the mouth rests before and after them.
-        opened: [n], opening of vowels: from prosody.openness, or the thousandths in a correctable
+        phonemes: in order, without gaps; the mouth is at rest before and after them.
+        opened: float[n], opening of vowels: from prosody.openness, or the integers in a correctable
             clip's metadata / 1000.
-        times: seconds, ascending in equal steps, [frames].
-        intensity, library: as in speak.
+        times: float64[frames], seconds, ascending in equal steps.
+        intensity, library: see speak.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].
     """
     begin, end = (phonemes[0].begin, phonemes[-1].end) if phonemes else (0.0, 0.0)
-    # Silence around the sound, so that the mouth comes to rest after the last word.
+    # Silence before and after, so that the mouth is at rest outside the sound.
     rest = [Phoneme(begin - 1.0, begin, "SIL"), *phonemes, Phoneme(end, end + 1.0, "SIL")]
     weights = articulation.viseme_weights(rest, times)
     open_far = prosody.openness_at(np.asarray(opened, np.float64), times)

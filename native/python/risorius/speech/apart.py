@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Speech recognition in a separate process.
+"""Runs speech recognition in a separate process.
 
 A program that embeds Python, such as Blender, may have loaded another libpocketsphinx through its
-ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. In a
-separate process this cannot happen, a crash becomes an error message, and the process can be ended
-at any moment.
+ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. A
+separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
-    here                                         there
-    one line of JSON: what to do         -->     speak()
+    this process                                 separate process
+    one line of JSON: the task           -->     speak()
     share, share, ..., clip or error     <--     lines of JSON
     the pipe closes: cancelled, or dead  -->     ends
 """
@@ -39,7 +38,7 @@ from .audio import AudioError
 from .listening import Cancel, CancelledError, Progress
 from .recogniser import MissingError
 
-_PATIENCE = 3600.0  # seconds without a message, because a long voice is aligned in one step
+_PATIENCE = 3600.0  # seconds without a message until an error; a long voice is aligned in one step
 _ASKED = 0.05  # seconds between two calls of cancel
 _BEGIN = (
     "import json, sys; task = json.loads(sys.stdin.buffer.readline()); sys.path[:] = task['paths'];"
@@ -53,7 +52,7 @@ _ERRORS: dict[str, type[Exception]] = {
 
 
 class RecogniserError(RisoriusError):
-    """The process of the recogniser could not be started, or ended unexpectedly; one sentence."""
+    """The recogniser's process could not be started, or ended unexpectedly."""
 
     code = "recogniser"
 
@@ -66,14 +65,14 @@ def speak_apart(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Clip:
-    """Like speak, in a separate process that is ended at once when cancel() returns true.
+    """Does the work of speak in a separate process, which is killed if cancel() returns true.
 
     Args:
-        path, transcript, progress, cancel, options: as in speak. progress and cancel are called
-        from the calling thread, which waits.
+        path, transcript, progress, cancel, options: see speak. progress and cancel are called from
+            the calling thread, which waits.
 
     Raises:
-        RecogniserError: the process could not be started, or ended unexpectedly. Also as speak.
+        RecogniserError: the process could not be started, or ended unexpectedly; errors of speak.
     """
     task = {
         "paths": [os.path.abspath(place) for place in sys.path],
@@ -81,8 +80,7 @@ def speak_apart(
         "transcript": transcript,
         "options": {**options, "library": _texts(options.get("library"))},
     }
-    # Error messages of the process go to a file, because a full pipe without a reader would block
-    # it.
+    # Error output goes to a file, because a full pipe without a reader would block the process.
     with tempfile.TemporaryFile() as said, _started(said) as process:
         try:
             _write(process, task)
@@ -100,7 +98,7 @@ def speak_apart(
 
 
 def _texts(library: Mapping[str, Expression] | None) -> dict[str, str] | None:
-    """Expressions as text, for the pipe."""
+    """Name -> text of each expression, to send them through the pipe."""
     if library is None:
         return None
     return {name: expressions.text_of(one) for name, one in library.items()}
@@ -115,7 +113,8 @@ def _library(texts: Mapping[str, str] | None) -> dict[str, Expression] | None:
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
     python = python_program()
     options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
-    quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows a console window would flash up
+    # otherwise a console window would appear on Windows
+    quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)
     try:
         return subprocess.Popen(
             [python, *options, "-c", _BEGIN],
@@ -131,9 +130,9 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
 
 
 def python_program() -> str:
-    """The program of the running Python; sys.executable may be a program that embeds Python.
+    """The path of Python's executable; sys.executable may be a program that embeds Python.
 
-    Raises: RecogniserError.
+    Raises: RecogniserError: none was found.
     """
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     places = [os.path.join(sys.exec_prefix, "bin", name) for name in (version, "python3")]
@@ -154,11 +153,13 @@ def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
         process.stdin.write(json.dumps(task).encode() + b"\n")
         process.stdin.flush()
     except OSError:
-        pass  # the process has ended; the reader of its messages reports it
+        pass  # the process has ended, which the reader of its messages reports
 
 
 def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
-    """The messages of the process until it ends. Raises: CancelledError, RecogniserError."""
+    """The messages of the process until it ends.
+
+    Raises: CancelledError: cancel() returned true. RecogniserError: no message for an hour."""
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_hand_over, args=(process.stdout, lines), daemon=True).start()
     heard = monotonic()
@@ -184,7 +185,7 @@ def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
         for line in pipe:
             lines.put(line)
     except (OSError, ValueError):
-        pass  # the parent closed the pipe during the read
+        pass  # this process closed the pipe while the thread was reading
     lines.put(b"")
 
 
@@ -210,8 +211,8 @@ def _clip_of(message: dict[str, Any]) -> Clip:
 
 
 def serve(task: dict[str, Any]) -> None:
-    """Runs in the separate process: do the task and end the process."""
-    # Text that a library prints must not mix with the lines of the protocol.
+    """Does the task in the separate process, and reports over standard output."""
+    # Output of libraries must not mix with the lines of the protocol.
     words = os.fdopen(os.dup(1), "w", encoding="ascii")
     os.dup2(2, 1)
 
@@ -219,7 +220,8 @@ def serve(task: dict[str, Any]) -> None:
         words.write(json.dumps(message) + "\n")
         words.flush()
 
-    with contextlib.suppress(ImportError):  # before a pipe is read, because Windows waits for it
+    # before a thread reads the pipe, because on Windows the import would wait for the read
+    with contextlib.suppress(ImportError):
         importlib.import_module("pocketsphinx")
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -244,9 +246,9 @@ def serve(task: dict[str, Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until the pipe closes, for example because the parent died.
+    """Ends the process when the pipe closes, for example because the parent died.
 
-    Reads below Python's buffers, whose locks would block at Python's exit.
+    It reads with os.read, because locks of Python's buffers would block the end of the process.
     """
     while os.read(0, 4096):
         pass

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Co-articulation: converts timed phonemes to weights of visemes, and these to controls.
+"""Co-articulation: converts timed phonemes to viseme weights, and these to controls.
 
-Tongue and vowel shapes blend by dominance (Cohen and Massaro 1993): each phoneme pulls the mouth
-towards its shape with a strength that decreases before and after it, and the visible shape is the
-mean weighted by strength. Lips that must close or touch are applied as gates on top, because a mean
-never closes completely.
+Shapes of tongue and vowels blend by dominance (Cohen and Massaro 1993): each phoneme pulls the
+mouth towards its shape with a strength that decreases before and after it, and the visible shape is
+the mean weighted by strength. Lips that must close or touch are applied as gates on top, because a
+mean never closes completely.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ Curves = npt.NDArray[np.float64]
 Times = npt.NDArray[np.float64]
 
 GATED = ("PP", "FF")
-"""Visemes of lips that close or touch; applied on top of the others."""
+"""Visemes in which lips close or touch; they are applied on top of the other visemes."""
 
-# Viseme -> strength of its pull on the lips, and the seconds in which the pull falls to 1/e before
-# and after it. Sounds of the tongue leave the lips to their neighbours; rounding begins earliest.
-# Under a closed gate the vowels around determine the shape.
+# Viseme -> (strength of its pull on the lips, seconds in which the pull falls to 1/e before it, and
+# after it). Sounds of the tongue leave the lips to their neighbours; rounding begins earliest.
+# While lips are closed, the vowels around determine their shape.
 _DOMINANCE = {
     "sil": (0.8, 0.06, 0.08), "PP": (0.15, 0.05, 0.05), "FF": (0.15, 0.05, 0.05),
     "TH": (0.6, 0.06, 0.05), "DD": (0.45, 0.05, 0.05), "kk": (0.35, 0.05, 0.05),
@@ -36,39 +36,39 @@ _DOMINANCE = {
     "RR": (0.8, 0.08, 0.06), "aa": (1.0, 0.07, 0.07), "E": (1.0, 0.07, 0.07),
     "I": (1.0, 0.07, 0.07), "O": (1.2, 0.10, 0.07), "U": (1.3, 0.11, 0.07),
 }  # fmt: skip
-_REACH = 0.8  # seconds: farther away a pull is negligible
-_GLIDE_PART = 0.55  # share of a diphthong that belongs to its first vowel
+_REACH = 0.8  # seconds from a phoneme beyond which its pull is ignored
+_GLIDE_PART = 0.55  # fraction of a diphthong's duration that its first vowel takes
 
 _CLOSING, _OPENING = 0.08, 0.075  # seconds in which lips close and open
-_QUICKEST = 0.035
-_SHORTEST_CLOSURE = 0.045  # seconds: shorter closures are not visible
-_SMOOTHING = 0.018  # seconds, standard deviation
-_FREE = 0.8  # up to here a control equals the sum of the shapes
+_QUICKEST = 0.035  # seconds: shortest closing or opening between two closures
+_SHORTEST_CLOSURE = 0.045  # seconds: a shorter closure would not be visible, so it is lengthened
+_SMOOTHING = 0.018  # seconds, standard deviation of the Gaussian filter
+_FREE = 0.8  # up to this value a control equals the sum of the shapes
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
-    """The weight of each viseme in the mouth.
+    """Computes the weight of each viseme at each time.
 
     Args:
-        phonemes: in order, without gaps; pauses are SIL.
-        times: seconds, ascending in equal steps, [frames].
+        phonemes: phonemes in order, without gaps; pauses are SIL.
+        times: float64[frames], seconds, ascending in equal steps.
 
     Returns:
-        float64[frames, 15] in the order of VISEMES: gated visemes as gates in [0, 1], the others as
-        shares of the rest; each row sums to 1.
+        float64[frames, 15] in the order of VISEMES: for gated visemes their gates in [0, 1], for
+        the others shares of the rest; each row sums to 1.
     """
     pull = np.zeros((len(times), len(VISEMES)))
     for begin, end, viseme in _targets(phonemes):
         strength, lead, lag = _DOMINANCE[viseme]
         first, last = np.searchsorted(times, (begin - _REACH, end + _REACH))
         t = times[first:last]
-        # Full strength in the middle of the sound, decreasing from there: a short sound pulls less.
+        # The pull is full in the middle half of the sound and decreases from there.
         middle, half = 0.5 * (begin + end), 0.25 * (end - begin)
         away = np.where(t < middle, (middle - half - t) / lead, (t - middle - half) / lag)
         pull[first:last, VISEMES.index(viseme)] += strength * np.exp(-np.clip(away, 0.0, None))
     weights = _smoothed(pull / np.maximum(pull.sum(axis=1, keepdims=True), 1e-12), times)
     gates = [gate(phonemes, name, times) for name in GATED]
-    gates[1] *= 1.0 - gates[0]  # closed lips do not touch the teeth
+    gates[1] *= 1.0 - gates[0]  # closed lips cannot touch the teeth
     for name in GATED:
         weights[:, VISEMES.index("sil")] += weights[:, VISEMES.index(name)]
         weights[:, VISEMES.index(name)] = 0.0
@@ -80,7 +80,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
 
 
 def _targets(phonemes: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
-    """Begin, end and viseme of each shape in sequence; a diphthong gives two."""
+    """(begin, end, viseme) of each shape, times in seconds; a diphthong gives two shapes."""
     found = []
     for phone in phonemes:
         if phone.name in GLIDES:
@@ -93,14 +93,14 @@ def _targets(phonemes: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
 
 
 def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
-    """float64[frames] in [0, 1]: 1 while a sound of this viseme controls the lips.
+    """float64[frames] in [0, 1]: 1 while a sound with this viseme determines the lips.
 
-    It is 1 for at least two frames at any rate, so that no closure falls between frames.
+    It is 1 for two frames or more at any frame rate, so that no closure falls between frames.
 
     Args:
-        phonemes: in order, without gaps.
+        phonemes: phonemes in order, without gaps.
         viseme: one of GATED.
-        times: seconds, ascending in equal steps, [frames].
+        times: float64[frames], seconds, ascending in equal steps.
     """
     closed = np.zeros(len(times))
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0
@@ -111,7 +111,7 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
             missing = max(0.0, shortest - (phone.end - phone.begin))
             spans.append((phone.begin - 0.7 * missing, phone.end + 0.3 * missing))
     for i, (begin, end) in enumerate(spans):
-        # Between two closures, as in "my map", the lips move faster, so that they do open.
+        # Between two closures, as in "my map", the lips move faster, so that they open.
         before = begin - spans[i - 1][1] if i else 1.0
         after = spans[i + 1][0] - end if i + 1 < len(spans) else 1.0
         closing = float(np.clip(0.5 * before, _QUICKEST, _CLOSING))
@@ -125,7 +125,7 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
 
 
 def _smoothed(curves: Curves, times: Times) -> Curves:
-    """A Gaussian over time without delay; the ends are extended."""
+    """Smooths with a Gaussian over time, without delay; the first and last values are extended."""
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0
     reach = int(np.ceil(3.0 * _SMOOTHING / step))
     held = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")
@@ -139,13 +139,14 @@ def controls(
     intensity: float,
     library: Mapping[str, Expression] | None = None,
 ) -> dict[str, Curves]:
-    """Curves of raw controls.
+    """Converts viseme weights to curves of raw controls.
 
     Args:
         weights: float64[frames, 15] from viseme_weights.
-        openness: float64[frames], 1 at the voice's usual loudness: scales the jaw of vowels.
-        intensity: scales every shape except the closures.
-        library: a face's own visemes by name, which replace ours; its own vowels scale as a whole.
+        openness: float64[frames], factor on the jaw of vowels; 1 at the voice's usual loudness.
+        intensity: factor on all shapes except closures.
+        library: a face's own visemes by name, which replace the built-in ones; their vowels are
+            scaled by openness as a whole.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].
@@ -163,7 +164,7 @@ def controls(
 
 
 def _rounded_off(curve: Curves) -> Curves:
-    """Limited to [0, 1] without a kink: values above _FREE approach 1."""
+    """Limits a curve to [0, 1] without a kink: values above _FREE approach 1."""
     rest = 1.0 - _FREE
     over = _FREE + rest * np.tanh((curve - _FREE) / rest)
     return np.where(curve > _FREE, over, curve).clip(0.0, 1.0)

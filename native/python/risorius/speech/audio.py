@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sound files as samples: all common kinds of WAV, other formats through ffmpeg, and resampling."""
+"""Reads sound files as samples (WAV directly, other formats with ffmpeg), and resamples them."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ..base.reading import ReadingError, read_file
 Samples = npt.NDArray[np.float32]
 
 RATE = 16000
-"""Sample rate of all speech code, which is that of the acoustic model's training data."""
+"""Samples per second in all speech code, equal to that of the acoustic model's training data."""
 
 _LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
 _MOST_CHANNELS = 64
-_MOST_BYTES = 2**31  # three hours of stereo at 48 kHz and 32 bit
+_MOST_BYTES = 2**31  # limit of a file: three hours of stereo at 48 kHz and 32 bit
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
-_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values that programs writing to a pipe leave in the size fields
+_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values in the size fields of programs that write to a pipe
 
 
 class AudioError(RisoriusError):
-    """An unusable sound file; the sentence names the file and the reason."""
+    """An unusable sound file; the message names the file and the reason."""
 
     code = "audio"
 
@@ -42,15 +42,15 @@ class _Format(NamedTuple):
 
 
 def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
-    """A sound file as one channel.
+    """Reads a sound file as one channel.
 
     Args:
-        path: a WAV file (8, 16, 24 or 32 bit integer, 32 or 64 bit float), or anything that an
-            ffmpeg on PATH can read.
+        path: path of a WAV file (8, 16, 24 or 32 bit integer, 32 or 64 bit float), or of any file
+            that an ffmpeg on PATH can read.
 
     Returns:
-        float32[samples], full scale is 1; and the samples per second. Several channels become their
-        mean, or the loudest one if the mean cancels out.
+        float32[samples], where full scale is 1, and the samples per second. Several channels are
+        averaged; if they cancel each other, the loudest one is used.
 
     Raises:
         AudioError: the file cannot be opened, is not sound, is damaged, or has no samples.
@@ -79,14 +79,14 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
 
 
 class _OtherKindError(AudioError):
-    """A valid WAV file of a kind that only ffmpeg reads."""
+    """A valid WAV file in a format that only ffmpeg reads."""
 
 
 def parse_wav(data: bytes) -> tuple[Samples, int]:
-    """The samples in the bytes of a WAV file, as in read_audio.
+    """Parses the bytes of a WAV file; returns the same as read_audio.
 
     Raises:
-        AudioError: without the name of the file.
+        AudioError: damaged, without samples, or of an unsupported format; without the file's name.
     """
     form: _Format | None = None
     offset = 12
@@ -122,7 +122,8 @@ def _format(chunk: bytes, offset: int) -> _Format:
         raise AudioError(f"byte {offset}: a fmt chunk of 16 bytes was expected, found {len(chunk)}")
     code, channels, rate, _, block, bits = struct.unpack_from("<HHIIHH", chunk)
     if code == _EXTENSIBLE and len(chunk) >= 26:
-        code = struct.unpack_from("<H", chunk, 24)[0]  # the first bytes of the sub-format's GUID
+        # the format code at the beginning of the sub-format's GUID
+        code = struct.unpack_from("<H", chunk, 24)[0]
     if not 1 <= channels <= _MOST_CHANNELS:
         raise AudioError(
             f"byte {offset + 2}: 1 to {_MOST_CHANNELS} channels were expected, found {channels}"
@@ -165,25 +166,26 @@ def _decode(body: bytes, form: _Format) -> Samples:
 
 
 def _one_channel(channels: Samples) -> Samples:
-    """float32[samples] of [samples, channels]."""
+    """Converts float32[samples, channels] to float32[samples]."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # Two microphones with opposite polarity cancel each other and the voice.
+    # Microphones with opposite polarity cancel each other, and with them the voice.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean
 
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
-    """A file's sound converted to the bytes of a WAV file by ffmpeg."""
-    if not os.path.isfile(path):  # ffmpeg would wait for data that was read already
+    """Converts a sound file with ffmpeg to the bytes of a WAV file."""
+    # a pipe was read already, so ffmpeg would wait for its data forever
+    if not os.path.isfile(path):
         raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")
     if program is None:
         raise AudioError(
             f"{path}: {found}; other formats are read through ffmpeg, which is not on PATH"
         )
-    # The file: prefix keeps a name from being taken as an address or an option.
+    # With the prefix file: a name is never taken as an address or an option.
     source = f"file:{os.path.abspath(path)}"
     # fmt: off
     done = subprocess.run(
@@ -199,8 +201,8 @@ def _converted(path: str | os.PathLike[str], found: str) -> bytes:
 
 
 def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
-    """Samples at another rate: a polyphase filter, a sinc in a Kaiser window (80 dB, flat to 91 %
-    of the lower band).
+    """Converts samples to another rate with a polyphase filter: a sinc in a Kaiser window (80 dB,
+    flat to 91 % of the lower band).
 
     Args:
         samples: float32[n] at `source` samples per second.
@@ -213,8 +215,8 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
     divisor = int(np.gcd(source, target))
     up, down = target // divisor, source // divisor
     count = -(-len(samples) * up // down)
-    band = 0.955 * min(1.0, target / source)  # as a share of the source's band
-    reach = int(np.ceil(56.0 / band))  # samples of the source on each side
+    band = 0.955 * min(1.0, target / source)  # as a fraction of the source's band
+    reach = int(np.ceil(56.0 / band))  # samples of the source on each side of the filter
     padded = np.concatenate([np.zeros(reach, np.float32), samples, np.zeros(reach + 1, np.float32)])
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
     result = np.empty(count, np.float32)
@@ -229,7 +231,7 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
 
 
 def _kernel(fractions: npt.NDArray[np.float64], reach: int, band: float) -> Samples:
-    """float32[fractions, 2 * reach + 1]: the weights of the samples around each place."""
+    """float32[fractions, 2 * reach + 1]: filter weights of the samples around each position."""
     distance = np.arange(-reach, reach + 1) - fractions[:, None]
     inside = np.clip(1.0 - np.square(distance / (reach + 1.0)), 0.0, None)
     window = np.i0(8.0 * np.sqrt(inside)) / np.i0(8.0)

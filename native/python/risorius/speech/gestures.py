@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Movements of a speaking face in addition to the mouth: blinks, brows, nods."""
+"""Movements of a speaking face besides the mouth: blinks, brows, nods."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from .phones import Phoneme
 from .prosody import Accent
 
 _PREFIX = "CTRL_expressions."
-_USUAL_GAP, _GAP_SPREAD = 3.2, 0.45  # seconds between blinks, and the sigma of its logarithm
-_SHORTEST_GAP = 0.9
-_PULL = 1.2  # seconds by which a blink may move to a pause
-_LID_DOWN, _LID_CLOSED, _LID_UP = 0.08, 0.035, 0.17  # seconds
+# median of the seconds between blinks, and standard deviation of their logarithm
+_USUAL_GAP, _GAP_SPREAD = 3.2, 0.45
+_SHORTEST_GAP = 0.9  # seconds between two blinks
+_PULL = 1.2  # seconds: a blink is moved to a pause that is nearer than this
+# seconds in which lids close, stay closed, and open
+_LID_DOWN, _LID_CLOSED, _LID_UP = 0.08, 0.035, 0.17
 _BROW = {"browRaiseInL": 0.32, "browRaiseInR": 0.32, "browRaiseOuterL": 0.4,
          "browRaiseOuterR": 0.4}  # fmt: skip
-_NOD = 0.05  # radians down, at the strongest accent
+_NOD = 0.05  # radians by which the head pitches down at the strongest accent
 
 
 def bump(times: Times, begin: float, rise: float, hold: float, fall: float) -> Curves:
-    """Rises smoothly from 0 to 1, holds, and falls back: float64[frames].
+    """float64[frames]: a curve that rises smoothly from 0 to 1, holds, and falls back to 0.
 
     Args:
-        times: seconds, [frames].
-        begin: seconds, start of the rise.
+        times: float64[frames], seconds.
+        begin: start of the rise in seconds.
         rise, hold, fall: durations in seconds.
     """
     up = smooth_step((times - begin) / rise)
@@ -35,12 +37,12 @@ def bump(times: Times, begin: float, rise: float, hold: float, fall: float) -> C
 
 
 def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list[float]:
-    """The times at which lids begin to fall: at a natural rate, moved to near pauses of speech.
+    """Seconds at which the lids begin to close: at a natural rate, moved to nearby pauses.
 
     Args:
         phonemes: phonemes of the voice; pauses are SIL.
-        duration: duration of the voice, seconds.
-        seed: the same seed gives the same times.
+        duration: duration of the voice in seconds.
+        seed: seed of the random times; equal seeds give equal times.
 
     Returns:
         Seconds, ascending.
@@ -62,11 +64,11 @@ def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list
 
 
 def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
-    """Curves float64[frames] of the lids by control.
+    """Control -> float64[frames]: curves of the lids.
 
     Args:
-        times: seconds, [frames].
-        begins: seconds, when the lids begin to fall.
+        times: float64[frames], seconds.
+        begins: seconds at which the lids begin to close.
     """
     lids = np.zeros(len(times))
     for begin in begins:
@@ -75,12 +77,12 @@ def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
 
 
 def accent_curves(times: Times, found: Sequence[Accent], intensity: float) -> dict[str, Curves]:
-    """Brows and nods that follow stressed syllables: float64[frames] by control.
+    """Control -> float64[frames]: brows and nods that follow stressed syllables.
 
     Args:
-        times: seconds, [frames].
+        times: float64[frames], seconds.
         found: the stressed syllables.
-        intensity: 1 is usual; 0 moves nothing.
+        intensity: factor on all movements; 1 is usual, 0 moves nothing.
     """
     brows, nod = np.zeros(len(times)), np.zeros(len(times))
     for accent in found:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Pronunciation of words that no dictionary has: letter-to-sound rules for English.
+"""Guesses the pronunciation of words that no dictionary has, by letter-to-sound rules for English.
 
-They need not be correct as speech, only as mouth movement: with an approximate pronunciation the
+It need not be correct as speech, only as mouth movement: with an approximate pronunciation the
 aligner still finds the times.
 """
 
 from __future__ import annotations
 
-# Letters -> phonemes, longest first. ^ is the begin of the word and $ its end.
+# Letters -> phonemes; the longest match counts. ^ is the beginning of the word and $ its end.
 _RULES = {
     "tion": "SH AH N", "sion": "ZH AH N", "ough": "AO", "augh": "AO", "eigh": "EY", "tch": "CH",
     "igh": "AY", "sch": "S K", "dge": "JH", "eau": "OW", "air": "EH R", "ear": "IH R",
@@ -34,17 +34,17 @@ _NAMES = {
 }  # fmt: skip
 _LONG = {"a": "EY", "e": "IY", "i": "AY", "o": "OW", "u": "UW", "y": "AY"}
 _VOWELS = frozenset("aeiouy")
-_LONGEST = 5
+_LONGEST = 5  # letters of the longest rule
 
 
 def pronounce(word: str) -> list[str]:
-    """The phonemes of a word.
+    """The guessed phonemes of a word.
 
     Args:
-        word: letters a to z and apostrophes, at least one letter.
+        word: a word of letters a to z and apostrophes, with at least one letter.
     """
     letters = word.replace("'", "")
-    if not _VOWELS & set(letters):  # an abbreviation: spell its letters
+    if not _VOWELS & set(letters):  # no vowel: an abbreviation, whose letters are spelled
         return " ".join(_NAMES[letter] for letter in letters).split()
     said: list[str] = []
     place = 0
@@ -60,7 +60,7 @@ def pronounce(word: str) -> list[str]:
 
 
 def _is_long(letters: str, place: int) -> bool:
-    """Whether a silent e at the end of the word makes the vowel long, as in take."""
+    """Whether a silent e at the end of the word makes the vowel at `place` long, as in take."""
     tail = letters[place:]
     return (
         len(tail) == 3
@@ -72,7 +72,7 @@ def _is_long(letters: str, place: int) -> bool:
 
 
 def _rule(letters: str, place: int) -> tuple[int, str]:
-    """The number of letters of the longest matching rule, and their phonemes."""
+    """The longest rule that matches at `place`: its number of letters, and its phonemes."""
     for length in range(min(_LONGEST, len(letters) - place), 0, -1):
         part = letters[place : place + length]
         begin = "^" if place == 0 else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A voice of any length as phonemes: cut at silences, and aligned or recognised in pieces."""
+"""Finds the phonemes of a voice: cuts it in pauses, and aligns or recognises the pieces."""
 
 from __future__ import annotations
 
@@ -22,37 +22,39 @@ Cancel = Callable[[], bool]
 STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
-_PIECE = 12.0  # least length of a piece in seconds, if silences allow it
-_LONGEST_PIECE = 30.0  # limits the memory of the decoder
-_PAUSE = 0.15  # seconds of silence in which a cut is allowed
-_SHORTEST_SILENCE = 0.08  # seconds
-_SHORTEST_PHONEME = 0.03
-_DOUBTFUL = 0.37  # confidence; of right transcripts 0.41 to 0.77, of wrong ones up to 0.35
-_UNSAID = 0.2  # of the loud time
-_LEAST_FOUND = 0.6  # of a transcript's words; up to half are found even for a wrong transcript
-_SILENT = -80.0  # decibels below full scale: quieter sound is not speech
-_GAP = 0.05  # seconds between words that are not adjacent
+_PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
+_LONGEST_PIECE = 30.0  # seconds; limits the memory of the decoder
+_PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
+_SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
+_SHORTEST_PHONEME = 0.03  # seconds: shortest length of a phoneme
+# confidence that makes a transcript doubtful: wrong ones reach 0.35, right ones 0.41 to 0.77
+_DOUBTFUL = 0.37
+_UNSAID = 0.2  # fraction of the speech that may be missing in the transcript
+# fraction of a transcript's words that must be heard; up to half are heard for a wrong transcript
+_LEAST_FOUND = 0.6
+_SILENT = -80.0  # decibels relative to full scale; quieter sound is not speech
+_GAP = 0.05  # seconds between words beyond which they are not adjacent
 _NO_SPEECH = "no speech was heard"
-_STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
+_STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})  # begin with a silent closure
 
 
 class CancelledError(RisoriusError):
-    """The caller's cancel() returned true."""
+    """The work was cancelled because cancel() returned true."""
 
     code = "cancelled"
 
 
 class Heard(NamedTuple):
-    """The result of listening."""
+    """The phonemes and samples of a voice."""
 
     phonemes: list[Phoneme]
-    """In order, without gaps from 0 to the end of the sound; pauses are SIL."""
+    """Phonemes in order, without gaps from 0 to the end of the sound; pauses are SIL."""
     samples: Samples
-    """float32[n] at audio.RATE."""
+    """float32[n] at audio.RATE samples per second."""
     aligned: bool
-    """Whether the phonemes come from the transcript."""
+    """Whether the phonemes were aligned from the transcript, and not recognised."""
     notes: list[str]
-    """Sentences about deviations from the request."""
+    """Sentences about deviations, such as words of the transcript that were not heard."""
 
 
 def listen(
@@ -62,16 +64,16 @@ def listen(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Heard:
-    """The phonemes of a sound file.
+    """Finds the phonemes of a sound file.
 
     Args:
-        path: as in audio.read_audio.
+        path: see audio.read_audio.
         transcript: the spoken words in English, if known.
-        progress: called with 0 to 1 from time to time.
-        cancel: called from time to time; true ends the work.
+        progress: called repeatedly with the fraction of the work done, 0 to 1.
+        cancel: called repeatedly; if it returns true, the work ends.
 
     Raises:
-        AudioError: an unusable file. ValueError: a transcript without English words, or
+        AudioError: an unusable file. ValueError: a transcript without English words. MissingError:
             PocketSphinx is not installed. CancelledError: cancel() returned true.
     """
     words = None if transcript is None else text.words(transcript)
@@ -105,14 +107,14 @@ def listen(
 
 
 def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
-    """A sound file with known phonemes; PocketSphinx is not needed.
+    """Combines a sound file with known phonemes; PocketSphinx is not needed.
 
     Args:
-        path: as in audio.read_audio.
-        found: in order; gaps are silence.
+        path: see audio.read_audio.
+        found: phonemes in order; gaps become silence.
 
     Raises:
-        AudioError: an unusable file. ArgumentError: a phoneme begins after the sound's end.
+        AudioError: an unusable file. ArgumentError: a phoneme begins after the end of the sound.
     """
     samples = resample(*read_audio(path))
     duration = len(samples) / RATE
@@ -139,7 +141,7 @@ def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
 def _aligned(
     recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress, notes: list[str]
 ) -> list[Phoneme] | None:
-    """The transcript's phonemes with times, or None if too little of it fits."""
+    """The transcript's phonemes with times, or None if too few of its words are heard."""
     duration = len(samples) / RATE
     segments = recogniser.align_words(samples, words)
     if segments is not None:
@@ -161,7 +163,7 @@ def _aligned(
 def _piece(
     recogniser: Recogniser, samples: Samples, begin: float, end: float, said: Sequence[str]
 ) -> list[Phoneme]:
-    """The phonemes of a piece: of its words, or the recognised ones if it has none."""
+    """The phonemes of a piece: of the words `said`, or recognised ones without words."""
     piece = samples[int(begin * RATE) : int(end * RATE)]
     phones = recogniser.align_phonemes(piece, said) if said else None
     if phones is not None:
@@ -170,14 +172,14 @@ def _piece(
 
 
 def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
-    """A piece's phonemes with times of the whole sound."""
+    """Converts times in a piece that begins at `begin` to times in the whole sound."""
     return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
 
 
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """Begin, end and words of each piece: adjacent words, and the gaps between them."""
+    """(begin, end, words) of each piece: runs of adjacent words, and the gaps between them."""
     parts: list[tuple[float, float, list[str]]] = []
     for segment in segments:
         last = parts[-1][1] if parts else 0.0
@@ -193,14 +195,14 @@ def _loose_pieces(
 
 
 def confidence(found: Sequence[Phoneme]) -> float:
-    """The mean confidence of all phonemes except silence, weighted by time; 0 if there are none."""
+    """Mean confidence of all phonemes but silence, weighted by duration; 0 without phonemes."""
     spoken = [p for p in found if p.name != "SIL"]
     whole = sum(p.end - p.begin for p in spoken)
     return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
 
 
 def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[str]:
-    """Sentences about signs that the transcript does not belong to this voice."""
+    """Notes on signs that the transcript does not belong to this voice."""
     notes = []
     if confidence(found) < _DOUBTFUL:
         notes.append("the transcript fits the voice badly: is it of another recording?")
@@ -219,7 +221,7 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
 def _word_pieces(
     segments: Sequence[Segment], duration: float
 ) -> Iterator[tuple[float, float, list[str]]]:
-    """Begin, end and words of each piece; pieces are cut in pauses and cover the whole time."""
+    """(begin, end, words) of each piece; pieces are cut in pauses and cover the whole duration."""
     begin = 0.0
     said: list[str] = []
     for segment in segments:
@@ -249,8 +251,8 @@ def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> lis
 
 
 def loudness(samples: Samples) -> npt.NDArray[np.float64]:
-    """Loudness in decibels relative to full scale every STEP seconds, in windows of 25 ms; at least
-    -100."""
+    """float64[n]: loudness in decibels relative to full scale every STEP seconds, over windows of
+    25 ms; -100 or more."""
     hop = int(STEP * RATE)
     count = max(1, -(-len(samples) // hop))
     half = int(0.0125 * RATE)
@@ -263,13 +265,13 @@ def loudness(samples: Samples) -> npt.NDArray[np.float64]:
 
 
 def speaking(levels: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Whether the sound is loud enough to be speech: [levels]."""
+    """bool[n]: whether each loudness is high enough for speech."""
     floor, peak = float(np.quantile(levels, 0.05)), float(np.quantile(levels, 0.98))
     return levels > max(_SILENT, peak - 38.0, min(floor + 8.0, peak - 12.0))
 
 
 def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
-    """Begin and end in seconds of pieces to decode separately; they cover the whole sound."""
+    """(begin, end) in seconds of pieces that are decoded separately; they cover the whole sound."""
     quiet = ~speaking(levels)
     shortest, longest = int(_PIECE / STEP), int(_LONGEST_PIECE / STEP)
     cuts = [0]
@@ -277,7 +279,7 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
     pauses = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _PAUSE / STEP]
     for first, last in [*pauses, (len(levels), len(levels))]:
         middle = (first + last) // 2
-        # Without a pause for too long: cut at the quietest moment.
+        # If there is no pause for too long, cut at the quietest moment.
         while middle - cuts[-1] > longest:
             window = levels[cuts[-1] + shortest : cuts[-1] + longest]
             cuts.append(cuts[-1] + shortest + int(np.argmin(window)))
@@ -288,13 +290,13 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
 
 
 def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[Phoneme]:
-    """The phonemes without pauses that a decoder included in them.
+    """The phonemes, shortened by silences that the decoder included in them.
 
-    Silence within a word is the closure of a stop and stays. A phoneme keeps at least 30 ms.
+    A silent closure of a stop within a word is kept. A phoneme keeps at least 30 ms.
 
     Args:
-        found: phonemes of a piece, in order.
-        levels: loudness of the piece in dB, one value every STEP seconds.
+        found: phonemes in order.
+        levels: float64[n], loudness in decibels every STEP seconds.
     """
     quiet = np.concatenate([[False], ~speaking(levels), [False]])
     edges = np.flatnonzero(np.diff(quiet.astype(np.int8))).reshape(-1, 2) * STEP
@@ -320,17 +322,17 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
 
 
 def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
-    """Whether a silence from `begin` on is the closure of a stop inside a word."""
+    """Whether a silence that starts at `begin` is the closure of a stop inside a word."""
     phone = phones[last]
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 
 
 def filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
-    """The phonemes of a whole sound: gaps become silence, adjacent silences are joined.
+    """The phonemes without gaps from 0 to `duration`: gaps become silence, silences are joined.
 
     Args:
-        found: in order.
-        duration: duration of the sound, seconds.
+        found: phonemes in order.
+        duration: duration of the sound in seconds.
     """
     whole: list[Phoneme] = []
     place = 0.0

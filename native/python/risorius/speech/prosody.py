@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Prosody of a voice: pitch, loudness, and stressed syllables."""
+"""Measures pitch, loudness and stressed syllables of a voice."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from .phones import VOWEL_VISEMES, Phoneme, viseme_of
 Curve = npt.NDArray[np.float64]
 
 OPENNESS_STEP = 0.04
-"""Seconds between two values of `openness`: a quarter of its smoothing time."""
+"""Seconds between two values of `openness`, a quarter of the duration of its smoothing."""
 
-_PITCH_RATE = 8000  # samples per second: enough for a fundamental
-_LOWEST, _HIGHEST = 60.0, 400.0  # Hz
-_VOICED = 0.45  # share of the power that repeats after a period
+_PITCH_RATE = 8000  # samples per second: enough to find the pitch
+_LOWEST, _HIGHEST = 60.0, 400.0  # Hz: range of the pitch
+_VOICED = 0.45  # fraction of the power that repeats after a period, above which a sound is voiced
 
 
 class Accent(NamedTuple):
-    """A stressed syllable."""
+    """A stressed syllable of a voice."""
 
     time: float
-    """Seconds, the middle of its vowel."""
+    """Middle of its vowel in seconds."""
     strength: float
-    """0 to 1."""
+    """Strength of the stress, 0 to 1."""
 
 
 def pitch(samples: Samples) -> Curve:
-    """Semitones above 100 Hz every STEP seconds; NaN where the sound is unvoiced.
+    """Pitch in semitones above 100 Hz every STEP seconds; NaN for unvoiced sound.
 
-    Uses the autocorrelation of windows of 40 ms, divided by that of the window (Boersma 1993).
+    It is the autocorrelation of windows of 40 ms, divided by that of the window (Boersma 1993).
     """
     low = resample(samples, RATE, _PITCH_RATE)
     width, hop = int(0.04 * _PITCH_RATE), int(STEP * _PITCH_RATE)
@@ -53,7 +53,8 @@ def pitch(samples: Samples) -> Curve:
         block = (block - block.mean(axis=1, keepdims=True)) * shape
         power = np.fft.irfft(np.square(np.abs(np.fft.rfft(block, size))))
         score = power[:, lags] / np.maximum(power[:, :1], 1e-9) * (own[0] / own[lags])
-        best = np.argmax(score - 0.002 * lags, axis=1)  # of equal peaks the first is the period
+        # prefers the first of equal peaks, which is the period
+        best = np.argmax(score - 0.002 * lags, axis=1)
         voiced = (score[np.arange(len(block)), best] > _VOICED) & (power[:, 0] > 1e-6)
         heights = 12.0 * np.log2(_PITCH_RATE / lags[best] / 100.0)
         found[first : first + len(block)] = np.where(voiced, heights, np.nan)
@@ -61,42 +62,42 @@ def pitch(samples: Samples) -> Curve:
 
 
 def openness(samples: Samples) -> Curve:
-    """The opening of vowels from loudness: about 0.6 to 1.25 every OPENNESS_STEP, without jitter.
+    """Factor on the jaw of vowels, from loudness: about 0.6 to 1.25 every OPENNESS_STEP seconds.
 
     Args:
-        samples: samples of the voice, at RATE.
+        samples: samples of the voice at RATE per second.
 
     Returns:
-        float64[n] in whole thousandths, so that text stores them exactly; the first value belongs
-        to half a STEP after the beginning.
+        float64[n] in multiples of 0.001, so that text stores them exactly; the first value is at
+        half a STEP after the beginning.
     """
     levels = loudness(samples)
     loud = levels[speaking(levels)]
     usual = float(np.median(loud)) if loud.size else 0.0
     relative = np.clip((levels - usual) / 12.0, -1.0, 0.6)
-    kernel = np.hanning(17)  # 160 ms: syllables, not glottal pulses
+    kernel = np.hanning(17)  # 160 ms wide: follows syllables, not glottal pulses
     kernel /= kernel.sum()
     smooth = np.convolve(np.pad(relative, 8, mode="edge"), kernel, mode="valid")
     return np.round((1.0 + 0.4 * smooth[:: round(OPENNESS_STEP / STEP)]) * 1000.0) / 1000.0
 
 
 def openness_at(opened: Curve, times: Curve) -> Curve:
-    """The values of `openness` at any times.
+    """float64[frames]: the values of `openness`, interpolated at other times.
 
     Args:
         opened: from `openness`.
-        times: seconds, [frames].
+        times: float64[frames], seconds.
     """
     return np.interp(times, np.arange(len(opened)) * OPENNESS_STEP + 0.5 * STEP, opened)
 
 
 def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -> list[Accent]:
-    """The vowels that are louder, higher or longer than those around.
+    """Finds vowels that are louder, higher or longer than the other vowels of the voice.
 
     Args:
         phonemes: phonemes of the voice, in order.
-        samples: samples of the voice, at RATE.
-        apart: least number of seconds between two accents.
+        samples: samples of the voice at RATE per second.
+        apart: smallest number of seconds between two accents.
     """
     levels, heights = loudness(samples), pitch(samples)
     vowels = [p for p in phonemes if viseme_of(p.name) in VOWEL_VISEMES | {"RR"}]
@@ -104,7 +105,7 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
     if len(vowels) < 3:
         return []
     rows = np.array([_measure(p, levels, heights) for p in vowels])
-    # Vowels without a measurable pitch get the median pitch.
+    # Vowels without a measurable pitch get the median pitch of the others.
     usual = np.nanmedian(rows[:, 1]) if np.isfinite(rows[:, 1]).any() else 0.0
     rows[:, 1] = np.where(np.isfinite(rows[:, 1]), rows[:, 1], usual)
     spread = np.maximum(rows.std(axis=0), (1.0, 0.5, 0.02))
@@ -120,7 +121,7 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
 
 
 def _measure(phone: Phoneme, levels: Curve, heights: Curve) -> tuple[float, float, float]:
-    """Loudness in dB, pitch in semitones (or NaN) and duration in seconds of a vowel."""
+    """(loudness in dB, pitch in semitones or NaN, duration in seconds up to 0.3) of a vowel."""
     first = min(int(phone.begin / STEP), len(levels) - 1)
     last = max(first + 1, int(phone.end / STEP))
     voiced = heights[first:last][np.isfinite(heights[first:last])]

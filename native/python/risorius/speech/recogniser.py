@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Timed phonemes: a known text aligned to a voice, or recognised speech.
+"""Aligns a known text to a voice, or recognises speech, as timed phonemes.
 
-The decoders are PocketSphinx's with the English model of its wheel. Frames have 10 ms.
+The decoders are PocketSphinx's, with the English model of its wheel. Frames have 10 ms.
 """
 
 from __future__ import annotations
@@ -18,20 +18,21 @@ from .audio import RATE, Samples
 from .phones import Phoneme, viseme_of
 
 FRAME = 0.01
-"""Seconds."""
+"""Duration of a decoder's frame in seconds."""
 
 _NEEDS = (
     "speech is recognised by PocketSphinx, which is not installed: pip install risorius[speech]"
 )
-# Seconds of near silence around each piece, because a decoder needs to hear the start of speech.
+# Seconds of near silence added around each piece, because a decoder must hear speech begin.
 _PAD = 0.3
-_LAG = 0.0128  # seconds from the begin of a frame to the middle of its 25.6 ms window
-_SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01  # likelihoods in a transcript that may be wrong
+_LAG = 0.0128  # seconds from the beginning of a frame to the middle of its 25.6 ms window
+# likelihoods of a word, of skipping a word, and of other speech, for an inexact transcript
+_SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
-# One pass with narrow beams: three quick decodings together are better than a thorough one.
+# A single pass with narrow beams: three quick decodings together are better than a thorough one.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
-# Tried in turn, because on the best path through the lattice of words the alignment of phonemes
-# sometimes does not reach the end of the sound.
+# Options that are tried in turn, because on the best path through the word lattice the alignment of
+# phonemes sometimes does not reach the end of the sound.
 _ALIGNERS: dict[str, dict[str, Any]] = {
     "narrow": {},
     "one way": {"bestpath": False},
@@ -40,27 +41,26 @@ _ALIGNERS: dict[str, dict[str, Any]] = {
 
 
 class MissingError(RisoriusError):
-    """PocketSphinx is not installed; the sentence says how to install it."""
+    """PocketSphinx is not installed; the message tells how to install it."""
 
     code = "missing_package"
 
 
 class Segment(NamedTuple):
-    """A part of a decoder's result; times in seconds from the begin of the piece."""
+    """A word, phoneme or silence from a decoder; seconds from the beginning of the piece."""
 
     begin: float
     end: float
     name: str
     word: str
-    """The word; for a phoneme the word that begins with it; otherwise ""."""
+    """The word; for a phoneme, the word that begins with it; otherwise ""."""
 
 
 class Recogniser:
-    """The decoders; each is made on first use, because the language model takes a second to
-    load."""
+    """PocketSphinx's decoders, made at first use, because their language model loads slowly."""
 
     def __init__(self) -> None:
-        """Raises: MissingError."""
+        """Imports PocketSphinx. Raises: MissingError: it is not installed."""
         try:
             self._sphinx: Any = importlib.import_module("pocketsphinx")
         except ImportError as error:
@@ -80,11 +80,11 @@ class Recogniser:
         return self._decoders[kind]
 
     def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The words with times, with silences between; None if the voice does not say them.
+        """The words with times, and silences between them; None if the voice does not say them.
 
         Args:
-            samples: samples of a piece of a voice, at RATE.
-            words: in the spoken order.
+            samples: samples of a piece of a voice at RATE per second.
+            words: words in spoken order.
         """
         for kind in _ALIGNERS:
             found = self._word_pass(kind, samples, words)
@@ -93,11 +93,11 @@ class Recogniser:
         return None
 
     def align_phonemes(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The phonemes of the words with times; None if the voice does not say them.
+        """The phonemes of words with times; None if the voice does not say the words.
 
         Args:
-            samples: samples of a piece of a voice, at RATE.
-            words: in the spoken order.
+            samples: samples of a piece of a voice at RATE per second.
+            words: words in spoken order.
         """
         for kind in _ALIGNERS:
             if self._word_pass(kind, samples, words) is not None:
@@ -107,13 +107,13 @@ class Recogniser:
         return None
 
     def align_loosely(self, samples: Samples, words: Sequence[str]) -> list[Segment]:
-        """The spoken ones of these words, with times; other speech is left out.
+        """The words that the voice says, with times; other words and other speech are left out.
 
-        For an inexact transcript: each word may be skipped, and other speech may precede any word.
+        It serves inexact transcripts: each word may be skipped, and other speech may precede it.
 
         Args:
-            samples: samples of a piece of a voice, at RATE.
-            words: in the spoken order.
+            samples: samples of a piece of a voice at RATE per second.
+            words: words in the order of the transcript.
         """
         decoder = self._decoder("one way")
         self._learn(decoder, words)
@@ -139,7 +139,7 @@ class Recogniser:
         return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
-        """The phonemes of the words that an English language model finds most likely."""
+        """The phonemes of the words that are most likely by an English language model, or None."""
         decoder = self._decoder("words")
         decoder.activate_search()
         _decode(decoder, _pcm(samples))
@@ -150,16 +150,16 @@ class Recogniser:
         return _phone_pass(decoder, samples) or self.align_phonemes(samples, words)
 
     def hear_phonemes(self, samples: Samples) -> list[Segment]:
-        """The most likely phonemes, independent of words."""
+        """The most likely phonemes, regardless of words."""
         decoder = self._decoder("phones")
         _decode(decoder, _pcm(samples))
         return [s._replace(name=_phone(s.name), word="") for s in _segments(decoder, len(samples))]
 
 
 def _pcm(samples: Samples) -> bytes:
-    """16-bit samples between pads, at the loudness that the model expects.
+    """16-bit samples with silence before and after, at the loudness that the model expects.
 
-    A little constant noise covers exact silence, whose logarithm is undefined.
+    A little constant noise is added, because the logarithm of exact silence is undefined.
     """
     pad = np.zeros(int(_PAD * RATE), np.float32)
     loud = float(np.quantile(np.abs(samples), 0.99)) if len(samples) else 0.0
@@ -175,7 +175,7 @@ def _decode(decoder: Any, pcm: bytes) -> None:
 
 
 def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
-    """The second pass: the times of phonemes within the words of the first pass."""
+    """A second pass that times phonemes within the words of the first; None if it fails."""
     try:
         decoder.set_alignment()
         _decode(decoder, _pcm(samples))
@@ -193,7 +193,7 @@ def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
 
 
 def _segments(decoder: Any, count: int) -> list[Segment]:
-    # hyp() comes first: called later it would free memory that the segments of seg() still use.
+    # hyp() must precede seg(), because it frees memory that segments of seg() still use.
     if decoder.hyp() is None:
         return []
     found = decoder.seg() or ()
@@ -201,23 +201,23 @@ def _segments(decoder: Any, count: int) -> list[Segment]:
 
 
 def _segment(first: int, last: int, name: str, word: str, count: int) -> Segment:
-    """Converts frames of the padded sound to seconds of the sound."""
+    """A Segment from frames of the padded sound, with times of the sound."""
     begin, end = (min(max(n * FRAME - _PAD + _LAG, 0.0), count / RATE) for n in (first, last))
     spoken = "" if word[:1] in "<[+" or word == "SIL" else word.partition("(")[0]
     return Segment(begin, end, name, spoken)
 
 
 def _phone(name: str) -> str:
-    """Without the mark of a noise: +SPN+ and similar are silence for the mouth."""
+    """The phoneme's name; noises such as +SPN+ become SIL."""
     return "SIL" if name.startswith("+") or name.startswith("<") else name
 
 
 def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[float]:
-    """For each segment, the share of its time in which the other decoder hears the same viseme.
+    """The fraction of each segment's duration in which another decoder hears the same viseme.
 
     Args:
-        segments: phonemes of one decoder.
-        other: phonemes of the other decoder, with times on the same clock.
+        segments: phonemes from one decoder.
+        other: phonemes from the other decoder, in the same time.
 
     Returns:
         Numbers from 0 to 1.
@@ -236,12 +236,12 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Phonemes of a piece with times of the whole sound; those without a duration are left out.
+    """Converts a piece's phonemes to times of the whole sound; those without duration are dropped.
 
     Args:
         segments: phonemes of the piece.
-        shares: confidence of each, from 0 to 1.
-        offset: seconds, begin of the piece.
+        shares: confidence of each phoneme, 0 to 1.
+        offset: beginning of the piece in seconds.
     """
     return [
         Phoneme(s.begin + offset, s.end + offset, s.name, round(share, 3), s.word)

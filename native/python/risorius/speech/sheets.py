@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Files of timed phonemes and words that people and other programs correct.
+"""Reads and writes files of timed phonemes and words, which people and other programs correct.
 
-Two forms: tab-separated lines, and Praat's TextGrid with a tier of words and one of phones, as
-written by Praat, ELAN and forced aligners (MFA).
+There are two formats: tab-separated lines, and Praat's TextGrid with a tier of words and one of
+phones, as written by Praat, ELAN and forced aligners (MFA).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..base.errors import RisoriusError
 from .phones import Phoneme, phone_named
 
-_TOUCH = 0.005  # seconds by which neighbours in a file may overlap, for rounding
+_TOUCH = 0.005  # seconds by which neighbours may overlap because of rounding
 _COLUMNS = ("begin", "end", "phoneme")
 _TOKEN = re.compile(
     r'"((?:[^"]|"")*)"|<(\w+)>|(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?!\S)|![^\n]*'
@@ -24,7 +24,7 @@ _EXPECTED = "a phoneme such as AA, a mouth such as M B P, or sil"
 
 
 class SheetError(RisoriusError):
-    """An unusable file of phonemes; one sentence with the place."""
+    """An unusable file of phonemes; the message names the place."""
 
     code = "phoneme_file"
 
@@ -36,29 +36,29 @@ class _Interval(NamedTuple):
 
 
 def suits_textgrid(name: str) -> bool:
-    """Whether a file of this name is written as a TextGrid."""
+    """Whether a file of this name is written as a TextGrid, by its suffix."""
     return name.lower().endswith(".textgrid")
 
 
 def write(found: Sequence[Phoneme], name: str) -> str:
-    """The text of a file of phonemes: a TextGrid by its suffix, else tab-separated lines.
+    """The text of a file of phonemes: a TextGrid if its suffix says so, else tab-separated lines.
 
     Args:
-        found: in order, without gaps.
+        found: phonemes in order, without gaps.
         name: name of the file.
     """
     return textgrid(found) if suits_textgrid(name) else table(found)
 
 
 def table(found: Sequence[Phoneme]) -> str:
-    """Tab separated: begin and end in seconds, phoneme, confidence, the word that begins."""
+    """Tab-separated lines: begin and end in seconds, phoneme, confidence, the word that begins."""
     rows = ["begin\tend\tphoneme\tconfidence\tword"]
     rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
     return "\n".join(rows) + "\n"
 
 
 def words_of(found: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
-    """Begin, end and text of each word; it ends before the next word and before silence."""
+    """(begin, end, text) of each word; it ends before the next word and before silence."""
     words: list[tuple[float, float, str]] = []
     open_ = False
     for phone in found:
@@ -71,7 +71,7 @@ def words_of(found: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
 
 
 def textgrid(found: Sequence[Phoneme]) -> str:
-    """A TextGrid with the tiers words and phones."""
+    """The text of a TextGrid with the tiers words and phones."""
     end = found[-1].end if found else 0.0
     words: list[_Interval] = []
     for word in map(_Interval._make, words_of(found)):
@@ -96,14 +96,14 @@ def textgrid(found: Sequence[Phoneme]) -> str:
 
 
 def read(data: bytes, name: str) -> list[Phoneme]:
-    """The phonemes of a file in either form, in order; gaps are silence.
+    """Reads the phonemes of a file in either format, in order; gaps are silence.
 
     Args:
-        data: content of the file, UTF-8, or UTF-16 with its byte order mark.
+        data: content of the file in UTF-8, or in UTF-16 with a byte order mark.
         name: the file's name in errors.
 
     Raises:
-        SheetError: another form, times that do not ascend, an unknown phoneme.
+        SheetError: another format, times that do not ascend, an unknown phoneme.
     """
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
@@ -177,7 +177,7 @@ def _from_textgrid(text: str, name: str) -> list[Phoneme]:
     for number, part in enumerate(tiers[phones], start=1):
         word = ""
         while said and part.begin >= said[0].begin - _TOUCH:
-            first = said.pop(0)  # of words before any of their phones only the last counts
+            first = said.pop(0)  # if several words precede the phone, the last one counts
             word = first.text.strip() if part.begin < first.end - _TOUCH else ""
         if not part.text.strip():
             word = ""
@@ -186,8 +186,8 @@ def _from_textgrid(text: str, name: str) -> list[Phoneme]:
 
 
 def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
-    """The tiers of intervals by name. Praat reads only numbers, strings and flags that stand free,
-    so that long and short files are equal."""
+    """Name -> intervals of each interval tier. Like Praat, it reads only free-standing numbers,
+    strings and flags, so that long and short files are equal."""
     tokens = _Tokens(text, name)
     tokens.string()  # ooTextFile
     tokens.string()  # TextGrid
@@ -204,7 +204,7 @@ def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
                 _Interval(tokens.number(), tokens.number(), tokens.string()) for _ in range(count)
             ]
             tiers.setdefault(title, rows)
-        else:  # of points
+        else:  # a tier of points
             for _ in range(count):
                 tokens.number()
                 tokens.string()
@@ -212,7 +212,7 @@ def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
 
 
 class _Tokens:
-    """The free-standing numbers, strings and flags in a file of Praat, one after the other."""
+    """Reads the free-standing numbers and strings of a Praat file one after the other."""
 
     def __init__(self, text: str, name: str) -> None:
         self._found = _TOKEN.finditer(text)

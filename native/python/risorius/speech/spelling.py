@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The phonemes of written words: from PocketSphinx's dictionary, else by rules."""
+"""Finds the phonemes of written words, in PocketSphinx's dictionary or else by rules."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ _DICTIONARY = ("model", "en-us", "cmudict-en-us.dict")
 
 
 def spell(said: str, places: Sequence[str] | None = None) -> list[tuple[str, list[str]]]:
-    """The pronunciation of written words.
+    """The pronunciation of the words in a text.
 
     Args:
-        said: English words, numbers and signs.
+        said: text of English words, numbers and signs.
         places: folders in which PocketSphinx may be installed; None: Python's search path. Its
-            dictionary is read as a file, without importing the package. Without it rules are used.
+            dictionary is read as a file, without importing the package. If there is none, rules are
+            used.
 
     Returns:
-        Each spoken word in lower case with its phonemes; at least one word.
+        (word in lower case, its phonemes) of each spoken word; at least one.
 
     Raises:
-        ArgumentError: there is no English word.
+        ArgumentError: the text has no English word.
     """
     words = text.words(said)
     if not words:
@@ -39,7 +40,7 @@ def spell(said: str, places: Sequence[str] | None = None) -> list[tuple[str, lis
 
 
 def _looked_up(words: set[str], places: Sequence[str]) -> dict[str, list[str]]:
-    """The first pronunciation of each word in the dictionary."""
+    """Word -> phonemes of its first pronunciation in the dictionary; unknown words are absent."""
     path = _dictionary(places)
     if path is None:
         return {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A transcript as spoken words: numbers and signs are spelled out."""
+"""Converts a transcript to spoken words: numbers and signs are spelled out."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _TOKEN = re.compile(
 
 
 def words(transcript: str) -> list[str]:
-    """The words of a text in lower case: letters and apostrophes only.
+    """The spoken words of a text in lower case, as letters and apostrophes only.
 
-    Text in brackets, such as (laughs) or [music], was not spoken and is left out.
+    Text in brackets, such as (laughs) or [music], is left out, because it is not spoken.
     """
     text = re.sub(r"\[[^\]]*\]|\([^)]*\)|<[^>]*>", " ", transcript)
     text = unicodedata.normalize("NFKD", text.replace("\u2019", "'").replace("°", _SIGNS["°"]))
@@ -48,7 +48,7 @@ def _spoken(match: re.Match[str]) -> list[str]:
         word = match[0].strip("'")
         return [word] if word else []
     plain = (number or stuck).replace(",", "")
-    if len(plain) > 30:  # too long to be said as a number
+    if len(plain) > 30:  # such a long number is read digit by digit
         return [_SMALL[int(digit)] for digit in plain if digit.isdigit()]
     if currency:
         return _money(plain, *_MONEY[currency])
@@ -62,7 +62,7 @@ def _spoken(match: re.Match[str]) -> list[str]:
 
 
 def cardinal(number: int) -> list[str]:
-    """A whole number in words; digit by digit from 10^12 on."""
+    """A whole number in words, from 10^12 on digit by digit."""
     if number >= 10**12:
         return [_SMALL[int(digit)] for digit in str(number)]
     for size, name in _LARGE:
@@ -75,7 +75,7 @@ def cardinal(number: int) -> list[str]:
 
 
 def _year(digits: str) -> list[str]:
-    """Four digits as a year (nineteen eighty four), others as a number."""
+    """Four digits as a year (nineteen eighty four), other digits as a number."""
     if digits.startswith("0") and len(digits) > 1:
         return [_SMALL[int(digit)] for digit in digits]
     number = int(digits)

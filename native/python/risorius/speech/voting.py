@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Recognition by vote: several decoders hear the voice at several speeds.
+"""Recognises phonemes by vote: several decoders hear the voice at several speeds.
 
-A decoder of words is constrained by its language, a decoder of phonemes is not. A voice played a
-little faster sounds like a smaller speaker, whom the model may know better. Where the decoders
-disagree, the majority is right more often than any single one.
+A decoder of words is constrained by its language model, a decoder of phonemes is not. A voice
+played a little faster sounds like a smaller speaker, for whom the model may work better. If the
+decoders disagree, the majority is right more often than any single decoder.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ Votes = npt.NDArray[np.float64]
 
 _SPEEDS = (0.95, 1.0, 1.05)
 _WORD_VOTE, _PHONE_VOTE = 1.2, 1.0
-_MAJORITY = 0.01  # for the voice at its own speed, to break ties
-_SHORTEST = 3  # least frames of a phoneme
+_MAJORITY = 0.01  # additional vote at the voice's own speed, to break ties
+_SHORTEST = 3  # smallest number of frames of a phoneme
 
 _PHONES = tuple(CLASS_OF)
 _COLUMN = {phone: i for i, phone in enumerate(_PHONES)}
@@ -31,12 +31,12 @@ _VISEME_OF_COLUMN = np.array([VISEMES.index(CLASS_OF[phone]) for phone in _PHONE
 
 
 def hear(recogniser: Recogniser, samples: Samples, tell: Callable[[float], None]) -> list[Phoneme]:
-    """The phonemes of a piece of a voice, and the words recognised in it.
+    """Recognises the phonemes of a piece of a voice, with the words that begin at them.
 
     Args:
-        recogniser: whose decoders vote.
-        samples: float32[n] at audio.RATE.
-        tell: called with the share of the work, in [0, 1].
+        recogniser: the recogniser whose decoders vote.
+        samples: float32[n] at audio.RATE per second.
+        tell: called with the fraction of the work done, 0 to 1.
     """
     votes = np.zeros((max(1, round(len(samples) / RATE / FRAME)), len(_PHONES)))
     words: list[Segment] = []
@@ -59,7 +59,7 @@ def _count(votes: Votes, heard: Sequence[Segment], speed: float, weight: float) 
 
 
 def _elected(votes: Votes) -> list[Phoneme]:
-    """Elects first the viseme, then one of its phonemes; short runs join their neighbours."""
+    """Elects the viseme of each frame, then a phoneme for each run; short runs are merged."""
     visemes = np.zeros((len(votes), len(VISEMES)))
     for column, viseme in enumerate(_VISEME_OF_COLUMN):
         visemes[:, viseme] += votes[:, column]
@@ -78,7 +78,7 @@ def _elected(votes: Votes) -> list[Phoneme]:
 
 
 def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
-    """First and last + 1 frame of each run of one viseme; short runs are joined to the left."""
+    """(first frame, last frame + 1) of each run of a viseme; short runs join the run before."""
     edges = [0, *(int(i) + 1 for i in np.flatnonzero(np.diff(best))), len(best)]
     runs: list[tuple[int, int]] = []
     for first, last in pairwise(edges):
@@ -90,7 +90,7 @@ def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
-    """Marks each word at the phoneme that begins nearest to it, at most one word per phoneme."""
+    """Sets each word at the phoneme that begins nearest to it, at most one word per phoneme."""
     spoken = [i for i, phone in enumerate(found) if phone.name != "SIL"]
     if not spoken:
         return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face as one web page that needs nothing but a browser."""
+"""Writes a face as a web page that needs only a browser."""
 
 from .looks import find_looks
 from .page import WebError, render, render_script

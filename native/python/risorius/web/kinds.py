@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What a mesh is of a person, read from its name."""
+"""Finds the kind of a mesh, such as skin or hair, by its name."""
 
 from __future__ import annotations
 
-# The first that fits counts: an eyelash is no eye.
+# The first match counts, so that eyelashes are not eyes.
 _KINDS = (
     ("lashes", ("lash", "eyebrow")),
     ("hair", ("hair", "brow", "beard", "moustache", "mustache", "sideburn", "ponytail", "stubble")),
@@ -20,10 +20,10 @@ _KINDS = (
 
 
 def kind_of(name: str) -> str:
-    """skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
+    """The kind of a mesh: skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
 
     Args:
-        name: of a mesh.
+        name: name of the mesh.
     """
     word = name.lower()
     return next((kind for kind, parts in _KINDS if any(p in word for p in parts)), "skin")

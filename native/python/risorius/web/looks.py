@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How the meshes of a page look: the textures that a DNA file names in its metadata, small enough
-for a network, and where wrinkles show."""
+"""Makes the materials of a web page: textures named in the DNA file's metadata, scaled down, and
+the masks of wrinkles."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .textures import Textures, base_name, halved, media_type
 Pixels = npt.NDArray[np.uint8]
 
 _JPEG = "image/jpeg"
-# Role -> longest side, quality. Wrinkles are soft, and hair has one colour for the most part.
+# Role -> (pixels of the longest side, JPEG quality). Wrinkles are soft; hair has few colours.
 _SIZES = {
     "color": (1024, 82),
     "hair": (512, 75),
@@ -33,20 +33,21 @@ _SIZES = {
 }
 _ROLES = ("color", "alpha", "normal", "roughness")
 _REGION = re.compile(r"head_wm([123])_(?!normal)[A-Za-z]+(?:_[A-Za-z]{1,2})?$")
-_TILE = 128  # pixels: masks are soft, and the page has all in one picture
-_FLUSH = 3  # the channel behind the three sets of wrinkles
-# Sets of newer exports hold differences about 0.5: of theirs blue is as grey as red.
-_OFFSET_BLUE = 0.75
+# pixels per side of a mask: masks are soft, and the page has all of them in one picture
+_TILE = 128
+_FLUSH = 3  # channel number after the three sets of wrinkle normals
+# Wrinkle normals of newer exports are differences about 0.5, so their blue is as grey as their red.
+_OFFSET_BLUE = 0.75  # mean blue below which normals are differences
 
 
 @dataclass
 class Looks:
-    """What the page knows of its surfaces.
+    """Materials and pictures of the page.
 
     Attributes:
-        materials: kind, and the numbers of pictures by use.
-        of_mesh: mesh -> number of its material.
-        pictures: media type and bytes.
+        materials: kind of each material, and use -> number of its picture.
+        of_mesh: name of a mesh -> number of its material.
+        pictures: (media type, bytes) of each picture.
     """
 
     materials: list[dict[str, Any]] = field(default_factory=list)
@@ -55,14 +56,15 @@ class Looks:
 
 
 def find_looks(dna: Dna, file: Path | None = None) -> Looks:
-    """A material for each mesh, those of one name at all levels the same.
+    """Makes a material for each mesh; the meshes of all LODs with the same base name share it.
 
     Args:
-        dna: has the metadata: `texture:<mesh>:<role>` names a file.
-        file: the DNA file; pictures lie beside it or in <stem>_textures. None: there are none.
+        dna: the face; its metadata `texture:<mesh>:<role>` names a file.
+        file: path of the DNA file; pictures are in its folder or in <stem>_textures. None: no
+            pictures.
 
     Returns:
-        Pictures that are there; what a browser cannot show is left out.
+        The materials, with the pictures that exist and that a browser can show.
     """
     return _Finder(dna, file).looks()
 
@@ -98,7 +100,7 @@ class _Finder:
         return material
 
     def _picture(self, name: str, role: str, kind: str = "") -> dict[str, int]:
-        """Role -> number of a picture; two where a colour has its opacity with it."""
+        """Role -> number of a picture; a colour picture with opacity gives two roles."""
         if (name, role) in self.numbers:
             return self.numbers[name, role]
         data = self.textures.read(name)
@@ -108,7 +110,7 @@ class _Finder:
             if pixels is None:
                 found[role] = self._add(media_type(data), data)
                 if has_opacity(data) and kind in ("hair", "lashes"):
-                    found["cut"] = 1  # by the opacity of the colour itself
+                    found["cut"] = 1  # hair is cut by the opacity of the colour picture
             elif pixels.ndim == 3 and pixels.shape[2] == 4:
                 found["color"] = self._compress(pixels[..., :3], "hair")
                 found["alpha"] = self._compress(pixels[..., 3], "alpha")
@@ -118,7 +120,7 @@ class _Finder:
         return found
 
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
-        """Sets of normals, one picture of all masks, and which map shows where in it."""
+        """Numbers of wrinkle normals, one picture of all masks, (animated map, tile, channel)."""
         sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
         tiles = list[Pixels]()
         for number in (1, 2, 3):
@@ -162,7 +164,7 @@ class _Finder:
 
 
 def _squared(mask: Pixels) -> Pixels:
-    """uint8[_TILE, _TILE]: what is nearest in a mask of any size."""
+    """uint8[_TILE, _TILE]: a mask resampled to the nearest pixels."""
     small = halved(mask, _TILE)
     row, column = ((np.arange(_TILE) * size // _TILE).astype(np.int64) for size in small.shape)
     return small[row[:, None], column[None, :]]

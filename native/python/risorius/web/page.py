@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The page: the empty one that comes with the package, and a face put into it.
+"""Writes a web page with a face, from the empty page that the package contains.
 
 packaging/ship/web.sh makes the empty page: the C library as WebAssembly, the viewer and three.js.
 """
@@ -36,10 +36,10 @@ from .looks import Looks, find_looks
 
 _EMPTY = "page.html"
 _MARK = "<!--FACE-->"
-# Of the page that packaging makes: each once, by id.
+# Scripts of the empty page, each with its id.
 _ELEMENT = re.compile(r'<script[^>]* id="(library|viewer)"[^>]*>([^<]*)</script>')
 _BOOT = re.compile(r"<script>(/\*BOOT\*/.*?)</script>", re.DOTALL)
-# Layers of what evaluates; the meshes come beside it, in fewer bytes.
+# Layers that the evaluator needs; meshes are stored apart, in fewer bytes.
 RIG = (
     "behavior",
     "machine_learned_behavior",
@@ -47,23 +47,23 @@ RIG = (
     "joint_behavior_metadata",
     "twist_swing_behavior",
 )
-_CAPTURES = "live_link_face"  # the mapping for tables that are dropped on the page
+_CAPTURES = "live_link_face"  # mapping for tables that a user drops on the page
 _SOUNDS = {".wav": "audio/wav", ".mp3": "audio/mpeg", ".ogg": "audio/ogg", ".m4a": "audio/mp4"}
 SOUNDS = tuple(_SOUNDS)
 Sound = tuple[bytes, str, float]
 
 
 class WebError(RisoriusError):
-    """A page that cannot be made."""
+    """A page that cannot be written."""
 
     code = "web"
 
 
 def empty_page() -> str:
-    """The page without a face.
+    """The HTML of the page without a face.
 
     Raises:
-        WebError: the package was built without it.
+        WebError: the package was built without the page.
     """
     place = resources.files(__package__).joinpath(_EMPTY)
     if not place.is_file():
@@ -82,21 +82,21 @@ def render(
     clip: Clip | None = None,
     sound: Sound | None = None,
 ) -> bytes:
-    """A page that opens from a file: sliders, levels of detail, a clip.
+    """Writes a page that opens from a file: controls, levels of detail, a clip.
 
     Args:
-        dna: with behavior and geometry.
-        title: of the page.
-        looks: materials and pictures, of find_looks; None: plain ones by the names of the meshes.
-        clip: that plays on it, of its raw controls and the angles of neck and head.
-        sound: what is heard with the clip: the bytes of a file, its ending (one of SOUNDS), and
-            at which second of the clip it begins.
+        dna: face with behavior and geometry.
+        title: title of the page.
+        looks: materials and pictures from find_looks; None: plain materials by the meshes' names.
+        clip: clip to play, with raw controls and angles of neck and head.
+        sound: sound of the clip: bytes of a file, its suffix (one of SOUNDS), and the second of the
+            clip at which it starts.
 
     Returns:
         The page as HTML in UTF-8.
 
     Raises:
-        WebError: there is nothing to show or to play, or no page in this build.
+        WebError: the face has no meshes, the clip moves nothing, or this build has no page.
         DnaError: the face cannot be written.
     """
     page = empty_page()
@@ -117,16 +117,16 @@ def render_script(
     clip: Clip | None = None,
     sound: Sound | None = None,
 ) -> bytes:
-    """A script with the face and the viewer in it, for pages of the user's own.
+    """Writes a script with the face and the viewer, for pages of the user's own.
 
     `<script src="face.js"></script>` and `<risorius-face></risorius-face>` show it.
 
     Args:
         dna, looks, clip, sound: see render.
-        name: by which `<risorius-face name="...">` finds it; the first face needs none.
+        name: name by which `<risorius-face name="...">` finds the face; the first face needs none.
 
     Returns:
-        JavaScript in ASCII.
+        JavaScript as ASCII bytes.
 
     Raises:
         WebError: see render.
@@ -144,14 +144,14 @@ def render_script(
 
 
 def _json(value: Any) -> str:
-    """Nothing in it may end the element that it stands in."""
+    """JSON that cannot end the HTML element around it."""
     return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _content(
     dna: Dna, title: str, looks: Looks | None, clip: Clip | None, sound: Sound | None
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """The table, and the files by name, each packed and as text."""
+    """The JSON table of the page, and file name -> packed content as text."""
     if not any(len(mesh.positions) for mesh in dna.meshes):
         raise WebError("the file has no meshes: there is nothing to show")
     looks = looks or find_looks(dna)
@@ -180,7 +180,7 @@ def _content(
 
 
 def _rig(dna: Dna) -> bytes:
-    """What evaluates: the file without its meshes."""
+    """The bytes of the DNA file without its meshes."""
     return load(dna.to_bytes(), layers=RIG).to_bytes()
 
 
@@ -189,8 +189,8 @@ def _packed(data: bytes, level: int = 9) -> str:
 
 
 def _captures(names: list[str]) -> dict[str, Any]:
-    """How the page maps the curves of a table that is dropped on it: rows by curve, a raw control
-    by number or an angle by name; and the controls that are shares of another."""
+    """The mapping for tables dropped on the page: curve -> [control or angle, weight], with raw
+    controls as numbers and angles as names; and the controls that are shares of others."""
     mapping = load_mapping(_CAPTURES)
     index = {short_name(name): i for i, name in enumerate(names)}
     index |= {name: i for i, name in enumerate(names)}
@@ -212,7 +212,7 @@ def _captures(names: list[str]) -> dict[str, Any]:
 
 
 def _bones(dna: Dna) -> list[dict[str, Any]]:
-    """The joints that turn as neck and head: their share of the angles, their axes, and the raw
+    """Joints that rotate as neck and head: their share of the angles, their axes, and the raw
     controls that hold their rotation."""
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     return [
@@ -228,7 +228,7 @@ def _bones(dna: Dna) -> list[dict[str, Any]]:
 
 
 def _regions(names: list[str]) -> list[dict[str, Any]]:
-    """Raw controls by region, in the order in which regions are shown."""
+    """The raw controls of each region, in the order in which the page shows regions."""
     of: dict[str, list[int]] = {region: [] for region in TITLES}
     for index, name in enumerate(names):
         of[region_of(name)].append(index)
@@ -236,10 +236,10 @@ def _regions(names: list[str]) -> list[dict[str, Any]]:
 
 
 def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes]:
-    """What the player needs, and float32[frames, controls + 4 * turns].
+    """The table for the player, and float32[frames, controls + 4 * turns] as bytes.
 
-    First the controls that the clip moves, then the turns of the joints of neck and head as
-    quaternions (x, y, z, w) against rest, about the joint's own axes, in the file's space.
+    The columns are the controls that the clip moves, then for each joint of neck and head its
+    rotation relative to rest, as a quaternion x, y, z, w about the joint's own axes.
     """
     even = clip if clip.times is None else clip.resampled(clip.rate)
     curves = np.nan_to_num(even.curves, nan=0.0, posinf=1.0, neginf=0.0)
@@ -260,7 +260,7 @@ def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes
 
 
 def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
-    """Joint -> float64[frames, 4]: as its raw controls say, else as the angles of its bone."""
+    """Joint -> float64[frames, 4]: from its raw controls, else from the angles of neck or head."""
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     raw = dna.raw_control_names
     found = {}

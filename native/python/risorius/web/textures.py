@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The textures that a DNA file names in its metadata, where they lie, and smaller ones of them."""
+"""Reads the textures that a DNA file names in its metadata, and scales them down."""
 
 from __future__ import annotations
 
@@ -19,19 +19,22 @@ _KINDS = {
     b"\xff\xd8\xff": "image/jpeg",
     b"RIFF": "image/webp",
 }
-_MOST = 16 << 20  # bytes of one picture
+_MOST = 16 << 20  # bytes: larger pictures are not read
 _LOD = re.compile(r"_lod\d+.*", re.IGNORECASE)
 
 
 class Textures:
-    """Attributes:
-    named: mesh without its level -> role -> name of the file.
+    """The textures of a face.
+
+    Attributes:
+    named: name of a mesh without its LOD -> role -> file name.
     """
 
     def __init__(self, dna: Dna, file: Path | None) -> None:
         """Args:
-        dna: has the metadata.
-        file: its file; pictures lie beside it or in <stem>_textures. None: there are none.
+        dna: the face with its metadata.
+        file: path of the DNA file; pictures are in its folder or in <stem>_textures. None: no
+            pictures.
         """
         self._folders = (
             () if file is None else (file.with_name(f"{file.stem}_textures"), file.parent)
@@ -43,7 +46,7 @@ class Textures:
                 self.named.setdefault(base_name(words[1]), {}).setdefault(words[2], name)
 
     def read(self, name: str) -> bytes:
-        """b"" where no such picture is there. Metadata may name no file elsewhere."""
+        """The bytes of a picture, or b""; names that lead to other folders are refused."""
         if not is_file_name(name):
             return b""
         for folder in self._folders:
@@ -55,21 +58,21 @@ class Textures:
 
 
 def base_name(mesh: str) -> str:
-    """A mesh's name without its level, e.g. head of head_lod0_mesh."""
+    """A mesh's name without its LOD, e.g. head for head_lod0_mesh."""
     return _LOD.sub("", mesh)
 
 
 def media_type(data: bytes) -> str:
-    """That of a picture's bytes, "" for what no browser shows."""
+    """The media type of a picture's bytes, "" for formats that no browser shows."""
     return next((kind for start, kind in _KINDS.items() if data.startswith(start)), "")
 
 
 def halved(pixels: Pixels, longest: int) -> Pixels:
-    """The mean of four in place of each four, until no side is longer.
+    """Halves a picture, by the mean of 2 x 2 pixels, until no side is longer than `longest`.
 
     Args:
         pixels: uint8[h, w] or [h, w, k].
-        longest: pixels of a side.
+        longest: largest number of pixels of a side.
     """
     while max(pixels.shape[:2]) > longest and min(pixels.shape[:2]) > 1:
         rows, columns = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2

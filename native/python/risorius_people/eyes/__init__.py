@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eyes: balls with a deep iris, corneas, lids that lie on the balls, tears."""
+"""Makes eyes: balls with a deep iris, corneas, lids that touch the balls, tear lines."""
 
 from .eyeball import with_eyeballs
 from .parts import eye_parts

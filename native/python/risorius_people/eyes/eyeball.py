@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Eyeballs, which the data do not have: a ball with a dished iris behind it, and a cornea.
+"""Makes eyeballs, which the data lack: a ball with a dished iris, and a cornea.
 
-Both are surfaces of revolution about the gaze. Their vertices follow the vertices of the base mesh,
-so that positions, motions and skin weights by vertex cover them too.
+Both are surfaces of revolution about the gaze. Their vertices are appended to those of the base
+mesh, so that positions, motions and skin weights by vertex include them.
 """
 
 from __future__ import annotations
@@ -15,41 +15,42 @@ import numpy as np
 from ..polygons import Floats, Ints
 from ..source import BaseMesh
 
-MM = 0.01  # the data are in decimetres
-SEGMENTS = 48
-# In radii of the ball. People have 5.85 mm in 12 mm, but the lids of the data fit a larger ball.
+MM = 0.01  # decimetres per millimetre
+SEGMENTS = 48  # columns around the gaze
+# Radius of the iris in radii of the ball. People have 5.85 mm in 12 mm, but the lids of the data
+# fit a larger ball.
 IRIS = 0.395
-CORNEA = 4 / 3  # radius of the cornea / radius of the iris: 7.8 mm / 5.85 mm
-PUPIL = 0.33  # radius of the pupil in radii of the iris, in room light
-CONVERGENCE = 1.2  # degrees inwards: both eyes look at a point 1.5 m away
-# angle of the limbus from the gaze, radians, at the ball's middle.
+CORNEA = 4 / 3  # radius of the cornea divided by the radius of the iris: 7.8 mm / 5.85 mm
+PUPIL = 0.33  # radius of the pupil in room light, in radii of the iris
+CONVERGENCE = 1.2  # degrees by which each eye turns inwards, to look at a point 1.5 m away
+# Angle in radians between gaze and limbus, the iris' outer edge, at the middle of the ball.
 _LIMBUS = float(np.arcsin(IRIS))
-_EDGE = _LIMBUS + 0.22  # angle where the cornea's shell sinks into the ball
+_EDGE = _LIMBUS + 0.22  # angle in radians at which the cornea's shell sinks into the ball
 _SOFT = 0.012  # width of the blend between cornea and ball, in radii of the ball
-_CLEAR = 0.0015  # gap between shell and ball, in radii of the ball
-# Rings of the iris from the pupil (0) to its root (1), and their depth behind the limbus, in
-# radii of the iris.
+_CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the ball
+# Rings of the iris from the pupil (0) to its root (1); below, depths behind the limbus at root,
+# middle and pupil, in radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
-_HOLE = 0.28  # depth of the pupil, in radii of the iris
+_HOLE = 0.28  # depth of the pupil behind the iris, in radii of the iris
 _BEHIND = np.array(
     [0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25]
 )
 _CORNEA_RINGS = np.array(
     [0.06, 0.14, 0.24, 0.34, 0.44, 0.53, 0.61, 0.68, 0.75, 0.82, 0.89, 0.95, 1.0]
 )
-# Rings that the coarse LOD keeps; the others lie close to them.
+# Indices of the rings that the coarse LOD keeps.
 _COARSE_BALL = [0, 1, 2, 4, 6, 8, 10, 11, 12, 15, 17, 19, 21, 22, 23, 24, 25, 26]
 _COARSE_CORNEA = [1, 3, 5, 7, 9, 12]
-# Distances of the rings on the texture: the iris gets most of it, the hidden back little.
+# Distances from the middle of the texture: the iris gets most of it, the hidden back little.
 IRIS_AT, SIDE_AT, SIDE_ANGLE = 0.26, 0.47, 1.4
 
 
 def surface(angle: Floats) -> Floats:
-    """Distance of the eye's surface from the ball's middle, float64[...], in radii of the ball.
+    """float64[...]: distance of the eye's surface from the ball's middle, in radii of the ball.
 
     Args:
-        angle: float64[...], from the gaze, radians.
+        angle: float64[...], angle from the gaze in radians.
     """
     curve = CORNEA * IRIS
     ahead = np.cos(_LIMBUS) - np.sqrt(curve**2 - IRIS**2)
@@ -60,10 +61,10 @@ def surface(angle: Floats) -> Floats:
 
 
 def side_map(angle: Floats) -> Floats:
-    """Distance from the middle of the texture for a point outside the iris, float64[...].
+    """float64[...]: distance from the middle of the texture for points outside the iris.
 
     Args:
-        angle: float64[...], from the gaze, radians; at least the limbus' angle.
+        angle: float64[...], angle from the gaze in radians, at least that of the limbus.
     """
     low = IRIS_AT + (SIDE_AT - IRIS_AT) * (angle - _LIMBUS) / (SIDE_ANGLE - _LIMBUS)
     high = SIDE_AT + (0.5 - SIDE_AT) * (angle - SIDE_ANGLE) / (np.pi - SIDE_ANGLE)
@@ -71,7 +72,7 @@ def side_map(angle: Floats) -> Floats:
 
 
 def side_angle(away: Floats) -> Floats:
-    """The angle from the gaze, float64[...]; the inverse of side_map.
+    """float64[...]: the angle from the gaze in radians; the inverse of side_map.
 
     Args:
         away: float64[...], distance from the middle of the texture, at least IRIS_AT.
@@ -83,11 +84,11 @@ def side_angle(away: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A surface of revolution: rings from front to back, with a pole at one end or both.
+    """A surface of revolution: rings from front to back, with a pole in front or at both ends.
 
     Attributes:
         away, along: float64[rings], distance from the axis and position along it, in radii of the
-        ball.
+            ball.
         map: float64[rings], distance from the middle of the texture.
         poles: (along, map) of the front pole, and of the back pole or None.
     """
@@ -108,11 +109,11 @@ class Revolved:
         return np.concatenate([rings.reshape(-1, 3), tips])
 
     def points(self) -> Floats:
-        """Positions, float64[vertices, 3], in radii of the ball, looking along +z; poles last."""
+        """float64[vertices, 3]: positions in radii of the ball, gaze along +z; poles last."""
         return self._spread(self.away, self.along, [p[0] for p in self.poles if p])
 
     def uvs(self) -> Floats:
-        """Texture coordinates, float64[vertices, 2]."""
+        """float64[vertices, 2]: texture coordinates."""
         flat = self._spread(self.map, 0 * self.map, [0.0 for p in self.poles if p])[:, :2]
         flat += 0.5
         if self.poles[1] is not None:
@@ -120,12 +121,12 @@ class Revolved:
         return flat
 
     def faces(self, first: int, rings: list[int], step: int) -> list[list[int]]:
-        """Vertex indices by face, seen from outside.
+        """Vertex indices of each face, counter-clockwise from outside.
 
         Args:
             first: index of the first vertex.
-            rings: the rings to use, from front to back.
-            step: use every `step`-th vertex of a ring.
+            rings: indices of the rings to use, from front to back.
+            step: only every `step`-th vertex of a ring is used.
         """
         out = []
         tip = first + len(self.away) * SEGMENTS
@@ -176,12 +177,13 @@ _PARTS = (("eyeball", BALL, _COARSE_BALL), ("cornea", SHELL, _COARSE_CORNEA))
 
 
 def with_eyeballs(base: BaseMesh) -> BaseMesh:
-    """The base mesh with the groups eyeball-l, cornea-l and so on, and their coarse versions.
+    """The base mesh with additional groups eyeball-l, cornea-l and so on, and coarse versions of
+    them.
 
-    All new vertices lie at the origin; `seat` places them in a face.
+    The new vertices are at the origin; `seat` moves them into a face.
 
     Args:
-        base: is not changed; a mesh that already has eyeballs is returned as it is.
+        base: the base mesh; not changed. A mesh that has eyeballs is returned as it is.
     """
     if "eyeball-l" in base.faces:
         return base
@@ -206,7 +208,7 @@ def with_eyeballs(base: BaseMesh) -> BaseMesh:
 
 
 def gaze(side: str) -> Floats:
-    """Rest rotation of an eye, float64[3, 3]: both gazes meet far in front of the face.
+    """float64[3, 3]: rest rotation of an eye; both gazes meet in front of the face.
 
     Args:
         side: "l" or "r".
@@ -219,24 +221,24 @@ def gaze(side: str) -> Floats:
 def seat(
     positions: Floats, groups: dict[str, Ints], side: str, middle: Floats, radius: float
 ) -> None:
-    """Put an eyeball and its cornea into a face.
+    """Places an eyeball and its cornea in a face.
 
     Args:
-        positions: float64[V, 3], decimetres; the vertices of the eye are changed in place.
-        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3] in decimetres; the vertices of the eye are changed.
+        groups: name of a group of the base mesh -> vertex indices.
         side: "l" or "r".
         middle: float64[3], middle of the ball.
-        radius: radius of the ball, decimetres.
+        radius: radius of the ball in decimetres.
     """
     for name, shape, _ in _PARTS:
         positions[groups[f"{name}-{side}"]] = middle + radius * shape.points() @ gaze(side).T
 
 
 def pupil_wide(radius: float, side: str) -> Floats:
-    """Displacement of the iris to its root, as if the pupil filled it, float64[ball vertices, 3].
+    """float64[ball vertices, 3]: displacement of the iris to its root, so that the pupil fills it.
 
     Args:
-        radius: radius of the ball, decimetres.
+        radius: radius of the ball in decimetres.
         side: "l" or "r".
     """
     share = np.zeros(len(BALL.away))

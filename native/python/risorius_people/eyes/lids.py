@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lids that lie on the eye: at rest, in each expression, closed and half closed."""
+"""Lays the lids on the eye: at rest, in each expression, closed and half closed."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from . import eyeball
 from .eyeball import IRIS, MM
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
-# Heights above the eye of the rings from the lashes' roots to the inner rim, mm: the skin's edge,
-# the middle of the rim, the contact with the eye, and the ring hidden in the ball.
+# mm above the eye of the rings from the lashes' roots to the inner rim: the skin's edge, the middle
+# of the rim, the contact with the eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-# weights of the rings outside the rim.
+# Share of the rim's displacement that the rings outside the rim follow, from the rim outward.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
-_STEPS = 10
-_LIFT = 0.38  # mm that lids rise in a full look: half a look does not carry them round the ball
-# Degrees that a look at 1 turns an eye, and the factor on the data's lid motion. The data's eyes
-# turn by a third of that and leave the lower lids still.
+_STEPS = 10  # iterations that lay the rim on the eye
+# mm by which lids rise in a full look, because half a look moves them straight, not round the ball
+_LIFT = 0.38
+# Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
+# eyes turn by a third of this, and their lower lids stay still.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
-_LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
-_SKIN = 0.9  # mm, smallest height of the skin around the rim above the eye
-# Pairs of controls that together push the lids into the eye.
+_LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm by which the lower lid rises in a look
+_SKIN = 0.9  # mm: smallest height above the eye of the skin around the rim
+# Pairs of controls that together would push the lids into the eye.
 _TOGETHER = (
     ("eyeCheekRaise", "eyeSquintInner"),
     ("eyeCheekRaise", "eyeLookDown"),
@@ -40,18 +41,19 @@ _NOT_CLOSED = [
     "eyeCheekRaise",
     "eyeUpperLidUp",
 ]
-WIDER = 0.75  # factor on the data's displacement, which starts from half-shut lids
-_FORWARD, _ASIDE = 1.5, 1.2  # mm: offset from the data's ball, and its largest offset up or down
-_RADIUS = 14.0  # mm, radius of the man's ball; the sizes above refer to it
-_MOVES = 0.03 * MM  # decimetres: displacements below this leave the lids alone
+WIDER = 0.75  # factor on the data's displacement, which starts with half-shut lids
+# mm: offset of the ball to the front from the data's ball, and largest offset up or down
+_FORWARD, _ASIDE = 1.5, 1.2
+_RADIUS = 14.0  # mm: radius of the man's ball, for which the lengths above are given
+_MOVES = 0.03 * MM  # decimetres: smaller displacements do not move the lids
 
 
 def rotation(degrees: float, axis: int) -> Floats:
-    """float64[3, 3]: a rotation.
+    """float64[3, 3]: a rotation about an axis.
 
     Args:
-        degrees: the angle.
-        axis: rotation axis: x (0), y (1) or z (2).
+        degrees: angle of the rotation.
+        axis: index of the axis: x (0), y (1) or z (2).
     """
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     out = np.eye(3)
@@ -62,7 +64,7 @@ def rotation(degrees: float, axis: int) -> Floats:
 
 
 def look_rotation(way: str) -> Floats:
-    """Rotation of an eye by a look at 1, float64[3, 3].
+    """float64[3, 3]: rotation of an eye by a look at 1.
 
     Args:
         way: "Up", "Down", "Left" or "Right", from the character's point of view.
@@ -73,16 +75,16 @@ def look_rotation(way: str) -> Floats:
 
 @dataclass
 class Lids:
-    """The lids of one eye and its ball.
+    """The lids of one eye, and its ball.
 
     Attributes:
         side: "l" or "r".
         rings: int64[13, COLUMNS], see find_rings.
-        openness: height of the upper lid above the ball's middle, in radii of the iris.
-        middle: float64[3], middle of the ball, decimetres.
-        radius: radius of the ball, decimetres.
-        raw: float64[V, 3], the positions before the lids were opened.
-        rest: float64[V, 3], the positions after it.
+        openness: height of the upper lid above the middle of the ball, in radii of the iris.
+        middle: float64[3], middle of the ball in decimetres.
+        radius: radius of the ball in decimetres.
+        raw: float64[V, 3], positions before the lids are opened.
+        rest: float64[V, 3], positions after the lids are opened.
     """
 
     side: str
@@ -94,16 +96,16 @@ class Lids:
     rest: Floats
 
     def grid(self, values: Floats) -> Floats:
-        """Values of the rings' vertices, float64[13, COLUMNS, 3]."""
+        """float64[13, COLUMNS, 3]: the values of the rings' vertices."""
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """A grid with its rim laid on the eye; the skin around the rim follows.
+        """float64[13, COLUMNS, 3]: a grid with its rim laid on the eye; the skin around it follows.
 
         Args:
-            grid: float64[13, COLUMNS, 3].
+            grid: float64[13, COLUMNS, 3], positions of the rings.
             turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
-            lift: mm above the rest height.
+            lift: mm by which the rim is above its rest height.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -118,7 +120,7 @@ class Lids:
             out[_EDGE] += lack[:, :, None] * ray[_EDGE]
             drawn = _FADE[::-1, None] * lack[0]
             out[:ROOT] += drawn[:, :, None] * ray[:ROOT]
-        # Skin below the rim that is pushed up must lie over the eye too.
+        # Skin outside the rim that is pushed up must stay above the eye, too.
         arm = out[:ROOT] - self.middle
         length = np.linalg.norm(arm, axis=2)
         angle = np.arccos(np.clip(arm @ gaze / length, -1, 1))
@@ -127,10 +129,10 @@ class Lids:
         return out
 
     def heights(self, grid: Floats, turn: Floats | None = None) -> Floats:
-        """Heights of the rim's rings above the eye, float64[4, COLUMNS], decimetres.
+        """float64[4, COLUMNS]: heights of the rim's rings above the eye, in decimetres.
 
         Args:
-            grid: float64[13, COLUMNS, 3].
+            grid: float64[13, COLUMNS, 3], positions of the rings.
             turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
@@ -144,12 +146,12 @@ class Lids:
 def place_ball(
     positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
 ) -> tuple[Floats, float]:
-    """Middle and radius of the ball that fits the lids of the data.
+    """The middle and radius of the ball that fits the data's lids.
 
     Args:
-        positions: float64[V, 3] of a person, decimetres.
-        groups: vertex indices by group of the base mesh.
-        rings: the rings of this eye.
+        positions: float64[V, 3] of a person, in decimetres.
+        groups: name of a group of the base mesh -> vertex indices.
+        rings: int64[13, COLUMNS], the rings of this eye.
         side: "l" or "r".
     """
     ball = groups[f"helper-{side}-eye"]
@@ -164,14 +166,14 @@ def place_ball(
 
 
 def open_lids(lids: Lids, widen: Floats) -> Floats:
-    """Open the lids of a person to their rest pose; changes `rest`.
+    """Opens the lids of a person to their rest pose; `lids.rest` is changed.
 
     Args:
-        lids: `rest` is as in the data.
-        widen: float64[V, 3], displacement of the data that widens the eye.
+        lids: the lids, with the data's positions in `rest`.
+        widen: float64[V, 3], the data's displacement that widens the eye.
 
     Returns:
-        The applied share of `widen`, float64[V, 3].
+        The part of `widen` that was added, float64[V, 3].
     """
     iris = IRIS * lids.radius
     edge = smoothed(lids.grid(lids.rest))[ROOT + 2] - lids.middle
@@ -191,8 +193,8 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
 
 
 def _lower_lid(grid: Floats) -> Floats:
-    """Weight of the lower lid, float64[13, COLUMNS, 1]: 1 at the rim's middle, 0 at corners and
-    cheek."""
+    """float64[13, COLUMNS, 1]: the lower lid's weight, 1 at the rim's middle, 0 at the corners
+    and the cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)
@@ -201,20 +203,19 @@ def _lower_lid(grid: Floats) -> Floats:
 
 
 def _lower_closed(lids: Lids) -> Floats:
-    """The grid with the lower lid raised to where it meets the upper lid, float64[13, COLUMNS,
-    3]."""
+    """float64[13, COLUMNS, 3]: the grid with the lower lid raised to meet the upper lid."""
     grid = lids.grid(lids.rest)
     way = np.array([-0.7 * np.sign(lids.middle[0]), 0.7, 0.0]) * MM
     return np.asarray(grid + _lower_lid(grid) * way)
 
 
 def following(lids: Lids, way: str, look: Floats) -> Floats:
-    """Displacement of the lids when the eye looks further than in the data, float64[V, 3].
+    """float64[V, 3]: displacement of the lids, because the eye turns further than in the data.
 
     Args:
-        lids: at rest.
+        lids: the lids at rest.
         way: "Up", "Down", "Left" or "Right".
-        look: float64[V, 3], the data's look.
+        look: float64[V, 3], the data's displacement of the look.
     """
     out = LOOKS[way][1] * look
     lower = _lower_lid(lids.rings)[:, :, 0] * _LOWER_LOOKS.get(way, 0.0) * MM
@@ -223,14 +224,14 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 
 
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
-    """Displacement from rest that closes the lids to one line, and the same without the line.
+    """Displacements from rest that close the lids: laid on one line, and as in the data.
 
-    Both are float64[V, 3]. The data's displacement is shortened: whole, it moves the upper lid past
-    the lower lid.
+    Both are float64[V, 3]. The data's displacement is shortened, because it would move the upper
+    lid past the lower lid.
 
     Args:
-        lids: at rest.
-        blink: float64[V, 3], displacement of the data from the data's lids.
+        lids: the lids at rest.
+        blink: float64[V, 3], the data's displacement of the blink.
     """
     closed = _lower_closed(lids)
     before, way = lids.grid(lids.raw), lids.grid(blink)
@@ -261,12 +262,12 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
 
 
 def _meeting(start: Floats, way: Floats, line: Floats) -> float:
-    """The share of a displacement at which a point is as low as a line at its x.
+    """The fraction of a displacement at which a point is as low as a line at the point's x.
 
     Args:
-        start: float64[3].
-        way: float64[3].
-        line: float64[n, 3].
+        start: float64[3], the point.
+        way: float64[3], the displacement.
+        line: float64[n, 3], points of the line.
     """
     line = line[line[:, 0].argsort()]
     if abs(way[1]) < 1e-6:
@@ -279,11 +280,11 @@ def _meeting(start: Floats, way: Floats, line: Floats) -> float:
 
 
 def _even(share: Floats, known: Floats) -> Floats:
-    """Shares by column: unknown columns get the nearest known share, then all are smoothed.
+    """Fractions by column: unknown columns get the nearest known one, then all are smoothed.
 
     Args:
-        share: float64[COLUMNS].
-        known: bool[COLUMNS].
+        share: float64[COLUMNS], fractions.
+        known: bool[COLUMNS], whether a fraction is known.
     """
     columns = np.arange(COLUMNS)
     held = known & (columns >= UPPER.start) & (columns < UPPER.stop)
@@ -294,12 +295,12 @@ def _even(share: Floats, known: Floats) -> Floats:
 
 
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
-    """Displacement of the skin outside the grid, without the part that opened it, float64[V, 3].
+    """float64[V, 3]: displacement of the skin outside the grid, minus the opening of the lids.
 
     Args:
-        lids: at rest.
-        blink: float64[V, 3], displacement of the data.
-        share: float64[COLUMNS], the share of `blink` to use.
+        lids: the lids at rest.
+        blink: float64[V, 3], the data's displacement.
+        share: float64[COLUMNS], the fraction of `blink` that is used.
     """
     out = np.zeros_like(blink)
     moved = np.flatnonzero(np.abs(blink).max(axis=1) > 1e-7)
@@ -311,11 +312,10 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
 
 
 def between(lids: Lids, way: Floats) -> Floats:
-    """Displacement for half-closed lids, which move straight instead of round the ball, float64[V,
-    3].
+    """float64[V, 3]: correction of half-closed lids, which move straight and not round the ball.
 
     Args:
-        lids: at rest.
+        lids: the lids at rest.
         way: float64[V, 3], displacement that closes the lids.
     """
     half = lids.grid(lids.rest + way / 2)
@@ -325,11 +325,11 @@ def between(lids: Lids, way: Floats) -> Floats:
 
 
 def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
-    """A displacement of the skin with its lids laid on the eye, float64[V, 3].
+    """float64[V, 3]: a displacement of the skin, corrected so that the lids touch the eye.
 
     Args:
-        lids: at rest.
-        way: float64[V, 3].
+        lids: the lids at rest.
+        way: float64[V, 3], the displacement.
         turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
     """
     grid = lids.grid(way)
@@ -342,10 +342,10 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
 
 
 def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) -> Floats:
-    """Displacement to add when closed lids get a second expression, float64[V, 3].
+    """float64[V, 3]: displacement to add if closed lids get a second expression.
 
     Args:
-        lids: at rest.
+        lids: the lids at rest.
         blink: float64[V, 3], displacement that closes the lids.
         other: float64[V, 3], displacement of the second expression.
         turn: float64[3, 3], rotation of the eye by the second expression; None: the eye is at rest.
@@ -359,10 +359,10 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
 
 
 def stays_on_the_ball(lids: Lids, one: Floats, other: Floats, turn: Floats | None) -> Floats:
-    """Displacement to add when two controls together push the lids into the eye, float64[V, 3].
+    """float64[V, 3]: displacement to add if two controls together push the lids into the eye.
 
     Args:
-        lids: at rest.
+        lids: the lids at rest.
         one, other: float64[V, 3], displacement of each control.
         turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
     """
@@ -371,10 +371,10 @@ def stays_on_the_ball(lids: Lids, one: Floats, other: Floats, turn: Floats | Non
 
 
 def together(names: Mapping[str, object], side: str) -> list[tuple[str, str]]:
-    """Pairs of existing raw controls that together push the lids into the eye.
+    """Pairs of raw controls that exist and together would push the lids into the eye.
 
     Args:
-        names: raw controls.
+        names: mapping whose keys are raw controls.
         side: "L" or "R".
     """
     pairs = [(one + side, other + side) for one, other in _TOGETHER]
@@ -382,10 +382,10 @@ def together(names: Mapping[str, object], side: str) -> list[tuple[str, str]]:
 
 
 def partners(names: Mapping[str, object], side: str) -> list[str]:
-    """Existing raw controls that must leave closed lids still.
+    """Raw controls that exist and must not move closed lids.
 
     Args:
-        names: raw controls.
+        names: mapping whose keys are raw controls.
         side: "L" or "R".
     """
     return [name + side for name in _NOT_CLOSED if name + side in names]

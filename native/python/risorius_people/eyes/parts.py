@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of the eyes: balls, corneas, tear lines along the lower lids, caruncles."""
+"""Makes the meshes of the eyes: balls, corneas, tear lines along the lower lids, caruncles."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..polygons import Floats, Ints, Operator, Polygons, compact_uvs, subdivide
 from ..source import BaseMesh
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, find_rings
 
-# Names of meshes -> groups of the base mesh.
+# Name of a mesh -> groups of the base mesh.
 _BALLS = {
     "eyeLeft": ["eyeball-l"],
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Sections of the caruncle: columns from the corner, distance in on the rim, and height over the
-# line between both rims, in lid thicknesses.
+# Sections of the caruncle: (columns from the corner, distance inwards on the rim, height above the
+# line between both rims, in lid thicknesses).
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),
@@ -27,17 +27,17 @@ _MOUND = (
     (4, 2.25, 0.04),
     (4, 2.7, -0.15),
 )
-_APART = 0.12
-Row = dict[int, float]  # weights by vertex of the base mesh, with sum 1
+_APART = 0.12  # share of the neighbouring column at the corner
+Row = dict[int, float]  # vertex of the base mesh -> weight; the weights of a row sum to 1
 
 
 def eye_parts(base: BaseMesh, groups: dict[str, Ints], lod: int) -> list[Part]:
-    """All meshes of the eyes at one LOD.
+    """Makes all meshes of the eyes at one LOD.
 
     Args:
         base: the base mesh with its eyeballs.
-        groups: vertex indices by group.
-        lod: 0, or 1 for the coarse meshes.
+        groups: name of a group of the base mesh -> vertex indices.
+        lod: number of the LOD: 0, or 1 for coarse meshes.
     """
     out = []
     for name, own in _BALLS.items():
@@ -93,11 +93,11 @@ def _mixed(*parts: tuple[float, Row]) -> Row:
 
 
 def _on_skin(rings: Ints, row: int, column: int) -> Row:
-    """Weights of a lid vertex after one Catmull-Clark step, as on the finest skin.
+    """Weights of a lid vertex after one Catmull-Clark step, which the skin of LOD 0 has.
 
     Args:
-        rings: the rings of the eye.
-        row: row of the grid, not the first and not the last.
+        rings: int64[13, COLUMNS], the rings of the eye.
+        row: row of the grid, neither the first nor the last.
         column: column of the grid.
     """
     out: Row = {}
@@ -110,11 +110,11 @@ def _on_skin(rings: Ints, row: int, column: int) -> Row:
 
 
 def _rim(rings: Ints, at: float, column: int) -> Row:
-    """Weights of a point on a lid's rim.
+    """Weights of the base mesh's vertices for a point on a lid's rim.
 
     Args:
-        rings: the rings of the eye.
-        at: 0 at the lashes' roots, 1 and 2 further in; from 2 to 3 the rim meets the eye.
+        rings: int64[13, COLUMNS], the rings of the eye.
+        at: position across the rim: 0 at the lashes' roots, 2 to 3 where the rim meets the eye.
         column: column of the grid.
     """
     row = min(int(at), 2)
@@ -123,10 +123,10 @@ def _rim(rings: Ints, at: float, column: int) -> Row:
 
 
 def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
-    """The tear line between lower lid and eye: a hollow strip from the rim to the ball.
+    """Makes the tear line between lower lid and eye: a hollow strip from the rim to the ball.
 
     Args:
-        rings: the rings of the eye.
+        rings: int64[13, COLUMNS], the rings of the eye.
 
     Returns:
         Vertices as weights of the base mesh's vertices, faces, and texture coordinates
@@ -153,19 +153,18 @@ def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
-    """The pink flesh in the eye's inner corner: a mound between both rims that sinks into the eye.
+    """Makes the caruncle, the pink flesh in the inner corner: a mound between the rims.
 
     Args:
-        rings: the rings of the eye.
+        rings: int64[13, COLUMNS], the rings of the eye.
 
     Returns:
-        The same as _tears.
+        Vertices, faces and texture coordinates, as from _tears.
     """
     rows: list[Row] = []
-    # How far from the corner in columns, how far in on the rim, how high the mound is.
     for aside, at, high in _MOUND:
         upper, lower = (_rim(rings, at, column) for column in (aside, (COLUMNS - aside) % COLUMNS))
-        if aside == 0:  # mix in the neighbours, so that no two vertices coincide
+        if aside == 0:  # mixes in the neighbours, so that no two vertices coincide
             upper = _mixed((1 - _APART, upper), (_APART, _rim(rings, at, 1)))
             lower = _mixed((1 - _APART, lower), (_APART, _rim(rings, at, COLUMNS - 1)))
         skin = _mixed((0.5, _rim(rings, 0.0, aside)), (0.5, _rim(rings, 0.0, -aside % COLUMNS)))
@@ -177,7 +176,7 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _strip(rows: list[Row], across: int) -> tuple[list[Row], list[list[int]], Floats]:
-    """Quads between rows of `across` vertices each, seen from the front."""
+    """Adds quads between rows of `across` vertices each, counter-clockwise from the front."""
     length = len(rows) // across
     faces = []
     for k in range(length - 1):

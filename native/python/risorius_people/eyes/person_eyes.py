@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The eyes of a person: place of the balls, rest pose of the lids, and their expressions."""
+"""The eyes of a person: positions of the balls, rest pose of the lids, and their expressions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from . import eyeball, lids
 from .lids import Lids
 from .rings import ROOT, find_rings
 
-# by age: height of the upper lids above the eye's middle, in radii of the iris.
+# By age in years: height of the upper lids above the eye's middle, in radii of the iris.
 _AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)
 _SIDES = (("l", "L"), ("r", "R"))
 _LASH_RINGS = slice(ROOT - 1, ROOT + 1)
@@ -22,22 +22,22 @@ Correctives = dict[tuple[str, str], Floats]
 
 
 class Eyes:
-    """The eyes of a person.
+    """The eyes of a person: their balls, lids and expressions.
 
     Attributes:
-        lids: the lids of each eye, by "l" and "r".
+        lids: "l" or "r" -> the lids of this eye.
     """
 
     def __init__(
         self, base: BaseMesh, groups: dict[str, Ints], positions: Floats, age: float
     ) -> None:
-        """Put eyeballs into a face; the lids stay as in the data.
+        """Places eyeballs in a face; the lids stay as in the data.
 
         Args:
             base: the base mesh.
-            groups: vertex indices by group of the base mesh.
-            positions: float64[V, 3], decimetres; the vertices of the eyes are changed in place.
-            age: years.
+            groups: name of a group of the base mesh -> vertex indices.
+            positions: float64[V, 3] in decimetres; the vertices of the eyes are changed.
+            age: age of the person in years.
         """
         self._groups = groups
         self.lids: dict[str, Lids] = {}
@@ -50,15 +50,15 @@ class Eyes:
             openness = float(np.interp(age, _AGES, _OPEN))
             raw = positions.copy()
             self.lids[side] = Lids(side, rings[side], openness, middle, radius, raw, raw.copy())
-        for eye in self.lids.values():  # set again after both eyes are placed
+        for eye in self.lids.values():  # repeated, because now both eyes are placed
             eye.raw, eye.rest = positions.copy(), positions.copy()
 
     def open(self, positions: Floats, widen: Mapping[str, Floats]) -> None:
-        """Open the lids.
+        """Opens the lids to their rest pose.
 
         Args:
-            positions: float64[V, 3] of the person, decimetres; changed in place.
-            widen: float64[V, 3] by "L" and "R": displacement of the data that widens the eye.
+            positions: float64[V, 3] of the person in decimetres; changed.
+            widen: "L" or "R" -> float64[V, 3], the data's displacement that widens this eye.
         """
         for side, letter in _SIDES:
             eye = self.lids[side]
@@ -69,13 +69,12 @@ class Eyes:
             eye.rest = positions.copy()
 
     def _with_lashes(self, eye: Lids, way: Floats, before: Floats) -> Floats:
-        """A displacement whose lashes follow the skin at their roots.
+        """The displacement `way`, with lashes that follow the skin at their roots.
 
         Args:
-            eye: the eye of the lashes.
-            way: float64[V, 3]; the displacement of the lashes is changed in place.
-            before: float64[V, 3], the part of the skin's displacement that `way` already has for
-                the lashes.
+            eye: lids of the eye.
+            way: float64[V, 3], displacement; that of the lashes is changed.
+            before: float64[V, 3], the part of the skin's displacement that the lashes have already.
         """
         roots = eye.rings[_LASH_RINGS].ravel()
         for number in (1, 2):
@@ -86,14 +85,15 @@ class Eyes:
         return way
 
     def move(self, units: Units) -> Correctives:
-        """Replace the data's motions of eyes and lids by motions that fit these eyes.
+        """Replaces the data's motions of eyes and lids by motions that fit these eyes.
 
         Args:
-            units: float64[V, 3] by raw control; controls that move eyes or lids are changed.
+            units: raw control -> float64[V, 3]; controls that move eyes or lids are changed.
 
         Returns:
-            Correctives, float64[V, 3] by two raw controls. A pair of the same control fires with
-            its square, and the control alone must then do that much less: at 1 the sum is `units`.
+            Correctives: two raw controls -> float64[V, 3]. A pair of equal controls has the weight
+                of the square of the control. The control's own shape must then be smaller by this
+                corrective, so that their sum at 1 is its displacement in `units`.
         """
         correctives: Correctives = {}
         for side, letter in _SIDES:
@@ -117,14 +117,14 @@ class Eyes:
                 turn = turns.get(other)
                 more = lids.stays_on_the_ball(eye, units[one], units[other], turn)
                 correctives[(one, other)] = self._with_lashes(eye, more, still)
-            # With the control's own share the sum is 4 x (1 - x) * half: 0 open and closed, half
-            # in between.
+            # If the control's own shape is closed + 4 * half, the sum adds 4 x (1 - x) * half: 0
+            # for open and closed lids, and half in between.
             correctives[(blink, blink)] = -4 * half
             units[blink] = closed
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:
-        """Rotate the eyes about their middle; the lids follow further than in the data."""
+        """Turns the eyes about their middle; the lids follow further than in the data."""
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
         for way in lids.LOOKS:

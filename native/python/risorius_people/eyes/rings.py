@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The lids of the base mesh as a grid: rings of skin around each eye, from cheek to socket."""
+"""Finds the lids of the base mesh as a grid: rings of skin around each eye."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ import numpy as np
 from ..polygons import Floats, Ints, edges_of
 from ..source import BaseMesh
 
-OUTER, INNER = 8, 4  # rings outside and inside the ring of the lashes' roots
+OUTER, INNER = 8, 4  # number of rings outside and inside the ring of the lashes' roots
 ROOT = OUTER  # row of the lashes' roots; row ROOT + 3 is the inner rim, inside the ball
 COLUMNS = 28
-UPPER, TEMPLE, LOWER = slice(1, 14), 14, slice(15, 28)  # column 0 is the corner at the nose
+# columns of the lids and of the outer corner; column 0 is the corner at the nose
+UPPER, TEMPLE, LOWER = slice(1, 14), 14, slice(15, 28)
 Faces = list[list[int]]
 Edges = dict[tuple[int, int], list[int]]
 
 
 def find_rings(base: BaseMesh, groups: dict[str, Ints]) -> dict[str, Ints]:
-    """Vertices of the rings by side ("l" and "r"), int64[OUTER + 1 + INNER, COLUMNS].
+    """ "l" or "r" -> int64[OUTER + 1 + INNER, COLUMNS], vertices of the rings of this eye.
 
     Column 0 is the inner corner; then follow the upper lid, the outer corner and the lower lid.
 
     Args:
         base: the base mesh; its faces are quads in regular rings around each eye.
-        groups: vertex indices by group.
+        groups: name of a group of the base mesh -> vertex indices.
     """
     faces = [[c[0] for c in face] for face in base.faces["body"]]
     edges = edges_of(faces)
@@ -45,7 +46,7 @@ def _rings(
     first: list[int],
 ) -> Ints:
     ahead = [_beside(first, faces, edges, way) for way in (0, 1)]
-    # The inner ring is nearer to the eye's middle.
+    # The next ring inwards is nearer to the middle of the eye.
     middle = base.positions[groups[f"helper-{side}-eye"]].mean(axis=0)
     ahead.sort(key=lambda ring: np.linalg.norm(base.positions[ring] - middle, axis=1).mean())
     inside, outside = [first, ahead[0]], [first, ahead[1]]
@@ -63,7 +64,7 @@ def _rings(
 
 
 def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
-    """The skin vertex nearest to an upper lash."""
+    """Index of the skin vertex nearest to an upper lash."""
     body = groups["body"]
     lashes = base.positions[groups[f"helper-{side}-eyelashes-2"]]
     middle = lashes[np.abs(lashes[:, 0] - lashes[:, 0].mean()).argsort()[:12]]
@@ -72,13 +73,13 @@ def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
 
 
 def _lash_ring(faces: Faces, edges: Edges, beside: dict[int, list[int]], root: int) -> list[int]:
-    """The closed loop of edges through a skin vertex.
+    """The closed loop of edges through a skin vertex, as vertices in order.
 
     Args:
-        faces: quads.
-        edges: the faces of each edge.
-        beside: the neighbours of each vertex along edges.
-        root: the vertex.
+        faces: vertex indices of each face; all faces are quads.
+        edges: edge -> numbers of its faces.
+        beside: vertex -> its neighbours along edges.
+        root: index of the vertex.
     """
     for start in beside[root]:
         ring = [root, start]
@@ -95,13 +96,13 @@ def _lash_ring(faces: Faces, edges: Edges, beside: dict[int, list[int]], root: i
 
 
 def _beside(ring: list[int], faces: Faces, edges: Edges, way: int) -> list[int]:
-    """The ring next to a ring, its vertices in the same order.
+    """The ring next to a ring, with corresponding vertices in the same order.
 
     Args:
         ring: vertices of a closed loop of edges.
-        faces: quads.
-        edges: the faces of each edge.
-        way: the side: 0 or 1.
+        faces: vertex indices of each face; all faces are quads.
+        edges: edge -> numbers of its faces.
+        way: side of the ring, 0 or 1.
     """
     out = []
     face = edges[(min(ring[:2]), max(ring[:2]))][way]
@@ -116,12 +117,12 @@ def _beside(ring: list[int], faces: Faces, edges: Edges, way: int) -> list[int]:
 
 
 def smoothed(grid: Floats) -> Floats:
-    """The rings' vertices after one Catmull-Clark step, float64[rings, columns, k].
+    """float64[rings, columns, k]: the rings' vertices after one Catmull-Clark step.
 
-    The first and the last ring stay as they are.
+    The first and the last ring stay unchanged.
 
     Args:
-        grid: float64[rings, columns, k].
+        grid: float64[rings, columns, k], values before the step.
     """
     beside = np.roll(grid, 1, axis=1) + np.roll(grid, -1, axis=1)
     out = grid.copy()

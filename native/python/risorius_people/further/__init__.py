@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls beyond the 52 ARKit units, from the data's shapes or from code."""
+"""Makes expressions beyond the 52 ARKit units, from the data's shapes or by code."""
 
 from .places import find_places
 from .recipes import CONTROLS_OF_CODE, further_units, unit_shape

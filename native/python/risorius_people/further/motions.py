@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Motions made by code: lids, lashes, pupils, neck, teeth and tongue.
+"""Displacements made by code: lids, lashes, pupils, neck, teeth and tongue.
 
-Each motion takes the places of a face and `by` from its row in further.toml; it returns float64[V,
-3].
+Each function in MOTIONS gets the places of a face and the value `by` of its row in further.toml; it
+returns float64[V, 3].
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from ..polygons import Floats
 from .places import MM, Places, bell, nearest
 
 Motion = Callable[[Places, object], Floats]
-_PUPIL, _IRIS = 9.5, 25.0  # degrees from the gaze on the painted texture
-_TIP = 0.68  # share of the tongue's length where its tip begins
+_PUPIL, _IRIS = 9.5, 25.0  # degrees from the gaze of the painted pupil's and iris' rim
+_TIP = 0.68  # fraction of the tongue's length at which its tip begins
 
 
 def _turned(points: Floats, pivot: Floats, degrees: Floats) -> Floats:
-    """Displacement of points that rotate about a pivot, each by a rotation vector (Rodrigues).
+    """float64[n, 3]: displacement of points that rotate about a pivot (Rodrigues' formula).
 
     Args:
-        points: float64[n, 3].
-        pivot: float64[3] or [n, 3].
-        degrees: float64[n, 3].
+        points: float64[n, 3], the points.
+        pivot: float64[3] or float64[n, 3], the pivot.
+        degrees: float64[n, 3], rotation vector of each point in degrees.
     """
     angle = np.radians(np.linalg.norm(degrees, axis=1))[:, None]
     axis = np.radians(degrees) / np.maximum(angle, 1e-12)
@@ -45,14 +45,14 @@ def _number(by: object) -> float:
 
 
 def _lid_turn(places: Places, by: object) -> Floats:
-    """About the middle of the eye, so that a lid slides on the ball; 1: up, -1: down."""
+    """A rotation about the middle of the eye, so that a lid slides on the ball; 1: up, -1: down."""
     arm = places.positions - places.eye_of()
     way = np.cross(np.array([-1.0, 0, 0]), arm)
     return np.asarray(way * _number(by))
 
 
 def _lid_press(places: Places, _: object) -> Floats:
-    """Press both lids together, towards the nose and outwards, as tightly closed eyes do."""
+    """Presses both lids together, towards the nose and outwards, as tightly shut eyes do."""
     upper, lower = places.lids["U"][:, None], places.lids["D"][:, None]
     turn = _lid_turn(places, 1) / 0.15
     inwards = np.zeros_like(turn)
@@ -64,7 +64,7 @@ def _lid_press(places: Places, _: object) -> Floats:
 
 
 def _lashes_up(places: Places, by: object) -> Floats:
-    """Turn upper lashes up about their roots; -1: the nose half, 1: the temple half."""
+    """Turns upper lashes up about their roots; -1: the half at the nose, 1: at the temple."""
     positions, groups = places.positions, places.groups
     out = np.zeros_like(positions)
     for letter in "lr":
@@ -78,12 +78,12 @@ def _lashes_up(places: Places, by: object) -> Floats:
 
 
 def _lashes_down(places: Places, by: object) -> Floats:
-    """Turn upper lashes down about their roots; -1: the nose half, 1: the temple half."""
+    """Turns upper lashes down about their roots; -1: the half at the nose, 1: at the temple."""
     return -_lashes_up(places, by) * np.array([1.0, 1.0, -1.0])
 
 
 def _pupil(places: Places, by: object) -> Floats:
-    """Move the rim of the pupil along the ball; 1: wider, -1: narrower. The iris' rim stays."""
+    """Moves the rim of the pupil along the ball; 1: wider, -1: narrower. The iris' rim stays."""
     out = np.zeros_like(places.positions)
     for side, middle in places.eyes.items():
         eye = places.groups[f"helper-{side.lower()}-eye"]
@@ -101,7 +101,7 @@ def _pupil(places: Places, by: object) -> Floats:
 
 
 def _mastoid(places: Places, _: object) -> Floats:
-    """Swell the muscle from behind the ear to the breastbone."""
+    """Makes the muscle from behind the ear to the breastbone swell."""
     top, bottom = np.array([0.6, 15.55, 0.35]), np.array([0.1, 14.35, 0.72])
     points = places.positions * [1, 1, 1]
     points[:, 0] = np.abs(points[:, 0])
@@ -121,7 +121,7 @@ def _teeth(group: str) -> Motion:
 
 
 def _on_tongue(places: Places) -> tuple[Floats, Floats, Floats]:
-    """Vertices of the tongue, their positions, and their place from root (0) to tip (1)."""
+    """Indices of the tongue's vertices, their positions, and their place from root 0 to tip 1."""
     tongue = places.groups["helper-tongue"]
     points = places.positions[tongue]
     low, high = points[:, 2].min(), points[:, 2].max()
@@ -135,13 +135,13 @@ def _of_tongue(places: Places, way: Floats) -> Floats:
 
 
 def _root(points: Floats, share: Floats, begin: float) -> Floats:
-    """The middle of the tongue at a share of its length: the pivot of everything beyond it."""
+    """The middle of the tongue at a fraction of its length, the pivot of all vertices beyond it."""
     near = np.argsort(np.abs(share - begin))[:24]
     return np.asarray(points[near].mean(axis=0) * [0, 1, 1])
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Shift the tongue along `by`; the tip moves most."""
+    """Shifts the tongue by the vector `by`; the tip moves most."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 
@@ -150,7 +150,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
     def move(places: Places, by: object) -> Floats:
         _, points, share = _on_tongue(places)
         beyond = np.clip((share - begin) / (1 - begin), 0, 1) ** power
-        # Up is a negative rotation about the character's left.
+        # a positive rotation about the axis to the character's left would be down
         degrees = beyond[:, None] * _vector(by) * [-1, 1, 1]
         return _of_tongue(places, _turned(points, _root(points, share, begin), degrees))
 
@@ -158,7 +158,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
 
 
 def _tongue_scale(places: Places, by: object) -> Floats:
-    """Scale the tongue's width and height; the root stays."""
+    """Scales the tongue's width and height; its root stays."""
     _, points, share = _on_tongue(places)
     middle = np.zeros_like(points)
     for at in np.unique(share.round(2)):
@@ -169,7 +169,7 @@ def _tongue_scale(places: Places, by: object) -> Floats:
 
 
 def _tongue_roll(places: Places, _: object) -> Floats:
-    """Raise the sides."""
+    """Raises the sides of the tongue."""
     _, points, share = _on_tongue(places)
     aside = np.abs(points[:, 0]) / np.abs(points[:, 0]).max()
     way = np.column_stack([-0.35 * np.sign(points[:, 0]) * aside, aside**2, 0 * aside])
@@ -177,7 +177,7 @@ def _tongue_roll(places: Places, _: object) -> Floats:
 
 
 def _tongue_press(places: Places, _: object) -> Floats:
-    """Press the middle against the palate; it spreads, and the tip stays."""
+    """Presses the middle of the tongue against the palate; it widens, and the tip stays."""
     _, points, share = _on_tongue(places)
     bump = np.exp(-(((share - 0.55) / 0.25) ** 2))
     way = np.column_stack(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weights of the base mesh's vertices for lips, lids and brows."""
+"""Finds lips, lids and brows, as weights of the base mesh's vertices."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 from ..source import BaseMesh
 
-MM = 0.01  # the data are in decimetres
-_TOUCHING = 0.03  # largest distance of a lip vertex from the other lip
-_PARTED = 0.04  # smallest distance that the opening jaw adds
-_BETWEEN = 0.03  # width of the blend between the lips at the corners
-_LID = 0.035  # how far a lid's skin extends from the roots of its lashes
-_CHUNK = 256
+MM = 0.01  # decimetres per millimetre
+_TOUCHING = 0.03  # decimetres: largest distance of a lip vertex from the other lip
+_PARTED = 0.04  # decimetres: smallest distance that the opening jaw adds
+_BETWEEN = 0.03  # decimetres: width of the blend between the lips at the corners
+_LID = 0.035  # decimetres: reach of a lid's skin from the roots of its lashes
+_CHUNK = 256  # points whose distances are computed together
 
 
 def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
-    """The index of the nearest other point for each point, and its distance.
+    """Index of the nearest other point for each point, and its distance.
 
     Args:
         points: float64[n, 3].
@@ -41,7 +41,7 @@ def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
 
 
 def bell(distance: Floats) -> Floats:
-    """A bell curve with value 1 at 0, float64[n].
+    """float64[n]: a bell curve with value 1 at distance 0.
 
     Args:
         distance: float64[n], in standard deviations.
@@ -51,19 +51,21 @@ def bell(distance: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Places:
-    """Places for the further controls. Arrays are by vertex of the base mesh, in decimetres.
+    """Regions and measures of a face for the further controls.
+
+    Arrays have a row per vertex of the base mesh; lengths are in decimetres.
 
     Attributes:
-        positions: float64[V, 3] of the man; his left is +x and he looks along +z.
-        normals: float64[V, 3].
-        groups: vertex indices by group of the base mesh.
-        skin: float64[V], 1 on the body.
-        lips: float64[V] by "U" and "D", weight of the lip.
+        positions: float64[V, 3] of the man, whose left is +x and who looks along +z.
+        normals: float64[V, 3], unit normals.
+        groups: name of a group of the base mesh -> vertex indices.
+        skin: float64[V], 1 for vertices of the body's skin, else 0.
+        lips: "U" or "D" -> float64[V], weight of the upper or lower lip.
         along: float64[V], 0 in the middle of the lips, 1 and -1 at their corners.
-        lip_distance: float64[V], distance from the line where the lips touch.
-        lids: float64[V] by "U" and "D", weight of the lids of both eyes, lashes included.
+        lip_distance: float64[V], distance from the line along which the lips touch.
+        lids: "U" or "D" -> float64[V], weight of the upper or lower lids of both eyes, with lashes.
         brows: float64[V], weight of both brows.
-        eyes: float64[3] by "L" and "R", the middle of each eye.
+        eyes: "L" or "R" -> float64[3], middle of this eye.
     """
 
     positions: Floats
@@ -78,7 +80,7 @@ class Places:
     eyes: dict[str, Floats]
 
     def eye_of(self) -> Floats:
-        """The middle of the eye on the side of each vertex, float64[V, 3]."""
+        """float64[V, 3]: the middle of the eye on each vertex's side of the face."""
         left = self.positions[:, :1] > 0
         return np.where(left, self.eyes["L"], self.eyes["R"])
 
@@ -90,14 +92,14 @@ def find_places(
     jaw_open: Floats,
     brow_shapes: Floats,
 ) -> Places:
-    """All places of a face.
+    """Finds the regions of a face.
 
     Args:
-        base: has the polygons.
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-        jaw_open: float64[V, 3], displacement of the opening jaw; it separates the lips.
-        brow_shapes: float64[V, 3], sum of the displacements of brows that go up and down.
+        base: the base mesh with the polygons.
+        positions: float64[V, 3], in decimetres.
+        groups: name of a group of the base mesh -> vertex indices.
+        jaw_open: float64[V, 3], displacement of the opening jaw, which distinguishes the lips.
+        brow_shapes: float64[V, 3], sum of the sizes of displacements of brows up and down.
     """
     count = len(positions)
     faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
@@ -107,7 +109,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # A parabola of height over width: the lips touch over some millimetres, not along a line.
+    # A parabola, because the lips touch over some millimetres, not along a line.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)
@@ -127,12 +129,12 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Lip vertices close to the other lip, without a common face, that the opening jaw parts.
+    """Vertices of lips that are near the other lip, share no face with it, and that the jaw parts.
 
     Args:
-        positions: float64[V, 3], decimetres.
-        faces: vertices by face.
-        body: vertices of the skin.
+        positions: float64[V, 3], in decimetres.
+        faces: vertex indices of each face.
+        body: indices of the skin's vertices.
         jaw_open: float64[V, 3], displacement of the opening jaw.
     """
     front = body[(np.abs(positions[body, 0]) < 0.4) & (positions[body, 2] > 1.2)]
@@ -150,12 +152,12 @@ def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: F
 
 
 def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
-    """Weight of a lid of both eyes, float64[V]; lashes get the weight of the skin below.
+    """float64[V]: weight of a lid of both eyes; lashes get the weight of the skin below.
 
     Args:
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-        number: number of its lash group.
+        positions: float64[V, 3], in decimetres.
+        groups: name of a group of the base mesh -> vertex indices.
+        number: number of its lash group: 1 for the lower lid, 2 for the upper one.
     """
     out = np.zeros(len(positions))
     body = groups["body"]
@@ -165,7 +167,7 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         roots = positions[lashes[height < np.quantile(height, 0.35)]]
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
-        # At the corners the other lid is as near: keep only the skin on this side of the roots.
+        # At the corners the other lid is as near, so only skin on this side of the roots counts.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rows of further.toml as displacements of all vertices."""
+"""Converts the rows of further.toml to displacements of all vertices."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OF_DATA = {"data", "units", "size", "with"}
 
 
 def names_of(row: str) -> list[str]:
-    """The raw controls of a row: its name, or one name per side."""
+    """The raw controls of a row: its name, or one name for each side if it contains {s}."""
     return [row.replace(_SIDE, side) for side in "LR"] if _SIDE in row else [row]
 
 
@@ -32,13 +32,14 @@ CONTROLS_OF_CODE = [
 
 
 def unit_shape(source: Source, origin: Mapping[str, float], name: str, count: int) -> Floats:
-    """Displacement [V, 3] of a FACS-like unit, mixed from the data's origins, decimetres.
+    """float64[V, 3]: displacement of a FACS-like unit, mixed from the data's origins, in
+    decimetres.
 
     Args:
         source: the data with the unit.
-        origin: share of each origin of the data, with sum 1.
+        origin: origin of the data -> its share in the person; the sum is 1.
         name: name of the unit.
-        count: V.
+        count: number of vertices V.
     """
     folder = f"{TARGETS}expression/units"
     parts = (
@@ -55,14 +56,15 @@ def further_units(
     units: Mapping[str, Floats],
     sides: Mapping[str, Floats],
 ) -> tuple[dict[str, Floats], dict[tuple[str, str], Floats]]:
-    """Displacements float64[V, 3] by raw control, and correctives by two raw controls, decimetres.
+    """Raw control -> float64[V, 3], and two raw controls -> float64[V, 3] of a corrective, in
+    decimetres.
 
     Args:
         source: the data with the shapes.
-        origin: share of each origin of the data, with sum 1.
-        places: the places of the face.
-        units: float64[V, 3] of the existing raw controls.
-        sides: float64[V] by "L" and "R", with sum 1.
+        origin: origin of the data -> its share in the person; the sum is 1.
+        places: regions of the face.
+        units: raw control -> float64[V, 3], of the controls that exist already.
+        sides: "L" or "R" -> float64[V], weight of the side; the sum is 1.
     """
     out, correctives = {}, {}
     for row, keys in _ROWS.items():
@@ -81,7 +83,7 @@ def further_units(
 
 
 def _side(row: str, name: str) -> str:
-    """ "L" or "R": which of the row's two raw controls a name is."""
+    """ "L" or "R": the side of a raw control that the row makes."""
     return name[row.index(_SIDE)]
 
 
@@ -92,7 +94,7 @@ def _ways(
     units: Mapping[str, Floats],
     keys: Mapping[str, Any],
 ) -> Floats:
-    """Displacement of a row before its weights, float64[V, 3]."""
+    """float64[V, 3]: displacement of a row before it is multiplied by its weights."""
     count = len(places.positions)
     out = np.zeros((count, 3))
     for name, weight in keys.get("data", {}).items():
@@ -117,7 +119,7 @@ def _ways(
 
 
 def _weight(places: Places, keys: Mapping[str, Any]) -> Floats:
-    """Weights of a row's motion, float64[V]."""
+    """float64[V]: weights of a row's displacement."""
     out = np.ones(len(places.positions))
     if "lip" in keys:
         out *= places.lips[keys["lip"]]

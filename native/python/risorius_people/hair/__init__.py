@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Guides that grow from the skin, cards along them, and the binding of cards to a face."""
+"""Grows hair as guides from the skin, lays cards along them, and binds the cards to a face."""
 
 from .making import Grown, add_hair, grow_hair, hair_metadata, hair_picture
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Cards as meshes of a Dna: each vertex gets the weights and shapes of the skin below it.
+"""Makes hair cards meshes of a Dna: each vertex gets the weights and shapes of the skin below it.
 
-Cards are bound to the finished face. So the hair moves with the skin of any rig, and the fit has no
-hair to handle.
+Cards are bound to the finished face, so the hair moves with the skin of any rig, and the fits of
+the rig need not handle hair.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from .strips import Strips, card_faces, card_vertices
 from .strips import unit as unit_vectors
 from .surface import Roots, about, nearest_places, nearest_rows
 
-_LEAST_WEIGHT = 0.01
-ARM = 0.8  # centimetres of a hair that turn with the skin; the rest hangs
-_MOST_INFLUENCES = 8
+_LEAST_WEIGHT = 0.01  # smaller skin weights are dropped
+ARM = 0.8  # centimetres: a hair turns with the skin as if it were at most this long
+_MOST_INFLUENCES = 8  # joints per vertex
+# Controls that move touching lips and lids apart.
 _PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
 
 def head_of(dna: Dna, lod: int) -> Mesh | None:
-    """The head mesh of a LOD, or None.
+    """The head mesh of a LOD, or None if the LOD has none.
 
     Args:
         dna: a sample face.
-        lod: the LOD.
+        lod: number of the LOD.
     """
     for m in (int(i) for i in dna.lod_mesh_mapping[lod]):
         if re.match(r"head_lod\d+_mesh$", dna.mesh_names[m]):
@@ -39,7 +40,7 @@ def head_of(dna: Dna, lod: int) -> Mesh | None:
 
 
 def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
-    """Triangles by vertex, int64[T, 3], and the triangles about each vertex, int64[V, n]."""
+    """int64[T, 3], vertices of triangles; int64[V, n], numbers of the triangles at each vertex."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     sizes = np.diff(offsets)
@@ -52,14 +53,14 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
 
 
 def whereabouts(dna: Dna, head: Mesh) -> Floats:
-    """Positions at rest, with an open jaw and with either eye closed, float64[V, 12].
+    """float64[V, 12]: positions at rest, with an open jaw, and with either eye closed.
 
-    Lips and lids touch at rest; in these poses they are far apart, so nearest points stay on one
-    side.
+    Lips and lids touch at rest; in these poses they are far apart, so that the nearest points of
+    two heads are on the same lip or lid.
 
     Args:
-        dna: has the controls.
-        head: a mesh of the head.
+        dna: face with the controls.
+        head: a head mesh of any LOD.
     """
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]
@@ -74,14 +75,14 @@ def whereabouts(dna: Dna, head: Mesh) -> Floats:
 
 
 def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Floats) -> Roots:
-    """The place on the skin that each vertex of the cards follows.
+    """The places on the skin that the vertices of the cards follow.
 
     Args:
-        head: the head.
-        strips: the cards.
-        unit: unit of the mesh, in units of the cards.
-        own: float64[n, 12], whereabouts of the roots; None: the cards are rooted on this head.
-        there: float64[V, 12], whereabouts of the head's vertices.
+        head: the head mesh of the LOD.
+        strips: the hair of the LOD.
+        unit: length of the strips' unit in the unit of the mesh.
+        own: float64[n, 12], `whereabouts` at the roots on the head of LOD 0; None: on this head.
+        there: float64[V, 12], `whereabouts` of the head's vertices.
     """
     positions = np.asarray(head.positions, np.float64) / unit
     triangles, around = corners_of(head)
@@ -106,8 +107,8 @@ def card_mesh(strips: Strips, unit: float) -> Mesh:
     """The cards as a mesh without skin weights and blend shapes.
 
     Args:
-        strips: the cards, decimetres.
-        unit: unit of the mesh, in units of the cards.
+        strips: the hair, in decimetres.
+        unit: length of the strips' unit in the unit of the mesh.
     """
     positions, normals = card_vertices(strips)
     faces, uvs = card_faces(strips)
@@ -115,11 +116,11 @@ def card_mesh(strips: Strips, unit: float) -> Mesh:
 
 
 class Turning:
-    """Turns the cards where a blend shape tilts the skin.
+    """Rotates cards where a blend shape tilts the skin.
 
-    A joint turns the cards itself. A blend shape only shifts their roots: without this turn a beard
-    on a lip that rolls in would stand in the skin beside it. The arguments of the constructor are
-    as in bind.
+    A joint rotates the cards by itself, but a blend shape only shifts their roots: without this
+    rotation the beard on a lip that rolls in would be inside the skin. See bind for the arguments
+    of the constructor.
     """
 
     def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
@@ -138,30 +139,31 @@ class Turning:
         self._normals = self._normals_at(self._skin)
 
     def _normals_at(self, skin: Floats) -> Floats:
-        """Unit normals of the skin at the places, float64[n, 3]."""
+        """float64[n, 3]: unit normals of the skin at the cards' places."""
         a, b, c = (skin[self._triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]
         return unit_vectors(self._places.of(unit_vectors(np.stack(sums, axis=1)[:-1])))
 
     def of(self, delta: Floats) -> Floats:
-        """Displacement of the cards by their turn, beyond the shift of their places, float64[n, 3].
+        """float64[n, 3]: displacement of the cards by their rotation, besides the shift of their
+        places.
 
         Args:
-            delta: float64[V, 3], the shape's deltas of the skin.
+            delta: float64[V, 3], the shape's displacement of the skin.
         """
         return turned(self._off, self._normals, self._normals_at(self._skin + delta))
 
 
 def turned(off: Floats, was: Floats, now: Floats) -> Floats:
-    """Displacement of ends that turn with a normal, float64[..., 3].
+    """float64[..., 3]: displacement of ends that rotate with a normal.
 
     Args:
-        off: float64[..., 3], from the foot of the normal to each end.
-        was, now: float64[..., 3], the unit normals before and after.
+        off: float64[..., 3], vector from the foot of the normal to each end.
+        was, now: float64[..., 3], unit normals before and after the rotation.
     """
     axis = np.cross(was, now)
-    # At 180 degrees the axis is undefined.
+    # limits the angle to 120 degrees, because at 180 degrees the axis is undefined
     cosine = (was * now).sum(axis=-1, keepdims=True).clip(-0.5)
     across = np.cross(axis, off)
     return np.asarray(across + np.cross(axis, across) / (1 + cosine))
@@ -176,16 +178,16 @@ def bind(
     rigid: bool,
     turns_itself: bool = False,
 ) -> None:
-    """Give cards the skin weights and blend shapes of their places on the skin.
+    """Gives cards the skin weights and blend shapes of their places on the skin.
 
     Args:
-        dna: has the joints.
-        mesh: the cards; is changed.
-        head: the skin.
-        places: the place on the skin of each vertex of the cards.
-        least: a shape that moves no vertex further than this is left out, in the unit of the mesh.
-        rigid: places that move less than `least` follow the head joint alone.
-        turns_itself: leave out the turn of the shapes; the caller adds its own.
+        dna: face with the joints.
+        mesh: the cards; changed.
+        head: the mesh of the skin.
+        places: place on the skin for each vertex of the cards.
+        least: length in the unit of the mesh; a shape that moves no vertex further is left out.
+        rigid: whether places that move less than `least` follow the head joint alone.
+        turns_itself: whether to leave out the rotation by shapes, because the caller adds its own.
     """
     weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
     if rigid:
@@ -222,8 +224,7 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """Places that no control moves further than `least`, and that no neck joint carries,
-    bool[n]."""
+    """bool[n]: places that no control moves further than `least`, and that no neck joint moves."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]
@@ -242,7 +243,7 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
 
 
 def _apart_from_head(dna: Dna) -> list[int]:
-    """The joints outside the subtree of the head joint."""
+    """Indices of the joints that are not the head joint or below it."""
     head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
     on_head = np.arange(len(parents)) == head
     for _ in range(len(parents)):
@@ -251,13 +252,13 @@ def _apart_from_head(dna: Dna) -> list[int]:
 
 
 def append_mesh(dna: Dna, name: str, mesh: Mesh, lods: list[int]) -> None:
-    """Append a mesh to a Dna.
+    """Appends a mesh to a Dna, with its LODs and blend shape channels.
 
     Args:
-        dna: is changed.
+        dna: the face; changed.
         name: name of the mesh.
         mesh: the finished mesh.
-        lods: the LODs that show it.
+        lods: numbers of the LODs that show the mesh.
     """
     number = len(dna.mesh_names)
     dna.mesh_names = [*dna.mesh_names, name]

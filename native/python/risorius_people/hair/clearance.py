@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Cut or drop hairs that expressions would bring into the skin.
+"""Cuts or drops hairs that expressions would bring into the skin.
 
-Long hair under the chin comes into the throat of a wide open mouth. Hair at the rim of a lip comes
-into the lip that rolls in. The finished face is posed to find these hairs.
+Long hair under the chin would enter the throat if the mouth opens wide. Hair at the rim of a lip
+would enter the lip if it rolls in. The finished face is posed to find such hairs.
 """
 
 from __future__ import annotations
@@ -24,28 +24,30 @@ from .strips import ROOT_DEEP, Strips
 from .strips import unit as unit_vectors
 from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
-_NEAR = 0.3  # decimetres: skin further than this from every hair is left out
-_SOME = 256  # number of hair points that decide which skin is near
-_LOW = 0.002  # decimetres: height that an end must keep, unless it was lower at rest
-_DEEPER = 0.002  # decimetres: a root lies in the skin and may sink this much deeper than at rest
-_STILL = 0.002  # decimetres: a control that moves the skin less cannot reach a hair
-_STIRRED = 0.0005  # a control that moves the skin under a hair less leaves this hair alone
-_SUNK = 0.0015  # decimetres of the rough height: a hair that sinks less needs no exact test
-_ROUGHLY = 4  # the rough test uses one in this many vertices
-_SHORTER = 0.75
-_CUTS = 5  # cuts before a hair is dropped
-_EDGE_DEEP = 0.004  # decimetres: depth of a card's edge beyond its root
-_AHEAD = 8  # poses that the thread computes in advance
+_NEAR = 0.3  # decimetres: skin further than this from every hair is ignored
+_SOME = 256  # number of hair points that determine which skin is near
+_LOW = 0.002  # decimetres: height above the skin that an end must keep, unless it is lower at rest
+_DEEPER = 0.002  # decimetres by which a root, which is in the skin, may sink deeper than at rest
+# decimetres: a control that moves all skin by less cannot bring a hair into the skin
+_STILL = 0.002
+# decimetres: a control that moves the skin under a hair by less does not affect this hair
+_STIRRED = 0.0005
+_SUNK = 0.0015  # decimetres: hairs that sink by less in the rough test are not tested exactly
+_ROUGHLY = 4  # the rough test uses every fourth vertex
+_SHORTER = 0.75  # factor on the length of a hair that is cut
+_CUTS = 5  # number of cuts after which a hair is dropped
+_EDGE_DEEP = 0.004  # decimetres by which the edge of a card may be in the skin beyond its root
+_AHEAD = 8  # number of poses that the thread computes in advance
 S = TypeVar("S")
 T = TypeVar("T")
 
 
 def narrow_edges(strips: Strips, surface: Surface) -> None:
-    """Narrow the cards whose edges would lie deep in bent skin, as at the root or around an ear.
+    """Narrows cards whose edges would be deep in curved skin, such as at an ear.
 
     Args:
-        strips: are changed.
-        surface: the head that the cards grow on.
+        strips: hair; changed.
+        surface: the head on which the hair grows.
     """
     over = np.maximum(0, -_depths(strips.points, surface))
     most = np.where(np.arange(strips.rows) == 0, ROOT_DEEP, _EDGE_DEEP)
@@ -55,7 +57,7 @@ def narrow_edges(strips: Strips, surface: Surface) -> None:
 
 
 def _depths(points: Floats, surface: Surface) -> Floats:
-    """Depth of points below the nearest skin, float64[...]. Args: points  float64[..., 3]."""
+    """float64[...]: depth of points below the nearest skin. Args: points: float64[..., 3]."""
     flat = points.reshape(-1, 3)
     places = surface.nearest(flat)
     normals = unit_vectors(places.of(surface.normals))
@@ -66,15 +68,15 @@ def _depths(points: Floats, surface: Surface) -> Floats:
 def cut_clear(
     strips: Strips, dna: Dna, head: Mesh, unit: float, faces: Iterable[NDArray[np.float32]]
 ) -> Strips:
-    """Shorten or drop the strips that would go through the skin, and return the rest.
+    """Shortens or drops hairs that would go through the skin, and returns the others.
 
     Args:
-        strips: hair bound at its roots alone, decimetres; is changed.
+        strips: hair that follows the skin at its roots alone, in decimetres; changed.
         dna: the finished face.
         head: the head mesh of LOD 0.
-        unit: unit of the mesh, in decimetres.
-        faces: raw controls of each expression, float32[R]. Each control alone is tested too; as
-            there are many, a rough test comes first.
+        unit: length of a decimetre in the unit of the mesh.
+        faces: float32[R] each, raw controls of expressions. Each control alone is tested, too;
+            because there are many controls, a rough test precedes the exact one.
     """
     ground = _Ground(strips, dna, head, unit)
     count = len(dna.raw_control_names)
@@ -101,7 +103,7 @@ def cut_clear(
 
 
 def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
-    """Results for each row, computed by a thread in advance."""
+    """The results for all rows in order; a thread computes them in advance."""
     waiting: deque[Future[T]] = deque()
     with ThreadPoolExecutor(1) as pool:
         for row in rows:
@@ -113,7 +115,7 @@ def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
 
 
 class _Ground:
-    """The skin near some hairs, and the motion of both by the face. Args: the same as cut_clear."""
+    """The skin near the hairs, and its motion with the face. Args: as of cut_clear."""
 
     def __init__(self, strips: Strips, dna: Dna, head: Mesh, unit: float) -> None:
         self.unit, self._dna, self._rig = unit, dna, Rig(dna)
@@ -145,11 +147,11 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """The roots of strips on the vertices of this skin."""
+        """The roots of strips, as places on the vertices of this skin."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:
-        """Unit normals of the vertices, float64[m, 3]."""
+        """float64[m, 3]: unit normals of the vertices."""
         a, b, c = (skin[self.triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         rows = self.triangles.ravel()
@@ -157,7 +159,7 @@ class _Ground:
         return unit_vectors(np.stack(sums, axis=1))
 
     def posed(self, raw: NDArray[np.float32]) -> _Posed:
-        """The skin posed by raw controls."""
+        """The skin posed by raw controls float32[R]."""
         pose = self._rig.evaluate(raw)
         shaped, shares = self.rest.copy(), np.asarray(pose.blend_shapes).tolist()
         for channel, rows, deltas in self._shapes:
@@ -171,10 +173,10 @@ class _Ground:
 
 
 class _Posed:
-    """The skin in a pose.
+    """The skin near the hairs in one pose.
 
     Attributes:
-        skin: float64[m, 3], posed positions, decimetres.
+        skin: float64[m, 3], posed positions in decimetres.
     """
 
     def __init__(self, ground: _Ground, shaped: Floats, moves: Floats) -> None:
@@ -191,8 +193,7 @@ class _Posed:
         return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
-        """Left and right edges in the pose, float64[n, rows, 2, 3], moved as binding.py moves
-        cards."""
+        """float64[n, rows, 2, 3]: left and right edges in the pose, moved as in binding.py."""
         ground = self._ground
         roots = ground.roots(strips)
         was, now = (unit_vectors(roots.of(n)) for n in (ground.upright, self._turned))
@@ -208,8 +209,8 @@ class _Posed:
         )
 
     def rough(self, strips: Strips) -> Floats:
-        """Heights of the guides over the tangent planes of every fourth vertex, float64[n,
-        rows]."""
+        """float64[n, rows]: approximate heights of the guides above the skin, from the tangent
+        plane of the nearest among every fourth vertex."""
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
         near = _nearest(points, self.skin[some])
@@ -217,7 +218,7 @@ class _Posed:
         return np.asarray(height.reshape(strips.points.shape[:2]))
 
     def heights(self, strips: Strips) -> Floats:
-        """Heights of the left and the right edges over the skin, float64[n, rows, 2]."""
+        """float64[n, rows, 2]: heights of the left and the right edges above the skin."""
         edges = self._carried(strips)
         points, ground = edges.reshape(-1, 3), self._ground
         vertex = _nearest(points, self.skin)
@@ -228,7 +229,7 @@ class _Posed:
 
 
 class _Cutting:
-    """Strips that are being cut, and which of them stay."""
+    """Hairs that are cut, and `stays`, bool[n], which is False for dropped hairs."""
 
     def __init__(self, strips: Strips, still: _Posed) -> None:
         self._strips, self._still = strips, still
@@ -236,7 +237,7 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Shorten or drop the strips in `some` that come too near to the skin in a pose."""
+        """Shortens or drops the hairs `some` that come too near to the skin in a pose."""
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]
@@ -250,13 +251,13 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """Which hairs come too near to the skin, and nearer than at rest, bool[n]."""
+    """bool[n]: whether a hair comes too near to the skin, and nearer than at rest."""
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))
 
 
 def _nearest(points: Floats, others: Floats) -> Ints:
-    """The same as nearest_rows in half the time; float32 blurs distances below a micrometre."""
+    """Does the same as nearest_rows in half the time; float32 is exact to about a micrometre."""
     middle = others.mean(axis=0)
     return nearest_rows((points - middle).astype(np.float32), (others - middle).astype(np.float32))

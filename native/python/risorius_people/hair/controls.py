@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Blend shapes of lashes: their own controls, and the turn with the lid.
+"""Makes blend shapes of lashes: for the lashes' own controls, and for their rotation with the lid.
 
-A lid slides around the eye, but the joints that carry its skin turn less. The shapes add the
-missing turn, so lashes of a closed eye point down.
+A lid slides around the eye, but the joints of its skin rotate less. These shapes add the missing
+rotation, so that lashes of a closed eye point down.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# Control -> its half of the lid (-1 at the nose), and the shift of a hair's tip in hair lengths.
+# Control -> (-1: half of the lid at the nose, 1: at the temple; shift of the tip in hair lengths).
 _WAYS = {
     "eyelashesUpIN": (-1, (0.0, 1.0, -0.3)),
     "eyelashesUpOUT": (1, (0.0, 1.0, -0.3)),
     "eyelashesDownIN": (-1, (0.0, -1.0, -0.3)),
     "eyelashesDownOUT": (1, (0.0, -1.0, -0.3)),
 }
-_LEAST_TURN = 4.0  # degrees: the eye does not see less
-_LEAST_SHIFT = 1e-3  # centimetres
-_REACH = 0.8  # factor on the tip's shift
+_LEAST_TURN = 4.0  # degrees: smaller missing rotations are ignored
+_LEAST_SHIFT = 1e-3  # centimetres: smaller displacements are ignored
+_REACH = 0.8  # factor on the shift of a hair's tip
 
 
 def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Add the shapes of the lashes' own controls, if the LOD has their channels.
+    """Adds the shapes of the lashes' own controls, if the LOD has their channels.
 
     Args:
-        dna: has the channels.
-        mesh: the lashes' cards, bound to the skin; gets the shapes.
-        rows: rows of a card.
-        lod: the LOD of the mesh.
+        dna: face with the channels.
+        mesh: cards of the lashes, bound to the skin; changed.
+        rows: number of rows of a card.
+        lod: number of the mesh's LOD.
     """
     positions = np.asarray(mesh.positions, np.float64)
     middles = _middles(positions, rows)
@@ -51,19 +51,19 @@ def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
         x = np.abs(root[root[:, 0] * side > 0][:, 0])
         aside = (np.abs(root[:, 0]) - (x.min() + x.max()) / 2) / (np.ptp(x) / 2)
         share = smooth_step(0.5 + 0.5 * half * aside) * (root[:, 0] * side > 0)
-        share = share * (middles[:, -1, 1] > root[:, 1])  # upper lashes curl up
+        share = share * (middles[:, -1, 1] > root[:, 1])  # only upper lashes, which curl up
         more[channel] = (_REACH * share[:, None] * long)[..., None] * np.array(way)
     _add(mesh, {c: np.repeat(d.reshape(-1, 3), 2, axis=0) for c, d in more.items()})
 
 
 def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Add shapes that turn lashes about their roots as much as the lid goes around the eye.
+    """Adds shapes that rotate lashes about their roots by the angle of the lid around the eye.
 
     Args:
-        dna: has joints of both eyes.
-        mesh: the lashes' cards, bound to the skin; gets the shapes.
-        rows: rows of a card.
-        lod: the LOD of the mesh.
+        dna: face with joints of both eyes.
+        mesh: cards of the lashes, bound to the skin; changed.
+        rows: number of rows of a card.
+        lod: number of the mesh's LOD.
     """
     channels = _channels(dna, lod)
     positions = np.asarray(mesh.positions, np.float64)
@@ -97,12 +97,12 @@ def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
 
 
 def _middles(positions: Floats, rows: int) -> Floats:
-    """The middle line of each card, float64[n, rows, 3]."""
+    """float64[n, rows, 3]: the middle line of each card."""
     return np.asarray(positions.reshape(-1, rows, 2, 3).mean(axis=2))
 
 
 def _angle(ways: Floats) -> Floats:
-    """Elevation of each direction seen from the side, float64[n], radians."""
+    """float64[n]: elevation of each direction seen from the side, in radians."""
     return np.asarray(np.arctan2(ways[:, 1], ways[:, 2]))
 
 
@@ -111,14 +111,14 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _channels(dna: Dna, lod: int) -> dict[str, int]:
-    """The blend shape channels of a LOD, by name."""
+    """Name -> number of the blend shape channels of a LOD."""
     listed = {int(c) for c in dna.lod_blend_shape_mapping[lod]}
     names = enumerate(dna.blend_shape_channel_names)
     return {name: channel for channel, name in names if channel in listed}
 
 
 def _add(mesh: Mesh, more: dict[int, Floats]) -> None:
-    """Add deltas, float64[V, 3] by channel, to the shapes of a mesh."""
+    """Adds displacements, channel -> float64[V, 3], to the shapes of a mesh."""
     whole = {channel: delta.copy() for channel, delta in more.items()}
     kept = []
     for target in mesh.blend_shape_targets:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Directions and lengths of the hairs of brows, lashes and beard."""
+"""Makes the hairs of brows, lashes and beard."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from .strips import Strips, joined, make_strips, unit
 from .surface import Surface, joined_roots
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
-_BEARD_SPACING = 0.037
+_BEARD_SPACING = 0.037  # decimetres between the roots of two cards
 _OVER_LIP = 0.6  # factor on spacing and width of the beard's cards
-_LONGEST_OVER_LIP = 0.08  # decimetres
-_RIM = 0.010  # decimetres from the line of the data to the outer rim of the lid
-_LASHES = {"U": (48, 0.098), "D": (26, 0.044)}  # cards per lid, longest hair in decimetres
+_LONGEST_OVER_LIP = 0.08  # decimetres: longest hair above the lip
+_RIM = 0.010  # decimetres from the data's line of lashes to the outer rim of the lid
+# lid -> (number of cards, longest hair in decimetres)
+_LASHES = {"U": (48, 0.098), "D": (26, 0.044)}
 
 
 def _turned(vectors: Floats, normals: Floats, angles: Floats) -> Floats:
-    """Vectors rotated about the skin's normals, float64[n, 3]."""
+    """float64[n, 3]: vectors rotated about the skin's normals by angles in radians."""
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     return np.asarray(c * vectors + s * np.cross(normals, vectors))
 
 
 def brow_flow(surface: Surface) -> Floats:
-    """Direction of brow hairs, float64[V, 3]: upright at the nose, flat at the temple.
+    """float64[V, 3]: direction of brow hairs, upright at the nose, flat at the temple.
 
-    Hairs below the middle line rise to it and hairs above come down, so that they meet in a ridge.
+    Hairs below the middle line rise towards it and hairs above descend, so that they form a ridge.
 
     Args:
-        surface: the head.
+        surface: surface of the head.
     """
     man, eye = surface.man, surface.eye
     along, height = brow_place(man, eye)
@@ -48,19 +49,19 @@ def brow_flow(surface: Surface) -> Floats:
     low = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [64, 56, 42, 26, 8])
     high = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [56, 34, 2, -16, -14])
     angle = low + (high - low) * smooth_step(0.5 + 0.5 * across)
-    # A left turn about the outward normal is up on the left side and down on the right.
+    # A rotation to the left about the outward normal is up on the left side, down on the right.
     return tangent(_turned(arc, surface.normals, np.radians(angle) * side), surface.normals)
 
 
 def brows(surface: Surface, person: Person) -> Strips:
-    """Both brows; all people have their roots at the same places on the skin.
+    """Makes both brows; all people have their roots at the same places of the skin.
 
     Args:
-        surface: the head.
-        person: brows of children and women are shorter, of old men longer.
+        surface: surface of the head.
+        person: the person; brows of children and women are shorter, those of old men longer.
     """
     random = np.random.default_rng(21)
-    front = surface.man_normals[:, 2] > 0.1  # exclude the inside of the eye socket
+    front = surface.man_normals[:, 2] > 0.1  # excludes the inside of the eye socket
     density = brow_density(surface.man, surface.eye) * front
     roots = surface.scattered(density, _BROW_SPACING, random)
     along, _ = brow_place(roots.of(surface.man), surface.eye)
@@ -81,25 +82,25 @@ def brows(surface: Surface, person: Person) -> Strips:
 
 
 def lash_curves(positions: Floats, faces: Ints) -> Floats:
-    """The line on the lid where the lashes of the data begin, float64[columns, 3].
+    """float64[columns, 3]: the line on the lid where the data's lashes begin.
 
-    The data's lashes are a grid: its first row lies behind the lid's edge, its second row on it.
+    The data's lashes are a grid: its first row is behind the lid's edge, its second row on the
+    edge.
 
     Args:
-        positions: float64[V, 3] of the person, decimetres.
-        faces: int64[n, 4], faces of one lid's lashes.
+        positions: float64[V, 3] of the person, in decimetres.
+        faces: int64[n, 4], faces of the lashes of one lid.
     """
     grid = _grid(faces)
     rows = positions[grid]
-    if rows[0, :, 2].mean() > rows[-1, :, 2].mean():  # tips lie further in front
+    if rows[0, :, 2].mean() > rows[-1, :, 2].mean():  # the tips are in front of the roots
         rows = rows[::-1]
     line = rows[1]
     return np.asarray(line if abs(line[0, 0]) < abs(line[-1, 0]) else line[::-1])
 
 
 def _grid(faces: Ints) -> Ints:
-    """Vertices of a grid of quads, int64[rows, columns]; the longer direction runs along the
-    columns."""
+    """int64[rows, columns]: the vertices of a grid of quads; there are more columns than rows."""
     where: dict[int, tuple[int, int]] = {}
     rest = [f.tolist() for f in faces]
     for vertex, place in zip(rest.pop(0), ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
@@ -115,7 +116,7 @@ def _grid(faces: Ints) -> Ints:
         k = known[0]
         a, b, c, d = (face[(k + i) % 4] for i in range(4))
         (ax, ay), (bx, by) = where[a], where[b]
-        way = (-(by - ay), bx - ax)  # to the left of the edge
+        way = (-(by - ay), bx - ax)  # the quad's other side is to the left of this edge
         where.setdefault(c, (bx + way[0], by + way[1]))
         where.setdefault(d, (ax + way[0], ay + way[1]))
     table = np.array(list(where.values()))
@@ -126,12 +127,12 @@ def _grid(faces: Ints) -> Ints:
 
 
 def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips:
-    """Lashes of all four lids: upper lashes long and curled, lower lashes short and sparse.
+    """Makes the lashes of all four lids: upper lashes long and curled, lower ones short and sparse.
 
     Args:
-        surface: the head.
-        lines: float64[n, 3] by "LU", "LD", "RU" and "RD": lash_curves from the nose outward.
-        person: lashes of women and children are longer.
+        surface: surface of the head.
+        lines: "LU", "LD", "RU" or "RD" -> float64[n, 3], lash_curves from the nose outward.
+        person: the person; lashes of women and children are longer.
     """
     random = np.random.default_rng(22)
     parts = []
@@ -144,7 +145,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         at = np.concatenate([[0], np.cumsum(steps)]) / steps.sum()
         begin = np.column_stack([np.interp(t, at, line[:, k]) for k in range(3)])
-        # Root lashes at the outer rim: skin behind it folds in when the eye closes.
+        # Lashes are rooted at the outer rim, because skin behind it folds in when the eye closes.
         roots = surface.nearest(begin + _RIM * surface.scale * np.array([0.0, 0.0, 1.0]))
         root = roots.of(surface.positions)
         fan = np.interp(t, [0, 0.35, 0.7, 1.0], [-0.55, 0.0, 0.55, 1.05])
@@ -167,7 +168,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
 
 
 def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float) -> Floats:
-    """Lashes that start forward and curl from one elevation to another, float64[n, 5, 3]."""
+    """float64[n, 5, 3]: lashes that curl from one elevation to another, both in radians."""
     flat = unit(np.column_stack([fan, np.zeros(len(fan)), np.ones(len(fan))]))
     points = [root]
     for k in range(4):
@@ -178,12 +179,12 @@ def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float)
 
 
 def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
-    """Beard and moustache.
+    """Makes the cards of beard and moustache.
 
     Args:
-        surface: the head.
-        lips: float64[V], 1 on the lips and in the mouth.
-        person: beard_style is not "none".
+        surface: surface of the head.
+        lips: float64[V], 1 on the lips and in the mouth, else 0.
+        person: the person; its beard_style is not "none".
     """
     style = person.beard_style
     random = np.random.default_rng(23)
@@ -191,7 +192,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     density = beard_density(man, lips, style)
     over = _over_lip(man)
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
-    # Hair over the lip is short and fine: longer hair would enter the skin when the mouth moves.
+    # Hair above the lip is short, because long hair would enter the skin if the mouth moves.
     finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
     roots = joined_roots([surface.scattered(density * ~over, spacing, random), finer])
     n = len(roots)
@@ -202,7 +203,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     length = long * (0.55 + 0.75 * under) * random.uniform(0.75, 1.2, n)
     length = np.where(lip, np.minimum(length, _LONGEST_OVER_LIP), length) * surface.scale
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
-    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # trimmed at the jaw's angle
+    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # shorter at the angle of the jaw
     flow = _beard_flow(man) + 0.22 * random.normal(0, 1, man.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     rows = 3 if full else 2
@@ -220,12 +221,12 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
 
 
 def _over_lip(man: Floats) -> NDArray[np.bool_]:
-    """Whether a vertex is in the moustache area, bool[V]."""
+    """bool[V]: whether a vertex is in the area of the moustache."""
     return np.asarray((man[:, 1] > -0.72) & (np.abs(man[:, 0]) < 0.34) & (man[:, 2] > 0.1))
 
 
 def _beard_flow(man: Floats) -> Floats:
-    """Direction of beard hairs, float64[V, 3]: down, and sideways over the lip."""
+    """float64[V, 3]: direction of beard hairs, down, and sideways above the lip."""
     x, _, z = man.T
     aside = np.where(_over_lip(man), np.sign(x) * (0.25 + 2.2 * np.abs(x)), 0.25 * x)
     return np.column_stack([aside, -np.ones(len(man)), 0.15 * (z < 0.0)])

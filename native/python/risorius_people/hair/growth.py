@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Growth of a hair: it follows a flow over the skin and stands up by its stiffness."""
+"""Grows guides of hair: they follow a flow over the skin, and rise above it by their stiffness."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ..polygons import Floats, Ints
 from .strips import unit
 from .surface import Roots, Surface
 
-_SUBSTEPS = 2
-_LOOSE = 0.08  # decimetres over the skin at which `hug` has its full strength
-_EASED = 2  # smoothing passes
-_FREE = -0.4  # height on the man below which hair hangs freely
+_SUBSTEPS = 2  # steps of a guide per row
+_LOOSE = 0.08  # decimetres above the skin at which `hug` has its full strength
+_EASED = 2  # number of smoothing passes
+_FREE = -0.4  # height on the man's head below which hair hangs freely
 
 
 def grow(
@@ -29,25 +29,25 @@ def grow(
     hug: float = 0.0,
     sway: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Grow guides from roots.
+    """Grows guides from roots.
 
     Args:
-        surface: the head.
-        roots: the points where the guides begin.
+        surface: surface of the head.
+        roots: places where the guides begin.
         flow: float64[V, 3], direction of the hair at each vertex.
-        lengths: float64[n], decimetres.
-        rise: float64[n] each, the angle above the skin at the root and at the tip, radians.
-        rows: points of each guide.
-        among: vertices of the surface that a guide may come near.
-        least: float64[n] or a number, smallest height of a tip over the skin, decimetres.
-        stiff: share of the previous direction that each step keeps.
+        lengths: float64[n], length of each guide in decimetres.
+        rise: (float64[n], float64[n]), angle above the skin at the root and at the tip, in radians.
+        rows: number of points of a guide.
+        among: indices of vertices that the guides may come near.
+        least: float64[n] or a number, smallest height of a tip above the skin in decimetres.
+        stiff: weight of the previous direction in each step, 0 to 1.
         fall: float64[n] or a number, weight of gravity at the tip.
-        hug: strength that draws a loose guide back to the skin, above the ends of the ears.
-        sway: float64[n, 3], constant offset of each guide from the flow. Noise in the flow itself
-            would bend a card at every vertex.
+        hug: strength that pulls a loose guide back to the skin, above the lower ends of the ears.
+        sway: float64[n, 3], constant offset of each guide's direction from the flow. Noise in the
+            flow would instead bend a card at every vertex.
 
     Returns:
-        Points of the guides, and the outward normal of the skin there, float64[n, rows, 3] each.
+        Points of the guides, and outward normals of the skin there, float64[n, rows, 3] each.
     """
     at = roots.of(surface.positions)
     out = unit(roots.of(surface.normals))
@@ -78,20 +78,20 @@ def grow(
 
 
 def tangent(vectors: Floats, normals: Floats) -> Floats:
-    """Vectors projected into the skin, with unit length, float64[n, 3].
+    """float64[n, 3]: vectors projected onto the skin, scaled to length 1.
 
     Args:
-        vectors: float64[n, 3].
-        normals: float64[n, 3], unit.
+        vectors: float64[n, 3], any vectors.
+        normals: float64[n, 3], unit normals of the skin.
     """
     return unit(vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals)
 
 
 def eased(points: Floats) -> Floats:
-    """Guides smoothed along their rows, float64[n, rows, 3]; both ends stay.
+    """float64[n, rows, 3]: guides smoothed along their rows; both ends stay.
 
     Args:
-        points: float64[n, rows, 3].
+        points: float64[n, rows, 3], points of the guides.
     """
     out = points.copy()
     for _ in range(_EASED):
@@ -102,14 +102,14 @@ def eased(points: Floats) -> Floats:
 def curled(
     points: Floats, outside: Floats, radius: Floats, turns: Floats, random: np.random.Generator
 ) -> Floats:
-    """Guides wound around themselves, from no winding at the root on, float64[n, rows, 3].
+    """float64[n, rows, 3]: guides wound to coils, whose radius grows from 0 at the root.
 
     Args:
-        points: float64[n, rows, 3].
-        outside: float64[n, rows, 3], direction away from the skin.
-        radius: float64[n], radius of the winding, decimetres.
+        points: float64[n, rows, 3], points of the guides.
+        outside: float64[n, rows, 3], unit vectors away from the skin.
+        radius: float64[n], radius of the coils in decimetres.
         turns: float64[n], number of turns over the whole length.
-        random: chooses the start angle of each guide.
+        random: generator of each guide's start angle.
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
@@ -117,7 +117,7 @@ def curled(
     t = np.linspace(0, 1, points.shape[1])
     angle = 2 * np.pi * (turns[:, None] * t + random.random((len(points), 1)))
     far = radius[:, None] * np.minimum(3 * t, 1)
-    # Raise only away from the skin: otherwise a curl would go through it.
+    # The coil rises only away from the skin, because it would otherwise go through the skin.
     rise = (far * np.sin(angle))[..., None] * up
     inward = np.minimum((rise * outside).sum(axis=2, keepdims=True), 0)
     return np.asarray(points + (far * np.cos(angle))[..., None] * side + rise - inward * outside)

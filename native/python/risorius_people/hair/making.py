@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All hair of a person, and its meshes for each LOD."""
+"""Makes all hair of a person, and its meshes for each LOD."""
 
 from __future__ import annotations
 
@@ -29,43 +29,43 @@ from .strips import Strips
 from .surface import Surface
 
 PICTURE = "hair_color.png"
-NO_HAIR = 4  # the first LOD without cards
-_SHARES = (1.0, 0.42, 0.2, 0.1)  # share of the strips at each LOD
-# For brows: wider cards would look like dashes while the face is still large.
+NO_HAIR = 4  # number of the first LOD without hair cards
+_SHARES = (1.0, 0.42, 0.2, 0.1)  # fraction of the strips that is kept at each LOD
+# More brows are kept, because wide cards would look like dashes while the face is still large.
 _BROWS = (1.0, 0.75, 0.3, 0.1)
-_MOST_VERTICES = 12_000  # of all cards at LOD 0 together
-_OWN = ("hair", "beard")
-_ROWS = (99, 4, 3, 3)
+_MOST_VERTICES = 12_000  # limit for all cards at LOD 0 together
+_OWN = ("hair", "beard")  # meshes that not all people have
+_ROWS = (99, 4, 3, 3)  # largest number of rows of a card at each LOD
+# Millimetres: shapes that move a mesh by less are left out.
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # millimetres in a centimetre
-_OVERDONE = np.float32(1.4)  # factor on an expression; each control stays at most 1
-# The expression that brings most of a beard to folds of the skin, and its weight.
+_OVERDONE = np.float32(1.4)  # factor on the controls of an expression; each control stays at most 1
+# Expression that brings most of a beard to folds of the skin, and its weight.
 _WIDEST, _OVER = "smile_open", np.float32(0.5)
-_COIL = 1.6  # mm: coil radius of an afro 4 cm long
-_PITCH = 2.4  # distance between turns in coil radii, where hair winds most tightly
+_COIL = 1.6  # mm: radius of the coils of an afro 4 cm long
+_PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1
 
 
 @dataclass
 class Grown:
-    """The hair of a person by mesh (hair, brows, beard, eyelashes), without meshes that the person
-    lacks."""
+    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, if there are any."""
 
     strips: dict[str, Strips]
-    unit: float  # unit of the Dna's meshes, in decimetres
+    unit: float  # length of a decimetre in the unit of the Dna's meshes
 
 
 def grow_hair(
     person: Person, body: Body, even: Floats, base: BaseMesh, parts: list[Part], unit: float
 ) -> Grown:
-    """Grow all hair of a person.
+    """Grows all hair of a person.
 
     Args:
-        person: has the styles.
-        body: the person's body.
-        even: float64[V, 3], positions of the man without asymmetry, decimetres.
+        person: the person, with the hair styles.
+        body: body of the person.
+        even: float64[V, 3], positions of the man without asymmetry, in decimetres.
         base: the base mesh.
         parts: the meshes; hair grows on the head of LOD 0.
-        unit: unit of the Dna's meshes, in decimetres.
+        unit: length of a decimetre in the unit of the Dna's meshes.
     """
     head = next(p for p in parts if p.name == "head_lod0_mesh")
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
@@ -95,24 +95,24 @@ def _beard(surface: Surface, head: Part, person: Person) -> Strips:
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
-    """Replace the scalp's cards by fewer and wider ones if all cards have too many vertices."""
+    """Replaces the scalp's cards by fewer and wider ones if all cards have too many vertices."""
     counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
     over = sum(counts.values()) - _MOST_VERTICES
     if over > 0 and "hair" in strips:
-        over += 2 * strips["hair"].rows  # coarser rounds the number of strips
+        over += 2 * strips["hair"].rows  # a margin, because coarser rounds the number of strips
         share = max(0.2, 1 - over / counts["hair"])
         strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
     return strips
 
 
 def add_hair(dna: Dna, grown: Grown) -> None:
-    """Add the cards of all LODs to a finished face.
+    """Adds the hair cards of all LODs to a finished face.
 
     Args:
-        dna: the face; gets the meshes.
-        grown: the hair; beard hairs that the skin would hit are cut or dropped.
+        dna: the face; changed.
+        grown: the hair; hairs of the beard that would enter the skin are cut or dropped.
     """
-    # Meshes that differ between people come last: the others keep their numbers in a mix.
+    # Meshes that not all people have come last, so that the others have the same numbers in a mix.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
@@ -138,7 +138,7 @@ def add_hair(dna: Dna, grown: Grown) -> None:
 
 
 def _played(names: list[str]) -> list[NDArray[np.float32]]:
-    """Raw controls of each expression: alone, overdone, and with a smile added.
+    """Raw controls float32[R] of each expression: alone, exaggerated, and with a smile added.
 
     Args:
         names: names of the raw controls.
@@ -150,26 +150,26 @@ def _played(names: list[str]) -> list[NDArray[np.float32]]:
 
 
 def hair_picture(person: Person, largest: int) -> dict[str, bytes]:
-    """The texture of the hairs as PNG, by file name.
+    """The texture of the hair: file name -> bytes of a PNG.
 
     Args:
-        person: has the colours.
-        largest: each texture has at most largest * largest texels.
+        person: the person, with the hair colours.
+        largest: largest number of texels, as the side of a square.
     """
     return {PICTURE: png(shrunk(paint_strands(person), largest))}
 
 
 def hair_metadata(dna: Dna, grown: Grown, person: Person) -> dict[str, str]:
-    """Metadata: which meshes show the hair texture, and the layout of their cards.
+    """Metadata: the meshes that show the hair texture, and the layout of their cards.
 
-    `texture:<mesh>:color` -> file name. `hair:<mesh>` -> "rows=R": the cards follow one another,
-    each with R rows of two vertices from root to tip; strand renderers need it. `coil:<mesh>` ->
-    "radius=R pitch=P" in millimetres, if strands wind about their path.
+    `texture:<mesh>:color` is a file name. `hair:<mesh>` is "rows=R": the cards follow one another,
+    each with R rows of two vertices from root to tip, which renderers of strands need.
+    `coil:<mesh>` is "radius=R pitch=P" in millimetres, if strands are coiled about their path.
 
     Args:
-        dna: has the meshes.
-        grown: the hair.
-        person: has the hair curl and length.
+        dna: the face with its meshes.
+        grown: hair of the face.
+        person: the person, with the hair's curl and length.
     """
     metadata = {}
     for name in dna.mesh_names:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scalp hair by style: short crops, receding, a bun, long hair, tight curls."""
+"""Makes scalp hair by style: short crop, receding, afro, long, bun."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from .growth import curled, eased, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
-# Place on the man's head around which hair turns at the crown.
+# Position of the whorl at the crown on the man's head.
 _WHORL = np.array([0.10, 0.86, -1.40])
-_PARTING = 0.10  # distance of the parting to his left
-_THIN = TILES["scalp"][4] - DENSE
-_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights on the man's head at which a fringe ends
-_FINE = 0.75  # factor on the spacing of short hair at its edge over the forehead
-_CLOSE = 0.6  # an afro with a smaller hair_length lies on the head
+_PARTING = 0.10  # x of the parting on the man's head; his left is positive
+_THIN = TILES["scalp"][4] - DENSE  # number of thin tiles
+_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights on the man's head where a fringe ends
+_FINE = 0.75  # factor on the spacing of short hair at the hairline over the forehead
+_CLOSE = 0.6  # hair_length below which an afro lies flat on the head
 
 
 def whorl_flow(surface: Surface, side: float) -> Floats:
-    """Direction of hair from the whorl at the crown outward, float64[V, 3]; it turns near the
+    """float64[V, 3]: direction of hair from the whorl at the crown outward; it spirals near the
     whorl.
 
     Args:
-        surface: the head.
-        side: how far the hair over the forehead is combed to the character's right, 0 to 1.
+        surface: surface of the head.
+        side: strength, 0 to 1, with which hair over the forehead is combed to the character's
+            right.
     """
     man, normals = surface.man, surface.man_normals
     away = tangent(man - _WHORL, normals)
@@ -53,15 +54,15 @@ def _roots(
     even: bool = True,
     fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
-    """Roots inside an uneven hairline, and their distances inside it, decimetres on the man.
+    """Roots inside an uneven hairline, and float64[n], their distances inside it in decimetres.
 
-    Short hair is denser where it lies flat, and thinner where it stands up. Long hair is finer at
-    the edge, and with `fine` 1 also at a parting.
+    Short hair (`even` False) is denser where it lies flat, and sparser where it stands up. Long
+    hair is denser at the hairline and, with `fine` 1, at a parting.
     """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
-    # No sharp line: single hairs stand before it, and the corners over the temples are round.
+    # Uneven, because single hairs grow before the line, and the corners at the temples are round.
     if even:
         inside = inside + 0.016 * wavy(man, random, 1.6)
     density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)
@@ -69,7 +70,7 @@ def _roots(
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
         density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
-        # Over the forehead single cards are visible, so they stand closer and are narrower.
+        # Single cards are visible over the forehead, so they are denser and narrower there.
         edge = np.exp(-((inside / 0.09) ** 2)) * smooth_step((man[:, 2] + 0.8) / 0.4)
         density = density * (_FINE**2 + (1 - _FINE**2) * edge)
     if fine:
@@ -84,7 +85,7 @@ def _roots(
 
 
 def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> Floats:
-    """Thin tiles at the hairline and at random places, dense tiles elsewhere."""
+    """Atlas tiles of strips: thin at the hairline and at random places, dense elsewhere."""
     n = len(inside)
     thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
     numbers = np.where(thin, DENSE + random.integers(0, _THIN, n), random.integers(0, DENSE, n))
@@ -97,21 +98,21 @@ def _scalp_vertices(surface: Surface) -> Floats:
 
 
 def crop(surface: Surface, person: Person) -> Strips:
-    """Short hair: some centimetres on top, brushed aside, shorter at the sides and the nape.
+    """Short hair: some centimetres long on top, brushed aside, shorter at the sides and the nape.
 
     Args:
-        surface: the head.
-        person: `hair_length` is a factor on the usual length.
+        surface: surface of the head.
+        person: the person; `hair_length` is a factor on the usual length.
     """
     return _short(surface, person, 31, "crop", top=0.32, sides=0.22)
 
 
 def receding(surface: Surface, person: Person) -> Strips:
-    """Hair of an old man: receded over the temples, thin on top, combed back.
+    """Hair of an old man: receded at the temples, thin on top, combed back.
 
     Args:
-        surface: the head.
-        person: `hair_length` is a factor on the usual length.
+        surface: surface of the head.
+        person: the person; `hair_length` is a factor on the usual length.
     """
     return _short(surface, person, 32, "receding", top=0.30, sides=0.20)
 
@@ -148,7 +149,7 @@ def _short(
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.5 + 0.5 * smooth_step(inside / 0.14)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 20 * high))
-    # Short hair stays low along its whole length.
+    # Limits the rotation of cards, so that their edges at the root are not deep in the skin.
     steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
     turns = np.clip(turns, -steep, steep)
     taper = np.array([0.85, 0.97, 1.0, 0.91, 0.7])
@@ -156,11 +157,11 @@ def _short(
 
 
 def afro(surface: Surface, person: Person) -> Strips:
-    """Tight curls that stand away from the head; short ones lie on it.
+    """Tight curls that stand away from the head; short curls lie on it.
 
     Args:
-        surface: the head.
-        person: `hair_length` is a factor on 4 cm.
+        surface: surface of the head.
+        person: the person; `hair_length` is a factor on 4 cm.
     """
     random = np.random.default_rng(33)
     short = person.hair_length < _CLOSE
@@ -170,7 +171,8 @@ def afro(surface: Surface, person: Person) -> Strips:
     length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
-    # An upright card shows its edge, so cards near the hairline, with little hair around, lie flat.
+    # The edges of upright cards are visible at the hairline, with little hair around: they lie
+    # flat.
     upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
 
     def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
@@ -192,17 +194,17 @@ def afro(surface: Surface, person: Person) -> Strips:
     turns = between((-16, 16), (0, 180))
     taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     strips = make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
-    # A frown moves the skin of the forehead: narrow cards there, so that edges do not sink deeper.
+    # A frown moves the forehead's skin; narrow cards keep their edges above the skin there.
     strips.sides[:, 0] *= (0.5 + 0.5 * smooth_step(inside / 0.15))[:, None]
     return strips
 
 
 def long(surface: Surface, person: Person) -> Strips:
-    """Hair to the shoulders behind the face, parted beside the middle.
+    """Hair to the shoulders, parted beside the middle, that falls behind the face.
 
     Args:
-        surface: the head.
-        person: `hair_length` is a factor on the usual length.
+        surface: surface of the head.
+        person: the person; `hair_length` is a factor on the usual length.
     """
     random = np.random.default_rng(34)
     roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
@@ -210,13 +212,13 @@ def long(surface: Surface, person: Person) -> Strips:
     man = roots.of(surface.man)
     flow = parted_flow(surface)
     sway = 0.10 * random.normal(0, 1, (n, 3))
-    # Hairs end at about the same height: hairs with higher roots are longer.
+    # Hairs end at about the same height, so hairs with higher roots are longer.
     way = 0.85 * (man[:, 1] + 0.55) + 1.15
     length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
     length *= random.uniform(0.88, 1.08, n)
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    # Hair must stay above an ear that is raised.
+    # smallest height above the skin, so that an ear that rises does not come through
     least = (0.036 + 0.02 * random.random(n)) * surface.scale
     points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
@@ -234,7 +236,7 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """Hair from behind the hairline that falls over the forehead and ends in a straight line."""
+    """A fringe: hair from behind the hairline that falls over the forehead to a line."""
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T
@@ -247,7 +249,7 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
     length = 1.1 * surface.scale * random.uniform(0.9, 1.1, n)
     rise = np.radians(random.uniform(14, 26, n)), np.zeros(n)
     near = np.flatnonzero((y > -0.3) & (z > -1.5))
-    # The skin of the forehead moves below the fringe, so keep a gap.
+    # The skin of the forehead moves below the fringe, so a gap is kept.
     least = (0.025 + 0.03 * random.random(n)) * surface.scale
     sway = 0.07 * random.normal(0, 1, (n, 3))
     points, out = grow(surface, roots, flow, length, rise, rows, near, least, 0.4, 0.3, 1.0, sway)
@@ -263,20 +265,20 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
 def _ended(
     surface: Surface, points: Floats, out: Floats, end: Floats, near: Ints
 ) -> tuple[Floats, Floats]:
-    """Guides cut where they come down to a height of the head; each keeps its number of points.
+    """Guides that end where they come down to a height on the head; their number of points stays.
 
     Args:
-        surface: the head.
-        points, out: float64[n, rows, 3] each, from grow.
-        end: float64[n], heights on the man.
-        near: vertices of the surface that the guides may come near.
+        surface: surface of the head.
+        points, out: float64[n, rows, 3] each, from `grow`.
+        end: float64[n], height of each guide's end on the man's head.
+        near: indices of vertices that the guides may come near.
     """
     n, rows, _ = points.shape
     _, _, vertex = surface.below(points.reshape(-1, 3), near)
     height = surface.man[vertex, 1].reshape(n, rows)
     k = np.arange(rows)
     for guide in range(n):
-        # Ignore a tip that turns up again: it would cross the height a second time.
+        # A tip that turns up again is ignored, because it would cross the height a second time.
         down = np.minimum.accumulate(height[guide])
         last = float(np.interp(-end[guide], -down, k))
         at = np.linspace(0, max(last, 0.5), rows)
@@ -286,11 +288,10 @@ def _ended(
 
 
 def parted_flow(surface: Surface) -> Floats:
-    """Direction of hair that falls to both sides of a parting and back behind the ears, float64[V,
-    3].
+    """float64[V, 3]: direction of hair that falls to both sides of a parting, and behind the ears.
 
     Args:
-        surface: the head.
+        surface: surface of the head.
     """
     man = surface.man
     x, y, z = man.T
@@ -300,7 +301,7 @@ def parted_flow(surface: Surface) -> Floats:
     fore = smooth_step((z + 0.5) / 0.5) * top
     flow[:, 1] += 0.4 * fore
     flow[:, 2] -= 0.55 * fore
-    # Hair in front of and above the ears goes back; below the ears it falls.
+    # Hair in front of the ears and above goes back; below the ears it falls.
     before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
     flow[:, 2] -= 0.9 * before
     low = smooth_step((-0.35 - y) / 0.25)[:, None]
@@ -308,15 +309,15 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-_KNOT = np.array([0.0, 0.46, -1.72])  # place of the bun on the man
+_KNOT = np.array([0.0, 0.46, -1.72])  # position of the bun on the man's head
 
 
 def bun(surface: Surface, person: Person) -> Strips:
-    """Hair drawn back into a bun.
+    """Hair that is drawn back into a bun.
 
     Args:
-        surface: the head.
-        person: `hair_length` is a factor on the bun's size.
+        surface: surface of the head.
+        person: the person; `hair_length` is a factor on the bun's size.
     """
     random = np.random.default_rng(35)
     roots, inside = _roots(surface, 0.060, random, "bun", fine=0.01)
@@ -328,7 +329,7 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    full = smooth_step(man[:, 1] / 0.4)  # loose over forehead and temples
+    full = smooth_step(man[:, 1] / 0.4)  # 1 over forehead and temples, where hair is loose
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale
@@ -348,7 +349,7 @@ def bun(surface: Surface, person: Person) -> Strips:
 def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
-    """Strips wound about an axis into a ball; the inner strips are opaque."""
+    """Strips wound about an axis into a ball; the inner ones are opaque."""
     count, rows = 64, 6
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Strips of hair: guides with a width. They become cards of a mesh or strands of a render."""
+"""Strips of hair: guides with a width, which become cards of a mesh or strands of a render."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from ..paint.atlas import tile_corners
 from ..polygons import Floats, Ints
 from .surface import Roots, joined_roots
 
-ROOT_DEEP = 0.014  # decimetres: largest depth of a root's edge in the skin
+ROOT_DEEP = 0.014  # decimetres: largest depth in the skin of a strip's edge at the root
 
 
 def unit(vectors: Floats) -> Floats:
-    """Vectors scaled to length 1, float64[..., 3]; zero stays zero."""
+    """float64[..., 3]: vectors scaled to length 1; a zero vector stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12))
 
 
 @dataclass
 class Strips:
-    """Strips with the same number of rows, from root to tip.
+    """Strips of hair with the same number of rows, from root to tip.
 
     Attributes:
-        points: float64[n, rows, 3], the guide of each strip, decimetres.
+        points: float64[n, rows, 3], the guide of each strip, in decimetres.
         sides: float64[n, rows, 3], vector from the guide to the left edge.
-        normals: float64[n, rows, 3], unit normals for shading, on the outer side.
-        tiles: int64[n], tile of the atlas.
-        roots: the place of each strip on the skin.
-        held: float64[n]; 1: each row follows the skin below it; 0: all rows follow the root.
+        normals: float64[n, rows, 3], unit normals for shading, away from the skin.
+        tiles: int64[n], tile of each strip in the atlas.
+        roots: place of each strip on the skin.
+        held: float64[n]: above 0, each row follows the skin below it; 0, all rows follow the root.
     """
 
     points: Floats
@@ -45,11 +45,11 @@ class Strips:
 
     @property
     def rows(self) -> int:
-        """Number of points per guide."""
+        """Number of points of a guide."""
         return int(self.points.shape[1])
 
     def taken(self, chosen: Ints) -> Strips:
-        """The chosen strips, by index or mask."""
+        """The strips with these indices, or with True in a mask."""
         return Strips(
             self.points[chosen],
             self.sides[chosen],
@@ -63,8 +63,8 @@ class Strips:
         """Fewer and wider strips that cover about the same area.
 
         Args:
-            share: share of the strips to keep.
-            rows: rows per strip.
+            share: fraction of the strips to keep, 0 to 1.
+            rows: largest number of rows of a strip.
         """
         count = max(1, round(share * len(self)))
         chosen = np.unique(np.linspace(0, len(self) - 1, count).round().astype(int))
@@ -85,22 +85,21 @@ def make_strips(
     turns: Floats | None = None,
     held: float = 1.0,
 ) -> Strips:
-    """Strips along guides, with faces turned outside.
+    """Makes strips along guides, with their faces away from the skin.
 
     Args:
-        points: float64[n, rows, 3].
-        outside: float64[n, rows, 3], direction away from the skin.
-        half_width: float64[n], decimetres.
-        taper: float64[rows], factor on the width.
-        tiles: int64[n].
-        roots: the place of each strip on the skin.
-        turns: float64[n], rotation of each strip about its own direction, radians.
-        held: `Strips.held` of all strips.
+        points: float64[n, rows, 3], points of the guides.
+        outside: float64[n, rows, 3], vectors away from the skin.
+        half_width: float64[n], half the width of each strip in decimetres.
+        taper: float64[rows], factor on the width in each row.
+        tiles: int64[n], tile of each strip in the atlas.
+        roots: place of each strip on the skin.
+        turns: float64[n], rotation of each strip about its own direction in radians; None: 0.
+        held: value of `Strips.held` for all strips.
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
-    # Where a hair crosses the outward direction, its left side flips: undo the flip, or the card
-    # folds.
+    # If a hair crosses the outward direction, its left side flips, and the card would fold.
     along = np.sign((side[:, 1:] * side[:, :-1]).sum(axis=2, keepdims=True))
     side[:, 1:] *= np.cumprod(np.where(along < 0, -1, 1), axis=1)
     if turns is not None:
@@ -108,14 +107,14 @@ def make_strips(
         c, s = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
         side = c * side + s * up
     sides = side * half_width[:, None, None] * taper[None, :, None]
-    # A strip on its edge would have half of its root deep in the skin: narrow it there.
+    # A strip on edge would have half of its root deep in the skin, so its root is narrowed.
     deep = np.abs((sides[:, 0] * outside[:, 0]).sum(axis=1))
     sides[:, 0] *= np.minimum(1, ROOT_DEEP / np.maximum(deep, 1e-9))[:, None]
     return Strips(points, sides, unit(outside), tiles, roots, np.full(len(points), held))
 
 
 def joined(parts: list[Strips]) -> Strips:
-    """Strips with the same number of rows, joined into one object."""
+    """Joins strips with the same number of rows into one object."""
     return Strips(
         np.concatenate([p.points for p in parts]),
         np.concatenate([p.sides for p in parts]),
@@ -127,7 +126,7 @@ def joined(parts: list[Strips]) -> Strips:
 
 
 def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
-    """Positions and normals, float64[V, 3] each: left and right edge by row, strip after strip."""
+    """Positions and normals, float64[V, 3] each: left and right edge row by row, strip by strip."""
     left, right = strips.points + strips.sides, strips.points - strips.sides
     positions = np.stack([left, right], axis=2).reshape(-1, 3)
     normals = np.repeat(strips.normals.reshape(-1, 3), 2, axis=0)
@@ -135,7 +134,7 @@ def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
 
 
 def card_faces(strips: Strips) -> tuple[list[list[int]], Floats]:
-    """Faces by vertex, counter-clockwise from outside, and texture coordinates, float64[V, 2]."""
+    """Vertices of faces, counter-clockwise from outside; float64[V, 2], texture coordinates."""
     n, rows = len(strips), strips.rows
     first = 2 * (np.arange(n)[:, None] * rows + np.arange(rows - 1)).reshape(-1)
     faces = np.stack([first + 1, first, first + 2, first + 3], axis=1)

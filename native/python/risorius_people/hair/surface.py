@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin on which hair grows: places on its triangles, carried from the man to each person."""
+"""The skin on which hair grows: places on its triangles, which are the same for all people."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from risorius.author.geometry.polygon_mesh import vertex_normals
 from ..polygons import Floats, Ints, Polygons
 
 _CHUNK = 256
-_AT_ONCE = 64  # points per block: their distances to all others fit into the processor's cache
+_AT_ONCE = 64  # points per block, so that distances to all others fit into the processor's cache
 
 
 @dataclass
 class Roots:
-    """Places on a mesh.
+    """Places on a mesh, as weighted corners of triangles.
 
     Attributes:
-        corners: int64[n, 3], vertices of the triangle of each place.
+        corners: int64[n, 3], vertices of each place's triangle.
         shares: float64[n, 3], weights of the corners; rows sum to 1.
     """
 
@@ -27,43 +27,43 @@ class Roots:
     shares: Floats
 
     def of(self, values: Floats) -> Floats:
-        """Values of vertices, float64[V, k], at the places, float64[n, k]."""
+        """float64[n, k]: values of vertices float64[V, k], interpolated at the places."""
         return np.asarray(np.einsum("nc,nck->nk", self.shares, values[self.corners]))
 
     def __len__(self) -> int:
         return len(self.corners)
 
     def taken(self, rows: Ints) -> Roots:
-        """The chosen places, by index or mask."""
+        """The places with these indices, or with True in a mask."""
         return Roots(self.corners[rows], self.shares[rows])
 
 
 def joined_roots(parts: list[Roots]) -> Roots:
-    """The places of all parts, one part after the other."""
+    """Joins places, one part after the other."""
     return Roots(
         np.concatenate([p.corners for p in parts]), np.concatenate([p.shares for p in parts])
     )
 
 
 class Surface:
-    """The head of a person, and the place of each vertex on the man's head.
+    """The head of a person, with the position of each vertex on the man's head.
 
     Attributes:
-        positions: float64[V, 3] of the person, decimetres.
-        normals: float64[V, 3], unit.
-        man: float64[V, 3], the man's positions; all maps of hair are drawn in them. y and z are
+        positions: float64[V, 3] of the person, in decimetres.
+        normals: float64[V, 3], unit normals of the person.
+        man: float64[V, 3], the man's positions, on which all maps of hair are defined. y and z are
             relative to the middle of his left eye, x to the middle of the face.
-        scale: size of the person, 1 for the man.
+        scale: size of the person's head relative to the man's.
     """
 
     def __init__(self, polygons: Polygons, positions: Floats, man: Floats, eye: Floats) -> None:
-        """Read the mesh.
+        """Prepares the surface.
 
         Args:
             polygons: polygons of the head.
-            positions: float64[V, 3] of the person, decimetres.
-            man: float64[V, 3] of the man.
-            eye: float64[3], the middle of the man's left eye.
+            positions: float64[V, 3] of the person, in decimetres.
+            man: float64[V, 3] of the man, in decimetres.
+            eye: float64[3], middle of the man's left eye.
         """
         self.positions = positions
         self.normals = vertex_normals(positions, polygons.faces)
@@ -77,12 +77,12 @@ class Surface:
         self._around = about(self.triangles, len(positions))
 
     def scattered(self, density: Floats, spacing: float, random: np.random.Generator) -> Roots:
-        """Random places; their smallest distance is the spacing over the root of the density.
+        """Random places; their smallest distance is the spacing divided by the root of the density.
 
         Args:
-            density: float64[V], 0 to 1; 0: no places.
-            spacing: decimetres on the man, where the density is 1.
-            random: source of the places.
+            density: float64[V], 0 to 1; 0 means no places.
+            spacing: smallest distance at density 1, in decimetres on the man's head.
+            random: generator of the places.
         """
         rows = self.triangles[density[self.triangles].max(axis=1) > 0]
         a, b, c = (self.man[rows[:, k]] for k in range(3))
@@ -96,19 +96,20 @@ class Surface:
         return roots.taken(_apart(roots.of(self.man), thick, spacing))
 
     def nearest(self, points: Floats) -> Roots:
-        """The place on the skin nearest to each point.
+        """The nearest place on the skin for each point.
 
         Args:
-            points: float64[n, 3], on the person.
+            points: float64[n, 3], on the person's head, in decimetres.
         """
         return nearest_places(self.positions, self.triangles, self._around, points)
 
     def below(self, points: Floats, among: Ints) -> tuple[Floats, Floats, Ints]:
-        """Height over the skin, the normal there, and the nearest vertex; fast and approximate.
+        """Approximate height above the skin, the skin's normal, and the nearest vertex of each
+        point.
 
         Args:
-            points: float64[n, 3].
-            among: the vertices to search.
+            points: float64[n, 3], in decimetres.
+            among: indices of the vertices to search.
         """
         vertex = among[nearest_rows(points, self.positions[among])]
         height = ((points - self.positions[vertex]) * self.normals[vertex]).sum(axis=1)
@@ -116,10 +117,10 @@ class Surface:
 
 
 def about(triangles: Ints, count: int) -> Ints:
-    """Triangles about each vertex, int64[count, n]; short rows repeat their last triangle.
+    """int64[count, n]: numbers of the triangles at each vertex; short rows repeat the last number.
 
     Args:
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], vertices of the triangles.
         count: number of vertices.
     """
     counts = np.bincount(triangles.ravel(), minlength=count)
@@ -130,7 +131,7 @@ def about(triangles: Ints, count: int) -> Ints:
 
 
 def nearest_rows(points: Floats, others: Floats) -> Ints:
-    """The index of the nearest of `others` for each point, int64[n].
+    """int64[n]: index of the nearest of `others` for each point.
 
     Args:
         points: float64[n, 3].
@@ -141,7 +142,7 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
     out = np.empty(len(points), np.int64)
     for at in range(0, len(points), _AT_ONCE):
         some = points[at : at + _AT_ONCE]
-        # Reuse one buffer: new memory for each block costs more than all sums.
+        # Reuses one buffer, because new memory for each block takes longer than the computation.
         near = np.matmul(some, others.T, out=room[: len(some)])
         np.subtract(half, near, out=near).argmin(axis=1, out=out[at : at + len(some)])
     return out
@@ -150,14 +151,14 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
 def nearest_places(
     positions: Floats, triangles: Ints, around: Ints, points: Floats, vertex: Ints | None = None
 ) -> Roots:
-    """The nearest place to each point on the triangles about its nearest vertex.
+    """The nearest place for each point, on the triangles at its nearest vertex.
 
     Args:
-        positions: float64[V, 3].
-        triangles: int64[T, 3].
-        around: int64[V, n], triangles about each vertex.
-        points: float64[n, 3].
-        vertex: int64[n], the nearest vertex of each point, if known.
+        positions: float64[V, 3], positions of the vertices.
+        triangles: int64[T, 3], vertices of the triangles.
+        around: int64[V, n], numbers of the triangles at each vertex, see `about`.
+        points: float64[n, 3], the points.
+        vertex: int64[n], nearest vertex of each point; None: it is searched.
     """
     if vertex is None:
         vertex = nearest_rows(points, positions)
@@ -177,7 +178,7 @@ def nearest_places(
 
 
 def _apart(points: Floats, density: Floats, spacing: float) -> Ints:
-    """Indices of points with the smallest distance between them; earlier points win."""
+    """Indices of points that are not too near to each other; earlier points have priority."""
     reach = (spacing / np.sqrt(np.maximum(density, 1e-6))) ** 2
     keep = np.zeros(0, np.int64)
     rest = np.flatnonzero(density > 0.02)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Closed lips, teeth and gums, and correctives that keep the tongue on the lip."""
+"""Closes the lips, makes teeth and gums, and keeps the tongue on the lip."""

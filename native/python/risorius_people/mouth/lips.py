@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Close the lips: the data's lips are a millimetre apart, which shows as a black line.
+"""Closes the lips: the data's lips are a millimetre apart, which would look like a black line.
 
-Lengths are decimetres.
+Lengths are in decimetres.
 """
 
 from __future__ import annotations
@@ -13,26 +13,27 @@ import numpy as np
 from ..polygons import Floats, Ints, Polygons, subdivide
 from ..source import BaseMesh
 
-PRESSED = 0.0015  # lips overlap by this much: skin in contact is pressed flat
-_REACH = 0.035  # reach from the line where the lips meet
-_NEAR = 0.06  # a vertex this near to the other lip belongs to its lip's rim
+PRESSED = 0.0015  # overlap of the lips, because skin in contact is pressed flat
+_REACH = 0.035  # distance from the line of the lips over which their displacement fades out
+_NEAR = 0.06  # a vertex nearer than this to the other lip belongs to the rim of its lip
 _BINS = 24  # number of bins across the mouth
 
 
 class Mouth:
-    """The faces of the mouth as shown at LOD 0.
+    """The faces of the mouth with the subdivision of LOD 0, and the vertices of both lips.
 
     Attributes:
-        operator: from vertices of the base mesh to vertices of the subdivided faces.
+        operator: converts values of the base mesh's vertices to the subdivided faces' vertices.
         upper, lower: int[n], subdivided vertices of each lip.
     """
 
     def __init__(self, base: BaseMesh, pucker: Floats, jaw_open: Floats) -> None:
-        """Find the lips by their motion: their positions touch.
+        """Finds the lips by their motion, because their positions touch.
 
         Args:
             base: the base mesh.
-            pucker: float64[V, 3], displacement of a unit that moves both lips and little else.
+            pucker: float64[V, 3], displacement of a unit that moves both lips and hardly anything
+                else.
             jaw_open: float64[V, 3], displacement of a unit that moves the lower lip.
         """
         strength = np.linalg.norm(pucker, axis=1)
@@ -51,26 +52,26 @@ class Mouth:
 
 
 def rims(mouth: Mouth, points: Floats) -> tuple[Ints, Ints]:
-    """Vertices of the upper and of the lower lip that lie near the other lip.
+    """Vertices of the upper and of the lower lip that are near the other lip.
 
     Args:
         mouth: the mouth.
-        points: float64[v, 3], positions of its subdivided vertices.
+        points: float64[v, 3], positions of the mouth's subdivided vertices.
     """
     apart = np.linalg.norm(points[mouth.upper][:, None] - points[mouth.lower][None], axis=2)
     return mouth.upper[apart.min(axis=1) < _NEAR], mouth.lower[apart.min(axis=0) < _NEAR]
 
 
 def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
-    """Height of the gap between the lips, from one corner to the other.
+    """Height of the gap between the lips, from one corner of the mouth to the other.
 
     Args:
         mouth: the mouth.
-        points: float64[v, 3], positions of its subdivided vertices.
+        points: float64[v, 3], positions of the mouth's subdivided vertices.
 
     Returns:
-        Places across, float64[n], and heights of the gap there, float64[n], below 0 if the lips
-        overlap.
+        x of places across the mouth, float64[n], and heights of the gap there, float64[n], negative
+        if the lips overlap.
     """
     upper, lower = (points[rim] for rim in rims(mouth, points))
     edges = np.linspace(
@@ -87,11 +88,11 @@ def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
 
 
 def sealed(mouth: Mouth, positions: Floats) -> Floats:
-    """Positions with closed lips, float64[V, 3]; each lip goes half of the way.
+    """float64[V, 3]: positions with closed lips; each lip goes half of the way.
 
     Args:
         mouth: the mouth of the base mesh.
-        positions: float64[V, 3] of a person; is not changed.
+        positions: float64[V, 3] of a person; not changed.
     """
     out = positions.copy()
     for _ in range(3):
@@ -102,7 +103,7 @@ def sealed(mouth: Mouth, positions: Floats) -> Floats:
         for lip, rim, way in zip(
             (mouth.upper, mouth.lower), rims(mouth, points), (-1, 1), strict=True
         ):
-            own = lip[lip < len(positions)]  # the first vertices are the vertices of the base mesh
+            own = lip[lip < len(positions)]  # the first vertices are vertices of the base mesh
             away = np.linalg.norm(points[own][:, None] - points[rim][None], axis=2).min(axis=1)
             half = np.interp(out[own, 0], places, (gaps + PRESSED) / 2)
             out[own, 1] += way * half * np.exp(-((away / _REACH) ** 2))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Teeth and gums made by code along the arch of the base mesh's own teeth, which are bare strips.
+"""Makes teeth and gums by code along the arch of the base mesh's own teeth, which are bare strips.
 
 A crown is a stack of rings between the biting edge and the gum. Its measures are means of adults
-(Wheeler's Dental Anatomy, tables of the crowns). Lengths are decimetres, places are on the base
-mesh. Each vertex is an affine combination of the strip's vertices, so teeth fit every head and
-follow the strip.
+(Wheeler's Dental Anatomy, tables of the crowns). Lengths are in decimetres, positions on the base
+mesh. Each vertex is an affine combination of the strip's vertices, so that teeth fit every head and
+move with the strip.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MM = 0.01
 
 @dataclass(frozen=True)
 class Tooth:
-    """Measures of a crown in mm: along the arch, from lip to tongue, from edge to gum."""
+    """Measures of a crown in mm: along the arch, from lip to tongue, and from edge to gum."""
 
     kind: str  # "incisor", "canine" or "molar"
     wide: float
@@ -48,8 +48,8 @@ LOWER = (
     Tooth("molar", 11.0, 10.2, 7.3),
     Tooth("molar", 10.4, 10.0, 6.9),
 )
-# By height (0 at the edge, 1 at the gum, more in the root): shares of half the width and of half
-# the thickness, and the offset of the lip side in mm.
+# At each height (0 at the edge, 1 at the gum, above 1 in the root): fraction of half the width,
+# fraction of half the thickness, and offset of the lip side in mm.
 _HEIGHTS = (0.0, 0.05, 0.16, 0.38, 0.66, 0.88, 1.02, 1.25)
 _PROFILES = {
     "incisor": (
@@ -68,24 +68,25 @@ _PROFILES = {
         (-1.6, -0.9, -0.35, 0.15, 0.35, 0.2, -0.1, -0.5),
     ),
 }
-_GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)  # mm beyond the gum's margin, on the lip side
+# mm beyond the gum's margin, on the side of the lip
+_GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)
 _GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm outside the crown's lip side
-_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)
+_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)  # the same on the side of the tongue
 _PALATE_IN = (0.9, -0.2, -1.6, -6.0)
 
 
 class Arch:
-    """The curve of the biting edges by its length from the middle, with a frame at each point."""
+    """The curve of the biting edges, by its length from the middle, with a frame at each point."""
 
     def __init__(self, edge: Floats, up: float) -> None:
-        """Fit the curve to points of one half.
+        """Fits the curve to points of one half.
 
         Args:
-            edge: float64[n, 3], decimetres, from the middle outward.
-            up: 1 for the upper jaw, -1 for the lower jaw: direction from the edge to the gum.
+            edge: float64[n, 3] in decimetres, points from the middle outward.
+            up: 1 for the upper jaw, -1 for the lower jaw: sign of y from the edge to the gum.
         """
-        # A smooth curve through few points: a polynomial in the share of the way. y and z are even
-        # in x.
+        # A smooth curve through few points: polynomials in the fraction of the length. y and z are
+        # even functions.
         way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
         both = np.concatenate([-way[:0:-1], way])
         points = np.concatenate([edge[:0:-1] * (-1, 1, 1), edge])
@@ -101,19 +102,20 @@ class Arch:
         length = np.concatenate([[0], np.cumsum(steps)])
         self._length = length - length[-1] / 2
         self.half = float(length[-1] / 2)
-        # The gum direction is normal to the plane of the edges.
+        # The direction to the gum is the normal of the plane of the edges.
         middle = points - points.mean(axis=0)
         normal = np.linalg.svd(middle)[2][2]
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points, directions along the arch to the character's left, and directions to the lips.
+        """Frames of the arch: points, directions along it to the character's left, directions to
+        the lips.
 
         Args:
-            way: float64[n], decimetres from the middle, positive on the left.
+            way: float64[n], decimetres along the arch from the middle, positive on the left.
 
         Returns:
-            Float64[n, 3] each.
+            float64[n, 3] each.
         """
 
         def place(where: Floats) -> Floats:
@@ -135,7 +137,7 @@ class Arch:
 
 
 class Builder:
-    """Collects rings and strips into one mesh."""
+    """Collects grids of vertices and faces into one mesh."""
 
     def __init__(self) -> None:
         self.points: list[Floats] = []
@@ -144,11 +146,11 @@ class Builder:
         self._count = 0
 
     def add(self, points: Floats, uvs: Floats) -> int:
-        """Add vertices; returns the index of the first.
+        """Adds vertices; returns the index of the first.
 
         Args:
-            points: float64[n, 3], decimetres.
-            uvs: float64[n, 2].
+            points: float64[n, 3], in decimetres.
+            uvs: float64[n, 2], texture coordinates.
         """
         first = self._count
         self.points.append(points)
@@ -157,13 +159,14 @@ class Builder:
         return first
 
     def sheet(self, points: Floats, uvs: Floats, closed: bool, flip: bool) -> int:
-        """Add a grid of vertices with quads between its rows; returns the index of the first.
+        """Adds a grid of vertices with quads between its rows; returns the index of the first
+        vertex.
 
         Args:
-            points: float64[rows, columns, 3], decimetres.
-            uvs: float64[rows, columns, 2].
-            closed: whether the last column joins the first.
-            flip: whether to reverse the faces.
+            points: float64[rows, columns, 3], in decimetres.
+            uvs: float64[rows, columns, 2], texture coordinates.
+            closed: whether faces join the last column and the first one.
+            flip: whether to reverse the winding of the faces.
         """
         rows, columns = points.shape[:2]
         first = self.add(points.reshape(-1, 3), uvs.reshape(-1, 2))
@@ -180,16 +183,16 @@ class Builder:
         return first
 
     def polygons(self) -> tuple[Polygons, Floats]:
-        """The mesh, and the positions of its vertices, float64[v, 3]."""
+        """The mesh, and float64[v, 3], positions of its vertices."""
         points = np.concatenate(self.points)
         uvs = np.concatenate(self.uvs)
         return Polygons(self.faces, self.faces, uvs, len(points)), points
 
 
 def arches(base: BaseMesh) -> dict[str, Arch]:
-    """The arches of both jaws, from the strips of the base mesh.
+    """The arches "upper" and "lower", from the strips of the base mesh.
 
-    The lower teeth bite behind the upper teeth, as in most people.
+    The lower teeth are behind the upper teeth, as in most people.
 
     Args:
         base: the base mesh.
@@ -199,7 +202,7 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         p = base.positions[used]
         half = p[p[:, 0] > -1e-6]
-        # The edge is the outermost row on the biting side: the lowest above its own inclined plane.
+        # The edge is the outermost row on the biting side, found by an inclined plane through it.
         edge = half
         for _ in range(6):
             slope = np.polyfit(edge[:, 2], edge[:, 1], 1)[0]
@@ -215,11 +218,11 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
 
 
 def places_of(teeth: tuple[Tooth, ...], arch: Arch) -> tuple[Floats, float]:
-    """Middles of the crowns along the arch, float64[n], and the scale of their width.
+    """float64[n]: middles of the crowns along the arch; and the factor on their widths.
 
     Args:
-        teeth: teeth of one half, from the middle outward.
-        arch: the arch of the teeth.
+        teeth: the teeth of one half, from the middle outward.
+        arch: arch of the teeth.
     """
     wide = np.array([t.wide for t in teeth]) * MM
     scale = min(1.0, 0.97 * arch.half / wide.sum())
@@ -229,14 +232,14 @@ def places_of(teeth: tuple[Tooth, ...], arch: Arch) -> tuple[Floats, float]:
 def add_crown(
     out: Builder, arch: Arch, tooth: Tooth, way: float, scale: float, around: int
 ) -> None:
-    """Add one tooth.
+    """Adds one tooth.
 
     Args:
-        out: the mesh to add to.
-        arch: the arch of the tooth.
-        tooth: its measures.
-        way: middle of the tooth, decimetres along the arch from its middle.
-        scale: scale of its width.
+        out: mesh under construction; changed.
+        arch: arch of the tooth.
+        tooth: measures of the tooth.
+        way: position of the tooth's middle on the arch, decimetres from the arch's middle.
+        scale: factor on its width.
         around: number of vertices per ring.
     """
     place, along, outward = (v[0] for v in arch.at(np.array([way])))
@@ -250,7 +253,7 @@ def add_crown(
     high = tooth.high * MM * np.array(_HEIGHTS)
     a = half_wide * wide[:, None] * c
     lip = stand[:, None] * MM - half_thick * thick[:, None] * (1 - s)
-    lip = lip + 0.05 * high[:, None] * (1 if tooth.kind != "molar" else 0.3)  # roots lean back
+    lip = lip + 0.05 * high[:, None] * (1 if tooth.kind != "molar" else 0.3)  # the roots lean back
     lip = lip - (0.06 if tooth.kind != "molar" else 0.0) * a**2 / MM  # the lip side is round
     rise = np.repeat(high[:, None], around, axis=1)
     share = np.clip(1 - np.array(_HEIGHTS) / 0.4, 0, 1)[:, None]
@@ -278,13 +281,13 @@ def add_crown(
 
 
 def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> None:
-    """Add the gum of one jaw; the necks of the teeth scallop its margin.
+    """Adds the gum of one jaw, whose margin curves around the necks of the teeth.
 
     Args:
-        out: the mesh to add to.
-        arch: the arch of the jaw.
-        teeth: teeth of one half, from the middle outward.
-        steps: columns per tooth.
+        out: mesh under construction; changed.
+        arch: arch of the jaw.
+        teeth: the teeth of one half, from the middle outward.
+        steps: number of columns per tooth.
     """
     middles, scale = places_of(teeth, arch)
     wide = scale * np.array([t.wide for t in teeth]) * MM
@@ -307,7 +310,7 @@ def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> N
     def sheet(heights: Floats, offsets: Floats, tongue: bool) -> None:
         rows = []
         for h, o in zip(heights, offsets, strict=True):
-            # Far from the margin the gum is even.
+            # Far from the margin the height of the gum is even.
             rise = margin + (high - margin) * np.clip(h / 5, 0, 1) + h * MM
             lip = lean * rise + 0.3 * MM + o * MM - between * (0.4 if tongue else 1.0)
             if tongue:
@@ -324,12 +327,13 @@ def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> N
 
 
 def affine(base: Floats, chosen: Ints, points: Floats) -> Operator:
-    """The operator with the smallest weights that gives points as affine combinations of vertices.
+    """The operator that makes points from vertices as affine combinations with the smallest
+    weights.
 
     Args:
-        base: float64[V, 3], decimetres.
-        chosen: int[n], indices of vertices that do not all lie in one plane.
-        points: float64[m, 3].
+        base: float64[V, 3], vertices in decimetres.
+        chosen: int[n], indices of vertices to use, which must not all be in one plane.
+        points: float64[m, 3], in decimetres.
     """
     p = np.column_stack([base[chosen], np.ones(len(chosen))])
     weights = np.column_stack([points, np.ones(len(points))]) @ np.linalg.pinv(p)
@@ -340,11 +344,11 @@ def affine(base: Floats, chosen: Ints, points: Floats) -> Operator:
 
 
 def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
-    """The meshes of teeth and gums at one LOD.
+    """Makes the meshes of teeth and gums of one LOD.
 
     Args:
         base: the base mesh.
-        lod: 0 or 1.
+        lod: number of the LOD, 0 or 1.
     """
     around, steps = ((14, 6), (8, 4))[lod]
     made: dict[str, list[tuple[Polygons, Operator]]] = {"teeth": [], "gums": []}
@@ -364,10 +368,10 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
 
 
 def joined(parts: list[tuple[Polygons, Operator]]) -> tuple[Polygons, list[Operator]]:
-    """Join two meshes into one, and give its operators.
+    """Joins meshes into one, and their operators as well.
 
     Args:
-        parts: the meshes, each with the operator of its vertices.
+        parts: the meshes, each with the operator that makes its vertices.
     """
     faces, uv_faces, rows, columns, weights = [], [], [], [], []
     count = uv_count = 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Correctives that keep a protruding tongue on the lower lip when other controls move the lip.
+"""Makes correctives that keep an extended tongue on the lower lip when controls move the lip.
 
-Lengths are decimetres.
+Lengths are in decimetres.
 """
 
 from __future__ import annotations
@@ -14,28 +14,27 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 
 OUT = "tongueOut"
-# Controls that lift the middle of the lower lip further than the open jaw drops the tongue.
+# Controls that lift the middle of the lower lip further than the open jaw lowers the tongue.
 LIFTING = ("mouthCornerPull", "mouthPressD", "jawChinRaiseD")
-_JAW = 0.08  # drop of the tongue by an open jaw; the data's tongue lies in the lip
-_BEHIND = 0.22  # distance behind the lip at which the tongue begins to rise
-_EVEN = 0.05  # width across over which the lip's lift is averaged
+_JAW = 0.08  # lift of the tongue with an open jaw, because the data's tongue would lie in the lip
+_BEHIND = 0.22  # decimetres behind the lip from which the tongue rises
+_EVEN = 0.05  # width across the mouth over which the lip's lift is averaged
 
 
 def over_lip(
     units: Mapping[str, Floats], positions: Floats, tongue: Ints, rim: Ints
 ) -> dict[tuple[str, str], Floats]:
-    """Displacements that lift the tongue with the lower lip, by the two raw controls of the
-    corrective.
+    """Two raw controls -> float64[V, 3]: displacements that lift the tongue with the lower lip.
 
     Args:
-        units: float64[V, 3], displacement of each raw control, by name.
+        units: raw control -> float64[V, 3], its displacement.
         positions: float64[V, 3] of a person.
         tongue: indices of the tongue's vertices.
-        rim: vertices of the lower lip's rim, at the upper lip.
+        rim: indices of vertices of the lower lip's rim, where the upper lip touches it.
     """
     at = positions[tongue] + units[OUT][tongue]
     lip = positions[rim]
-    # The tongue lifts fully at the lip and in front of it, and not at all at its root.
+    # The tongue rises fully at the lip and in front of it, and not at all at its root.
     share = smooth_step((at[:, 2] - lip[:, 2].max()) / _BEHIND + 1.0)
     near = np.exp(-(((at[:, :1] - lip[None, :, 0]) / _EVEN) ** 2)) + 1e-12
     near /= near.sum(axis=1, keepdims=True)
@@ -48,7 +47,7 @@ def over_lip(
 
 
 def _up(positions: Floats, vertices: Ints, lift: Floats) -> Floats:
-    """Vertices lifted by y, float64[V, 3]. Args: positions  float64[V, 3]; lift  per vertex."""
+    """float64[V, 3]: `lift` along y. Args: positions: float64[V, 3]; vertices: with a lift each."""
     out = np.zeros_like(positions)
     out[vertices, 1] = lift
     return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Textures of the sample people, painted from anatomy: each texel knows its place on the head.
+"""Paints the textures of the sample people from anatomy: each texel has its place on the head.
 
-Colours are sRGB in [0, 1]; lengths are decimetres.
+Colours are sRGB in [0, 1]; lengths are in decimetres.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The texture atlas of all hair cards of a person: its tiles by kind of hair."""
+"""The texture atlas of a person's hair cards: its tiles by kind of hair."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from ..polygons import Floats, Ints
 
 ATLAS_SIZE = 1024
-# Kind -> first column and row, width and height of a tile in texels, and tiles per row.
+# Kind -> (first column, first row, width and height of a tile in texels, tiles per row).
 TILES = {
     "scalp": (0, 512, 128, 512, 8),
     "brows": (0, 256, 64, 256, 8),
@@ -16,27 +16,27 @@ TILES = {
     "beard": (0, 0, 64, 256, 8),
     "solid": (512, 0, 64, 256, 4),  # opaque hair
 }
-DENSE = 5  # scalp tiles below this number are dense, the rest thin
+DENSE = 5  # scalp tiles with a smaller number are dense, the others thin
 _FIRST = {"scalp": 0, "brows": 8, "lashes": 16, "beard": 32, "solid": 40}
-_MARGIN = 1.0  # border of a tile in texels that cards leave out
+_MARGIN = 1.0  # texels at the border of a tile that cards do not use
 
 
 def tile(kind: str, numbers: Ints) -> Ints:
-    """Atlas numbers of the tiles of one kind, int64[n].
+    """int64[n]: atlas numbers of tiles of one kind.
 
     Args:
-        kind: a key of TILES.
-        numbers: int64[n], numbers within the kind; any integers, they wrap around.
+        kind: kind of hair, a key of TILES.
+        numbers: int64[n], numbers within the kind; too large numbers wrap around.
     """
     return np.asarray(_FIRST[kind] + numbers % TILES[kind][4])
 
 
 def tile_corners(tiles: Ints) -> tuple[Floats, Floats]:
-    """Texture coordinates of a tile: left end of the root and right end of the tip, float64[n, 2]
-    each.
+    """Corners of tiles in texture coordinates, float64[n, 2] each: left end of the root, right end
+    of the tip.
 
     Args:
-        tiles: int64[n].
+        tiles: int64[n], atlas numbers.
     """
     table = np.zeros((64, 4))
     for kind, (left, low, width, height, count) in TILES.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The colour of a shirt: jersey with visible loops."""
+"""Paints the colour of a shirt: jersey with visible loops."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from ..polygons import Floats
 from .images import noise
 
 CLOTH_SIZE = 256
-_LOOPS = 64  # across the texture, which repeats
+_LOOPS = 64  # number of loops across the texture, which repeats
 
 
 def paint_cloth(colour: tuple[float, float, float]) -> Floats:
-    """Loops in columns; each thread is a little lighter or darker, float64[CLOTH_SIZE, CLOTH_SIZE,
-    3].
+    """float64[CLOTH_SIZE, CLOTH_SIZE, 3]: columns of loops, with lighter and darker threads.
 
     Args:
-        colour: sRGB in [0, 1].
+        colour: colour of the shirt, sRGB in [0, 1].
     """
     random = np.random.default_rng(13)
     at = np.arange(CLOTH_SIZE) / CLOTH_SIZE * _LOOPS

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The colour of the eyes: pupil, iris, sclera, vessels."""
+"""Paints the colour of the eyes: pupil, iris, sclera, vessels."""
 
 from __future__ import annotations
 
@@ -15,27 +15,29 @@ from .skin import depth_of
 EYE_SIZE = 1024
 _WHITE, _PINK, _VESSEL = (0.80, 0.755, 0.71), (0.83, 0.62, 0.56), (0.66, 0.24, 0.20)
 _SHADE = (0.60, 0.47, 0.43)
-_COLLARETTE = 0.30  # place of the frill, as a share of the way from the pupil to the root
-_CRYPTS = 46
-_VESSELS = 110
+# position of the collarette, as a fraction of the way from the pupil to the limbus
+_COLLARETTE = 0.30
+_CRYPTS = 46  # number of gaps between the iris' fibres
+_VESSELS = 110  # number of blood vessels before they fork
 
 
 def paint_eye(person: Person) -> Floats:
-    """The eye texture: pupil, iris of fibres, dark soft limbus, off-white sclera; the gaze in the
-    middle.
+    """float64[EYE_SIZE, EYE_SIZE, 3]: pupil, fibres of the iris, soft limbus, sclera; the gaze is
+    at the centre.
 
-    The iris fills most of the texture, see side_map.
+    The iris takes most of the texture, see side_map.
     """
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    colour *= 1 - 0.23 * depth_of(person)  # next to dark skin the same white would glow
+    # darker beside dark skin, next to which the same white would seem to glow
+    colour *= 1 - 0.23 * depth_of(person)
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)
     wobble = 0.012 * _polar(around, 0 * reach, 53, 1, random)
-    # The limbus is soft: the sclera turns clear over a millimetre.
+    # The limbus is soft, because the sclera becomes transparent over a millimetre.
     inside = 1 - smooth(0.955, 1.13, reach + wobble)
     colour = colour * (1 - inside[:, :, None]) + iris * inside[:, :, None]
     halo = np.exp(-(((reach - 1.07) / 0.10) ** 2))
@@ -46,14 +48,14 @@ def paint_eye(person: Person) -> Floats:
 def _polar(
     around: Floats, along: Floats, cells: int, rings: int, random: np.random.Generator
 ) -> Floats:
-    """Smooth noise from -1 to 1 that is seamless around the pupil, float64[h, w].
+    """float64[h, w]: smooth noise from -1 to 1 without a seam around the pupil.
 
     Args:
-        around: float64[h, w], the angle in turns.
-        along: float64[h, w], 0 at the pupil, 1 at the limbus; clipped.
-        cells: noise cells around the pupil.
-        rings: noise cells from the pupil to the limbus.
-        random: source of the noise.
+        around: float64[h, w], angle about the pupil in turns.
+        along: float64[h, w], 0 at the pupil, 1 at the limbus; other values are clipped.
+        cells: number of noise cells around the pupil.
+        rings: number of noise cells from the pupil to the limbus.
+        random: generator of the noise.
     """
     grid = random.uniform(-1, 1, (cells, rings + 1))
     a = around % 1 * cells
@@ -67,7 +69,7 @@ def _polar(
 
 
 def _fibres(around: Floats, reach: Floats, random: np.random.Generator) -> Floats:
-    """Fibres that wander, part and meet on their way outward, float64[h, w] from 0 to 1."""
+    """float64[h, w] from 0 to 1: fibres that wander, part and meet on their way outward."""
     bent = around + 0.0055 * _polar(around, reach, 17, 3, random)
     bent = bent + 0.0025 * _polar(around, reach, 61, 4, random)
     out = np.zeros_like(around)
@@ -78,13 +80,13 @@ def _fibres(around: Floats, reach: Floats, random: np.random.Generator) -> Float
 
 
 def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Generator) -> Floats:
-    """The iris with the pupil; beyond the limbus its rim continues, float64[h, w, 3].
+    """float64[h, w, 3]: the iris with the pupil; beyond the limbus the iris' rim continues.
 
     Args:
-        person: has the iris colours.
-        around: float64[h, w], the angle in turns.
+        person: the person, with the colours of the iris.
+        around: float64[h, w], angle about the pupil in turns.
         reach: float64[h, w], 0 at the pupil, 1 at the limbus.
-        random: source of fibres and crypts.
+        random: generator of fibres and crypts.
     """
     inner, outer = np.array(person.iris[0]), np.array(person.iris[1])
     frill = _COLLARETTE + 0.035 * _polar(around, 0 * reach, 41, 1, random)
@@ -94,7 +96,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
     depth = np.clip(beyond * 0.75 + 0.3 * smooth(0.2, 0.95, reach) + patches, 0, 1)[:, :, None]
     colour = inner * (1 - depth) + outer * depth
     fibres = _fibres(around, reach, random)
-    # Inside the frill fibres are short and fine.
+    # Inside the collarette fibres are short and fine.
     contrast = 0.45 + 0.55 * beyond
     light = 0.50 + 1.05 * (0.5 + contrast * (fibres - 0.5))
     light += 0.30 * np.exp(-(((reach - frill) / 0.045) ** 2)) * (0.4 + fibres)
@@ -115,7 +117,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
-    """Crypts: lozenge gaps between the fibres, mostly at the frill, float64[h, w] from 0 to 1."""
+    """float64[h, w] from 0 to 1: crypts, lozenge gaps between fibres, mostly at the collarette."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
@@ -128,13 +130,13 @@ def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Gene
 
 
 def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats:
-    """The sclera: warm grey, redder and darker at the corners, with faint vessels, float64[h, w,
-    3].
+    """float64[h, w, 3]: the sclera, warm grey, redder and darker at the corners, with faint
+    vessels.
 
     Args:
-        angle: float64[h, w], from the gaze, radians.
-        aside: float64[h, w], 1 and -1 in the direction of the corners, 0 above and below.
-        random: source of patches and vessels.
+        angle: float64[h, w], angle from the gaze in radians.
+        aside: float64[h, w], 1 and -1 towards the corners of the eye, 0 above and below.
+        random: generator of patches and vessels.
     """
     colour = np.ones((*angle.shape, 3)) * np.array(_WHITE)
     patches = 0.5 + 0.5 * noise(len(angle), 14, random)
@@ -145,11 +147,11 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
 
 
 def vessels(random: np.random.Generator) -> Floats:
-    """Fine blood vessels that wander in from behind, fork and thin out, [EYE_SIZE, EYE_SIZE], 0 to
-    1.
+    """float64[EYE_SIZE, EYE_SIZE], 0 to 1: fine blood vessels that wander in from behind, fork and
+    thin out.
 
     Args:
-        random: source of their paths.
+        random: generator of their paths.
     """
     image = np.zeros((EYE_SIZE, EYE_SIZE))
     ways = []
@@ -173,11 +175,11 @@ def vessels(random: np.random.Generator) -> Floats:
 
 
 def _draw(image: Floats, points: Floats) -> None:
-    """Lay a thin line over an image, which is changed in place.
+    """Draws a thin line onto an image.
 
     Args:
-        image: float64[size, size].
-        points: float64[n, 3]: angle, distance from the middle, strength.
+        image: float64[size, size]; changed.
+        points: float64[n, 3]: angle about the centre in radians, distance from it, strength.
     """
     x = (0.5 + points[:, 1] * np.cos(points[:, 0])) * EYE_SIZE - 0.5
     y = (0.5 + points[:, 1] * np.sin(points[:, 0])) * EYE_SIZE - 0.5
@@ -194,6 +196,6 @@ def _draw(image: Floats, points: Floats) -> None:
 
 
 def _soft(image: Floats) -> Floats:
-    """An image with its lines widened to two texels and a faint halo."""
+    """The image with lines widened to two texels, and with a faint halo."""
     near = sum(np.roll(image, shift, axis) for axis in (0, 1) for shift in (-1, 1))
     return np.asarray(np.clip(0.7 * image + 0.2 * near, 0, 1))

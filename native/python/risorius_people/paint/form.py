@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Fine form of the face that the mesh shows too softly: beside a nostril, at a lip's rim, under an
+"""Makes fine form of the face that the mesh shows too softly: beside a nostril, at a lip, under an
 eye.
 
-A vertex that stands out of the mean of its neighbourhood, or lies below it, is form. The mesh shows
-it too softly, so the skin's relief adds it once more: an unsharp mask of the surface. Hollows of
-the form also get colour.
+Form is the height of a vertex above or below the mean of its neighbourhood. The mesh shows it too
+softly, so the skin's relief adds it once more, like an unsharp mask. Hollows of the form also get
+colour.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from .images import smooth
 from .raster import filled
 from .skin import Texels
 
-# Smoothing rounds of each mean, and the share of the form that the relief adds: forms about 3 mm
-# wide, and about 8 mm wide.
+# (smoothing rounds of the mean, fraction of the form that the relief adds): for forms about 3 mm
+# and about 8 mm wide.
 _SCALES = ((6, 1.4), (30, 0.42))
-_MOST = 0.016  # decimetres: larger form belongs to the head, not to its skin
-_SOFT = 5.0  # texels of HEAD_SIZE over which the mesh's edges are blurred
-_HOLLOW = 0.006  # decimetres: depth of a hollow with full colour
-# Years, and the share of the form at that age: a child's face is round.
+_MOST = 0.016  # decimetres: larger form is of the head and not of its skin
+_SOFT = 5.0  # texels at HEAD_SIZE over which the edges of the mesh are blurred
+_HOLLOW = 0.006  # decimetres: depth at which a hollow has its full colour
+# (ages in years), (factor on the form at these ages), because a child's face is round.
 _AGES = ((8, 25), (0.5, 1.0))
 
 
 def stressed(polygons: Polygons, places: Floats) -> Floats:
-    """Height of each vertex above its neighbourhood, float64[V]; negative: below it.
+    """float64[V]: height of each vertex above its neighbourhood in decimetres; negative below.
 
     Args:
-        polygons: the mesh.
-        places: float64[V, 3] of its vertices, decimetres.
+        polygons: polygons of the head.
+        places: float64[V, 3], positions of its vertices in decimetres.
 
     Returns:
-        Decimetres: the weighted sum over the scales, at most _MOST.
+        The weighted sum over the scales, limited to _MOST.
     """
     edges = np.array(list(edges_of(polygons.faces)))
     about = np.maximum(np.bincount(edges.ravel(), minlength=len(places)), 1)[:, None]
@@ -53,7 +53,7 @@ def stressed(polygons: Polygons, places: Floats) -> Floats:
 
 
 def _neighbours(edges: Ints, values: Floats) -> Floats:
-    """The sum over the neighbours of each vertex, float64[V, k]."""
+    """float64[V, k]: the sum over the neighbours of each vertex."""
     columns = [
         sum(np.bincount(a, column[b], len(column)) for a, b in (edges.T, edges.T[::-1]))
         for column in values.T
@@ -62,15 +62,15 @@ def _neighbours(edges: Ints, values: Floats) -> Floats:
 
 
 def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels) -> Floats:
-    """Heights of the face's form at the texels, float32[n], decimetres.
+    """float32[n]: heights of the face's form at the texels, in decimetres.
 
-    Zero where lips or lids meet, because their rims are one with the surface behind them, and on
-    ears, scalp and neck.
+    They are 0 where lips or lids meet, because there the neighbourhood includes the surface behind
+    the rim, and on ears, scalp and neck.
 
     Args:
         polygons: polygons of the head.
-        places: float64[V, 3] of the person's own vertices, decimetres.
-        face: the vertices on the man, which give the places of the face.
+        places: float64[V, 3], positions of the person's vertices in decimetres.
+        face: vertices on the man's head, which locate the parts of the face.
         texels: texels of the texture.
     """
     there = smooth(-1.25, -1.05, face.y) * smooth(0.6, 0.3, face.y) * smooth(-0.45, -0.1, face.z)
@@ -82,14 +82,14 @@ def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels)
 
 
 def share_at(age: int) -> float:
-    """The share of a face's form at an age in years, up to 1."""
+    """Factor on a face's form at an age in years, at most 1."""
     return float(np.interp(age, *_AGES))
 
 
 def hollows(form: Floats) -> Floats:
-    """Depth of each texel in a hollow of the form, float32[n], 0 to 1.
+    """float32[n], 0 to 1: depth of each texel in a hollow of the form.
 
     Args:
-        form: float32[n], decimetres.
+        form: float32[n], heights from `form` in decimetres.
     """
     return np.clip(-form / _HOLLOW, 0, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tools for all textures: sizes, smooth steps, noise, layers."""
+"""Tools for painting textures: changes of size, smooth steps, noise, layers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..polygons import Floats
 
 
 def shrunk(image: Floats, side: int) -> Floats:
-    """An image halved until it has at most side * side texels; each new texel is the mean of 2 x 2.
+    """Halves an image until it has at most side * side texels; new texels are means of 2 x 2.
 
     Args:
         image: float64[h, w, ...]; h and w are powers of two.
-        side: side of the largest square.
+        side: side of the largest allowed square.
     """
     while image.shape[0] * image.shape[1] > side * side:
         blocks = image.reshape(image.shape[0] // 2, 2, image.shape[1] // 2, 2, *image.shape[2:])
@@ -23,11 +23,11 @@ def shrunk(image: Floats, side: int) -> Floats:
 
 
 def enlarged(image: Floats, side: int) -> Floats:
-    """An image [h, h] enlarged to this side, linear between the texels.
+    """float[side, side]: an image enlarged with linear interpolation.
 
     Args:
         image: float[h, h].
-        side: a multiple of h.
+        side: side of the result, a multiple of h.
     """
     times = side // len(image)
     at = (np.arange(side) + 0.5) / times - 0.5
@@ -38,17 +38,17 @@ def enlarged(image: Floats, side: int) -> Floats:
 
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
-    """0 at x = low and below, 1 at x = high and above, smooth in between."""
+    """0 for x up to low, 1 for x from high on, and smooth between them."""
     return smooth_step((x - low) / (high - low))
 
 
 def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
-    """Smooth noise [size, size] in [-1, 1]: a random grid, interpolated with smooth steps.
+    """float64[size, size] in [-1, 1]: smooth noise, from a random grid with smooth interpolation.
 
     Args:
-        size: texels of a side.
-        cells: grid cells along a side; more cells make finer noise.
-        random: source of the grid.
+        size: number of texels of a side.
+        cells: number of grid cells along a side; more cells make finer noise.
+        random: generator of the grid.
     """
     grid = random.uniform(-1, 1, (cells + 1, cells + 1))
     at = np.linspace(0, cells, size, endpoint=False)
@@ -59,6 +59,6 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
 
 
 def blend(image: Floats, colour: tuple[float, float, float], mask: Floats) -> Floats:
-    """An image [h, w, 3] with a colour laid over it by a mask [h, w] from 0 to 1."""
+    """Blends a colour over an image [h, w, 3] by a mask [h, w] from 0 to 1."""
     mask = np.clip(mask, 0, 1)[:, :, None]
     return image * (1 - mask) + np.array(colour) * mask

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Texture layout of the head: the face gets most of the texture.
+"""Texture layout of the head, in which the face gets most of the texture.
 
-The base mesh's own layout holds a whole body: the head gets a tenth, and its back as many texels as
-the face. Here the island of the face fills the upper part, upright and wider in the middle. Mouth,
-sockets and neck share a strip below it.
+The base mesh's own layout is of a whole body: the head gets a tenth, and its back as many texels as
+the face. In this layout the island of the face fills the upper part, upright and enlarged in the
+middle. Mouth, eye sockets and neck share a strip below it.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ import numpy as np
 
 from ..polygons import Floats, Ints, Polygons
 
-STRIP = 0.22  # share of the texture's height for all islands except the face
-_MARGIN = 0.006  # around each island
-# The face island across and down: middle of the enlarged area, its reach, and its texel density
-# relative to the rim.
+STRIP = 0.22  # fraction of the texture's height for all islands except the face
+_MARGIN = 0.006  # margin around each island, as a fraction of the texture's side
+# Across and down the face island: middle of the enlarged area, its reach, and its texel density
+# relative to the island's rim.
 _ACROSS = (0.5, 0.19, 2.0)
 _DOWN = (0.63, 0.25, 1.45)
 
 
 def islands(polygons: Polygons) -> Ints:
-    """The island of each texture coordinate, int[T], numbered by size from the largest.
+    """int[T]: number of each texture coordinate's island; the largest island is 0.
 
     Args:
-        polygons: a mesh.
+        polygons: mesh with texture coordinates.
     """
     owner = list(range(len(polygons.uvs)))
 
@@ -46,10 +46,10 @@ def islands(polygons: Polygons) -> Ints:
 
 
 def packed(polygons: Polygons) -> Floats:
-    """Texture coordinates of a head in this layout, float64[T, 2] in [0, 1].
+    """float64[T, 2] in [0, 1]: texture coordinates of a head in this layout.
 
     Args:
-        polygons: a head in the base mesh's layout, where the face lies on its side.
+        polygons: head in the base mesh's layout, in which the face is rotated by 90°.
     """
     label = islands(polygons)
     upright = np.column_stack([polygons.uvs[:, 1], -polygons.uvs[:, 0]])
@@ -69,13 +69,13 @@ def packed(polygons: Polygons) -> Floats:
 
 
 def _unit(places: Floats) -> Floats:
-    """Shift and scale coordinates to fill [0, 1] in both directions."""
+    """Shifts and scales coordinates so that they fill [0, 1] in both directions."""
     low = places.min(axis=0)
     return np.asarray((places - low) / np.maximum(np.ptp(places, axis=0), 1e-12))
 
 
 def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
-    """Map [0, 1] onto itself, `more` times as wide in the middle as at the ends."""
+    """Maps [0, 1] onto itself, with `more` times the density in the middle as at the ends."""
     steps = np.linspace(0, 1, 513)
     density = 1 + (more - 1) * np.exp(-(((steps - middle) / reach) ** 4))
     total = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])
@@ -83,13 +83,13 @@ def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
 
 
 def _into(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Map [0, 1] to a cell inside its margin."""
+    """Maps [0, 1] to a cell without its margin."""
     a, b = np.array(low) + _MARGIN, np.array(high) - _MARGIN
     return np.asarray(a + places * (b - a))
 
 
 def _fitted(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Centre coordinates in a cell as large as possible, lying or upright."""
+    """Centres coordinates in a cell as large as possible, if necessary rotated by 90°."""
     room = np.array(high) - np.array(low) - 2 * _MARGIN
 
     def scale(size: Floats) -> float:

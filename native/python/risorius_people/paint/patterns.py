@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Seamless tiles of skin patterns: mottling, dots, pores and the fine net between them.
+"""Seamless tiles of skin patterns: mottling, and dots for pores and the fine net between them.
 
-Lengths are texels of the tile. Tiles wrap around; `laid` lays them over a texture.
+Lengths are in texels of the tile. Tiles wrap around; `laid` repeats them over a texture.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..polygons import Floats, Ints
 def mottling(
     side: int, width: float, random: np.random.Generator, high: float | None = None
 ) -> Floats:
-    """Smooth noise with mean 0 and deviation 1; spots are about `width` wide, float32[side, side].
+    """float32[side, side]: smooth noise with mean 0, deviation 1, and spots about `width` wide.
 
     Args:
-        side: side of the tile.
-        width: width of a spot.
-        random: source of the spots.
-        high: height of a spot; None: the same as `width`.
+        side: side of the tile in texels.
+        width: width of a spot in texels.
+        random: generator of the spots.
+        high: height of a spot in texels; None: equal to `width`.
     """
     across = np.fft.rfftfreq(side) * width
     up = np.fft.fftfreq(side) * (width if high is None else high)
@@ -35,12 +35,12 @@ def mottling(
 
 @dataclass(frozen=True)
 class Dots:
-    """Points spread evenly at random, one in each cell of a grid.
+    """Random points, one in each cell of a grid, and the distance of each texel from them.
 
     Attributes:
-        near: float32[side, side]: distance to the nearest point, in cell sides.
-        gap: float32[side, side]: distance to the second nearest point, minus `near`.
-        rank: float32[side, side]: random number of the nearest point, 0 to 1.
+        near: float32[side, side], distance to the nearest point, in sides of a cell.
+        gap: float32[side, side], distance to the second nearest point minus `near`.
+        rank: float32[side, side], random number of the nearest point, 0 to 1.
     """
 
     near: Floats
@@ -50,31 +50,32 @@ class Dots:
     def over(
         self, share: Floats, at: Ints, size: float, soft: float = 0.35, bent: Floats | float = 0.0
     ) -> Floats:
-        """A mask with a dot at a share of the points, float32[n], at some texels: 1 in a dot, 0
-        outside.
+        """float32[n]: a mask at some texels, 1 in dots, 0 outside; a fraction of the points gets
+        dots.
 
         Args:
-            share: float[n] from 0 to 1, share of the points with a dot.
-            at: places on the tile, see `laid`.
-            size: radius of the largest dots, in cell sides.
-            soft: share of the radius over which a dot fades out.
-            bent: float[n], added to the distance to make dots irregular.
+            share: float[n], 0 to 1, fraction of the points with a dot.
+            at: int[n], texels of the tile, see `laid`.
+            size: radius of the largest dots, in sides of a cell.
+            soft: fraction of the radius over which a dot fades out.
+            bent: float[n], added to the distance, to make dots irregular.
         """
         rank = self.rank.ravel()[at]
-        # A dot grows with share - rank, so dots at the edge of a field are small.
+        # A dot grows with share - rank, so dots at the edge of a region are small.
         radius = size * np.clip(1.6 * (share - rank) / np.maximum(share, 1e-6), 0, 1)
         depth = (radius - self.near.ravel()[at] - bent) / np.maximum(soft * radius, 1e-6)
         return np.asarray(np.clip(depth, 0, 1) * (share > rank), np.float32)
 
 
 def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8) -> Dots:
-    """A tile of dots.
+    """Makes a tile of dots.
 
     Args:
-        side: side of the tile.
-        cell: approximate side of a cell; a whole number of cells fills the tile.
-        random: source of the points.
-        loose: largest distance of a point from the middle of its cell, 0 to 1.
+        side: side of the tile in texels.
+        cell: approximate side of a cell in texels; a whole number of cells fills the tile.
+        random: generator of the points.
+        loose: largest distance of a point from the middle of its cell, 0 to 1, as a fraction of
+            half a cell.
     """
     count = max(3, round(side / cell))
     point = (0.5 + loose * random.uniform(-0.5, 0.5, (count, count, 2))).astype(np.float32)
@@ -98,13 +99,13 @@ def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8
 
 
 def laid(where: Ints, size: int, side: int, shift: tuple[int, int] = (0, 0)) -> Ints:
-    """The texel of a tile below each texel of a texture, int[n].
+    """int[n]: the texel of a repeated tile that covers each texel of a texture.
 
     Args:
-        where: int[n], texels of the texture, counted row by row.
-        size: side of the texture.
-        side: side of the tile.
-        shift: offset of the tile, so that two patterns do not start together.
+        where: int[n], texels of the texture, numbered row by row.
+        size: side of the texture in texels.
+        side: side of the tile in texels.
+        shift: rows and columns by which the tile is shifted, so that two patterns do not coincide.
     """
     rows, columns = np.divmod(where, size)
     return np.asarray(((rows + shift[0]) % side) * side + (columns + shift[1]) % side)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Places of hair on the man's head, as densities of vertices relative to his eyes.
+"""Where hair grows on the man's head, as densities at vertices.
 
-All maps are in decimetres relative to the middle of the eyes: x to the side, y up, z to the front.
+Positions are in decimetres: x from the middle of the face to the side, y up and z to the front from
+the middle of the eyes.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# The hairline seen from the side, from the nape over the ear to the middle of the forehead.
+# The hairline seen from the side, (z, y) from the nape over the ear to the middle of the forehead.
 _LINE = np.array(
     [
         (-2.20, -0.66),
@@ -35,7 +36,7 @@ _LINE = np.array(
         (0.90, 0.74),
     ]
 )
-HAIRLINES = {  # by style: recession, sideburn and low of hairline_height
+HAIRLINES = {  # style -> (recession, sideburn, low), see hairline_height
     "none": (0.0, 1.0, 0.0),
     "crop": (0.0, 1.0, 0.0),
     "receding": (0.75, 1.0, 0.0),
@@ -44,17 +45,17 @@ HAIRLINES = {  # by style: recession, sideburn and low of hairline_height
     "afro": (0.0, 0.6, 0.0),
 }
 _THIN_TOP = {"receding": 0.55}
-_NO_SIDEBURN = slice(9, 12)  # points of the line in front of the ear
+_NO_SIDEBURN = slice(9, 12)  # points of the hairline in front of the ear
 
 
 def wavy(points: Floats, random: np.random.Generator, waves: float, count: int = 12) -> Floats:
-    """Smooth noise in about [-1, 1] at points in space, float64[n].
+    """float64[n]: smooth noise in about [-1, 1] at points in space.
 
     Args:
-        points: float64[n, 3].
-        random: source of the noise.
-        waves: waves per decimetre.
-        count: number of waves to add.
+        points: float64[n, 3], in decimetres.
+        random: generator of the noise.
+        waves: number of waves per decimetre.
+        count: number of waves that are added.
     """
     ways = random.normal(0, 1, (count, 3))
     ways *= 2 * np.pi * waves / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -65,13 +66,13 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
 def hairline_height(
     points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
 ) -> Floats:
-    """Distance inside the hairline, float64[n], negative outside.
+    """float64[n]: distance inside the hairline in decimetres, negative outside.
 
     Args:
-        points: float64[n, 3], on the man.
-        recession: how far the hairline has receded at temples and forehead, 0 to 1.
+        points: float64[n, 3], on the man's head.
+        recession: amount by which the hairline has receded at temples and forehead, 0 to 1.
         sideburn: length of the hair in front of the ear, 0 to 1.
-        low: how low and round the line over the forehead is, as on women, 0 to 1.
+        low: how low and round the hairline over the forehead is, as for women, 0 to 1.
     """
     line = _LINE.copy()
     line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]
@@ -91,20 +92,20 @@ def hairline_height(
 
 
 def thinned(points: Floats, style: str) -> Floats:
-    """The share of hair lost on top, float64[n].
+    """float64[n]: fraction of hair that is lost on top, 0 to 1.
 
     Args:
-        points: float64[n, 3], on the man.
+        points: float64[n, 3], on the man's head.
         style: one of people.HAIR_STYLES.
     """
     return np.asarray(_THIN_TOP.get(style, 0.0) * smooth_step((points[:, 1] - 0.55) / 0.3))
 
 
 def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
-    """Place along a brow, 0 at the nose and 1 at the temple, and height over its middle line.
+    """Position along a brow, 0 at the nose and 1 at the temple, and height above its middle line.
 
     Args:
-        points: float64[n, 3], on the man.
+        points: float64[n, 3], on the man's head.
         eye: distance of his eye's middle from the middle of the face.
     """
     along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
@@ -112,7 +113,7 @@ def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
 
 
 def brow_ridge(along: Floats) -> Floats:
-    """Height of a brow's middle line over the eye's middle, float64[n], decimetres.
+    """float64[n]: height of a brow's middle line above the eye's middle, in decimetres.
 
     Args:
         along: float64[n], 0 at the nose and 1 at the temple.
@@ -125,7 +126,7 @@ def brow_ridge(along: Floats) -> Floats:
 
 
 def brow_width(along: Floats) -> Floats:
-    """Half the width of a brow, float64[n], decimetres.
+    """float64[n]: half the width of a brow, in decimetres.
 
     Args:
         along: float64[n], 0 at the nose and 1 at the temple.
@@ -134,11 +135,10 @@ def brow_width(along: Floats) -> Floats:
 
 
 def brow_density(points: Floats, eye: float) -> Floats:
-    """Density of a brow, float64[n], 0 to 1: thin at both ends, with a cleaner edge below than
-    above.
+    """float64[n], 0 to 1: density of a brow, sparse at both ends.
 
     Args:
-        points: float64[n, 3], on the man.
+        points: float64[n, 3], on the man's head.
         eye: distance of his eye's middle from the middle of the face.
     """
     along, height = brow_place(points, eye)
@@ -149,15 +149,15 @@ def brow_density(points: Floats, eye: float) -> Floats:
 
 
 def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
-    """Density of the beard, float64[n], 0 to 1.
+    """float64[n], 0 to 1: density of the beard.
 
     Args:
-        points: float64[n, 3], on the man.
-        lips: float64[n], 1 on the lips and in the mouth.
+        points: float64[n, 3], on the man's head.
+        lips: float64[n], 1 on the lips and in the mouth, else 0.
         style: one of people.BEARD_STYLES except "none".
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
-    # From the front of the ear down over the cheek to the corner of the mouth.
+    # The upper edge goes from the front of the ear over the cheek to the corner of the mouth.
     cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.66])
     under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.20, -1.30])
     edge = smooth_step((cheek - y) / 0.10) * smooth_step((y - under) / 0.12)
@@ -165,7 +165,8 @@ def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
     moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
     moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
     chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
-    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)  # beside the soul patch
+    # beside the tuft below the lower lip
+    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)
     full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
     goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))
     shape = {"full": full, "short": full, "goatee": goatee, "moustache": moustache}[style]

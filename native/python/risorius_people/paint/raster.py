@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Interpolate values of vertices at texels."""
+"""Interpolates values of vertices at the texels of a texture."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import numpy as np
 
 from ..polygons import Floats, Ints, Polygons
 
-_AT_ONCE = 1 << 20  # texels per block
+_AT_ONCE = 1 << 20  # largest number of texels that are searched together
 
 
 class Raster:
-    """The triangle and the weights of each covered texel, found once for any values of vertices.
+    """The triangle and the weights of each covered texel, found once for all values of vertices.
 
     Attributes:
-        covered: bool[size, size]: texels that a face covers.
-        where: int[n]: the covered texels, counted row by row.
+        covered: bool[size, size], whether a face covers a texel.
+        where: int[n], the covered texels, numbered row by row.
     """
 
     def __init__(self, polygons: Polygons, uvs: Floats, size: int) -> None:
-        """Find the texels of all faces; where two faces overlap, the later one wins.
+        """Finds the texels of all faces; if two faces overlap, the later one counts.
 
         Args:
-            polygons: the mesh.
+            polygons: mesh with texture coordinates.
             uvs: float64[T, 2] in [0, 1].
-            size: texels of a side.
+            size: number of texels of a side.
         """
         corners, places = [], []
         for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
@@ -58,7 +58,7 @@ class Raster:
     def _triangles(
         self, begin: int, end: int, low: Ints, span: Ints, room: Ints, size: int
     ) -> None:
-        """Texels inside some triangles, searched in the rectangle around each."""
+        """Finds the texels inside some triangles, in the rectangle around each triangle."""
         count = room[begin:end]
         which = np.repeat(np.arange(begin, end), count)
         if not len(which):
@@ -81,10 +81,10 @@ class Raster:
         self._all_shares[texel] = np.column_stack([b, c])[inside]
 
     def values(self, values: Floats) -> Floats:
-        """Values of vertices at the covered texels, float32[n, k].
+        """float32[n, k]: values of vertices, interpolated at the covered texels.
 
         Args:
-            values: float[V, k].
+            values: float[V, k], values of the vertices.
         """
         values = values.astype(np.float32)
         first, second, third = self._corners.T
@@ -94,10 +94,10 @@ class Raster:
         return np.asarray(out)
 
     def steps(self, places: Floats) -> Floats:
-        """Width and height of each covered texel on the surface, float32[n, 2].
+        """float32[n, 2]: width and height of each covered texel on the surface.
 
         Args:
-            places: float64[V, 3] of the vertices; results are in the same unit.
+            places: float64[V, 3], positions of the vertices; results are in the same unit.
         """
         uv = np.stack([self._uv[:, k] - self._uv[:, 0] for k in (1, 2)], axis=1)
         edges = places[self._corners[:, 1:]] - places[self._corners[:, :1]]
@@ -108,11 +108,11 @@ class Raster:
         return np.asarray(lengths[self._owner])
 
     def spread(self, values: Floats) -> Floats:
-        """An image of values at the covered texels, 0 elsewhere, float32[size, size] or [size,
-        size, k].
+        """An image float32[size, size] or [size, size, k] of values at the covered texels, 0
+        elsewhere.
 
         Args:
-            values: float[n] or [n, k], as `values` returns them.
+            values: float[n] or [n, k], values at the covered texels.
         """
         size = len(self.covered)
         out = np.zeros((size * size, *values.shape[1:]), np.float32)
@@ -120,23 +120,23 @@ class Raster:
         return out.reshape(size, size, *values.shape[1:])
 
     def image(self, values: Floats) -> Floats:
-        """An image of values of vertices, 0 where no face is, float32[size, size, k].
+        """float32[size, size, k]: an image of values of vertices, 0 where no face is.
 
         Args:
-            values: float[V, k].
+            values: float[V, k], values of the vertices.
         """
         return self.spread(self.values(values))
 
 
 def filled(image: Floats, covered: Floats) -> Floats:
-    """An image whose uncovered texels get the colours of near covered texels.
+    """The image with uncovered texels filled with colours of nearby covered texels.
 
-    Texture filtering then meets no foreign colour at the rims of islands, and the space between
-    them compresses well.
+    Filtering of the texture then shows no other colour at the rims of islands, and the space
+    between islands compresses well.
 
     Args:
         image: float[h, w, ...]; h and w are powers of two.
-        covered: bool[h, w]: the painted texels.
+        covered: bool[h, w], whether a texel is painted.
     """
     bare = ~covered
     share = covered.astype(np.float32)
@@ -157,7 +157,7 @@ def _halves(whole: Floats) -> Floats:
 
 
 def _filled(image: Floats, share: Floats) -> Floats:
-    """Means of covered texels; a texel without any takes the value of the next coarser level."""
+    """Means of covered texels; a texel without them takes the next coarser level's value."""
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

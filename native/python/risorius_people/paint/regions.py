@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where a head has blood, pigment, hair roots, pores and oil: smooth fields over its vertices.
+"""Where a head has blood, pigment, hair roots, pores and oil, as smooth fields over its vertices.
 
-Places are in decimetres from the left eye's middle: `x` from the middle of the face, `y` up, `z` to
-the front. All people share topology and texture layout with the man, so his fields serve all.
+Positions are in decimetres: `x` from the middle of the face, `y` up and `z` to the front from the
+left eye's middle. All people share topology and texture layout with the man, so his fields serve
+all.
 """
 
 from __future__ import annotations
@@ -18,26 +19,27 @@ from ..polygons import Floats, Ints, Polygons, edges_of
 from .images import smooth
 from .layout import islands
 
-FAR_RINGS = 14.0
-LIPS_RINGS = 8.0  # edge loops of the base mesh from the mouth's island to the rim of the lips
-DIVIDED = 2.0  # each edge of the base mesh is this many edges of the head at LOD 0
-_REACH = 0.12  # decimetres: spot size of the noise that makes fields uneven
+FAR_RINGS = 14.0  # largest number of edge loops that are counted
+# number of the base mesh's edge loops from the mouth's island to the rim of the lips
+LIPS_RINGS = 8.0
+DIVIDED = 2.0  # an edge of the base mesh is divided into this many edges of the head at LOD 0
+_REACH = 0.12  # decimetres: size of the spots of the noise in fields
 
 
 @dataclass
 class Face:
-    """The head's vertices, relative to the left eye.
+    """The vertices of a head, relative to the left eye.
 
     Attributes:
-        x: float64[V]; the character's left is positive.
+        x: float64[V], to the side; the character's left is positive.
         y: float64[V], up.
         z: float64[V], to the front.
-        lids: float64[V], share of a vertex in the blink, 0 to 1.
-        mouth: float64[V], edge loops of the base mesh outside the mouth's inside (its own island of
-            the texture); negative inside.
-        eyes: float64[V], the same for the skin behind the lids.
+        lids: float64[V], how far a vertex moves in a blink, relative to the largest, 0 to 1.
+        mouth: float64[V], number of the base mesh's edge loops from the inside of the mouth, which
+            is an island of the texture; negative inside.
+        eyes: float64[V], the same number from the skin behind the lids.
         uneven: float64[V, 3], noise with mean 0 and deviation about 1, equal on both sides of
-            seams.
+            texture seams.
     """
 
     x: Floats
@@ -50,15 +52,15 @@ class Face:
 
     @property
     def aside(self) -> Floats:
-        """float64[V]: |x|."""
+        """float64[V]: distance from the middle of the face, |x|."""
         return np.abs(self.x)
 
     def spot(self, x: float, y: float, wide: float, high: float) -> Floats:
-        """A spot at a place of the front and at its mirror image, float64[V]: 1 in its middle.
+        """float64[V]: a spot in front and its mirror image, 1 in the middle.
 
         Args:
-            x, y: middle of the spot.
-            wide, high: distance from the middle at which it falls to a third.
+            x, y: position of the spot's middle.
+            wide, high: distances from the middle at which the spot falls to a third.
         """
         away = ((self.aside - x) / wide) ** 2 + ((self.y - y) / high) ** 2
         return np.asarray(np.exp(-away) * smooth(-0.5, -0.1, self.z))
@@ -67,14 +69,14 @@ class Face:
 def find_face(
     part: Part, positions: Floats, eye: Floats, units: dict[str, Expression], step: float
 ) -> Face:
-    """The face of a head.
+    """Locates the parts of the face on a head.
 
     Args:
-        part: the mesh of the head.
-        positions: float64[V, 3] of its vertices, decimetres.
-        eye: float64[3], the left eye's middle.
-        units: expression of each raw control, by name.
-        step: each edge of the base mesh is this many edges of this head.
+        part: mesh of the head.
+        positions: float64[V, 3] of its vertices, in decimetres.
+        eye: float64[3], middle of the left eye.
+        units: raw control -> expression.
+        step: number of this head's edges per edge of the base mesh.
     """
     blink = sum(
         np.linalg.norm(part.carry(units[name].displacement), axis=1)
@@ -96,11 +98,11 @@ def find_face(
 
 
 def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
-    """Edges from the mouth's inside and from the eyes' inside, float64[V] each, negative inside.
+    """float64[V] each: number of edges from the mouth's and from the eyes' inside, negative inside.
 
     Args:
         polygons: polygons of the head; the insides are islands of its texture.
-        places: float64[V, 3], measured from the left eye, decimetres.
+        places: float64[V, 3], relative to the left eye, in decimetres.
     """
     label = islands(polygons)
     corner = np.concatenate([np.asarray(face) for face in polygons.faces])
@@ -124,10 +126,10 @@ def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
 
 
 def lips_of(rings: Floats) -> Floats:
-    """1 on the lips and in the mouth, where no hair grows, float64[V].
+    """float64[V]: 1 on the lips and in the mouth, where no hair grows, else 0.
 
     Args:
-        rings: float64[V], `Face.mouth`.
+        rings: float64[V], as `Face.mouth`.
     """
     return smooth(LIPS_RINGS + 1.0, LIPS_RINGS, rings)
 
@@ -147,12 +149,12 @@ def _rings(edges: Ints, inside: Ints, outside: Ints) -> Floats:
 
 
 def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Floats:
-    """Smooth noise in space, float64[n], with mean 0 and deviation about 1.
+    """float64[n]: smooth noise in space, with mean 0 and deviation about 1.
 
     Args:
-        places: float64[n, 3].
-        pitch: pitch of its grid, in the unit of `places`.
-        random: source of the grid.
+        places: float64[n, 3], positions.
+        pitch: side of a cell of its grid, in the unit of `places`.
+        random: generator of the grid.
     """
     low = places.min(axis=0) - pitch
     at = (places - low) / pitch
@@ -169,7 +171,7 @@ def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Fl
     return np.asarray(1.7 * out)
 
 
-# ---- fields, float64[V]
+# ---- fields of a face, float64[V] each
 
 
 def ears(face: Face) -> Floats:
@@ -185,11 +187,11 @@ def forehead(face: Face) -> Floats:
 
 
 def blood(face: Face, age: int) -> Floats:
-    """Blood relative to the mean of the face, 1 for a blush.
+    """Amount of blood relative to the mean of the face; 1 is a blush.
 
     Args:
-        face: the vertices.
-        age: years; children have redder cheeks, old people redder noses.
+        face: vertices of the head.
+        age: age in years; children have redder cheeks, old people redder noses.
     """
     young = np.interp(age, (8, 25), (1.2, 1.0))
     old = np.interp(age, (40, 75), (1.0, 1.5))
@@ -212,8 +214,7 @@ def blood(face: Face, age: int) -> Floats:
 
 
 def shade_of_eyes(face: Face) -> Floats:
-    """Mask of the dark skin under the eyes, where veins show, 0 to 1: from the inner corner
-    outward."""
+    """Mask of the dark skin under the eyes, where veins show, 0 to 1."""
     along = np.clip((face.aside - 0.13) / 0.30, 0, 1)
     rim = -0.15 - 0.075 * np.sin(np.pi * np.clip(along * 0.9 + 0.05, 0, 1))
     away = np.abs(face.y - rim) / 0.062
@@ -222,7 +223,7 @@ def shade_of_eyes(face: Face) -> Floats:
 
 
 def yellow(face: Face) -> Floats:
-    """How much of the skin's own yellow shows, where there is little blood."""
+    """Amount of the skin's own yellow, which shows where there is little blood."""
     temple = face.spot(0.56, 0.12, 0.16, 0.22)
     mouth = face.spot(0.0, -0.75, 0.36, 0.2) * (1 - 0.5 * face.spot(0.0, -1.03, 0.15, 0.1))
     out = 0.26 * forehead(face) + 0.2 * temple + 0.22 * mouth
@@ -230,7 +231,7 @@ def yellow(face: Face) -> Floats:
 
 
 def beard(face: Face) -> Floats:
-    """Density of the beard's roots, 0 to 1, with a loose edge."""
+    """Density of the beard's roots, 0 to 1, with an uneven edge."""
     x, y, z = face.aside, face.y, face.z
     line = np.interp(
         x, (0.0, 0.17, 0.3, 0.45, 0.6, 0.72), (-0.53, -0.56, -0.70, -0.66, -0.45, -0.2)
@@ -245,7 +246,7 @@ def beard(face: Face) -> Floats:
 
 
 def pores(face: Face) -> Floats:
-    """Size of the pores, 0 to 1; largest on and beside the nose."""
+    """Size of the pores, 0 to 1; they are largest on and beside the nose."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.17) ** 2) - ((face.y + 0.36) / 0.2) ** 2) * front
     cheeks = face.spot(0.28, -0.36, 0.17, 0.17)
@@ -254,7 +255,7 @@ def pores(face: Face) -> Floats:
 
 
 def oil(face: Face) -> Floats:
-    """How much the skin shines, 0 to 1: forehead, nose, chin and lids."""
+    """Amount of gloss of the skin, 0 to 1: on forehead, nose, chin and lids."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.14) ** 2) - ((face.y + 0.3) / 0.24) ** 2) * front
     brow = forehead(face) * np.exp(-((face.aside / 0.32) ** 2))
@@ -263,7 +264,7 @@ def oil(face: Face) -> Floats:
 
 
 def freckled(face: Face) -> Floats:
-    """Where the sun makes freckles, 0 to 1: nose, cheeks, and less on the forehead."""
+    """Density of freckles by the sun, 0 to 1: on nose, cheeks, and less on the forehead."""
     nose = face.spot(0, -0.24, 0.2, 0.13)
     cheeks = face.spot(0.36, -0.3, 0.2, 0.16)
     return np.asarray(
@@ -273,6 +274,6 @@ def freckled(face: Face) -> Floats:
 
 
 def weathered(face: Face) -> Floats:
-    """Where age leaves spots, 0 to 1: temples, forehead, outer cheeks, scalp."""
+    """Density of age spots, 0 to 1: on temples, forehead, outer cheeks, scalp."""
     sides = face.spot(0.6, 0.1, 0.25, 0.35) + face.spot(0.55, -0.35, 0.2, 0.25)
     return np.asarray(np.clip(sides + 0.6 * forehead(face) + smooth(0.7, 1.0, face.y), 0, 1))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The skin's relief and roughness: pores, lips, lines of age. The shader adds finer detail.
+"""Paints the skin's relief and roughness: pores, lips, creases. The shader adds finer detail.
 
-Heights are decimetres above the skin.
+Heights are in decimetres above the skin.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ from .images import smooth
 from .raster import filled
 from .skin import Skin
 
-PORE = 0.0020
-_STEP = 2 / 255  # step of a normal's components: finer steps are not visible and compress badly
-_LIPS = 0.0004
-_CREASE = 0.0045
+PORE = 0.0020  # depth of a pore
+# step of a normal's components, because finer steps are invisible and compress badly
+_STEP = 2 / 255
+_LIPS = 0.0004  # height of the lips' lines
+_CREASE = 0.0045  # depth of a crease
 
 
 def heights(skin: Skin, creases: Floats) -> Floats:
-    """The relief at the texels, float32[n].
+    """float32[n]: the relief at the texels, in decimetres.
 
     Args:
-        skin: the face.
-        creases: float32[n], depth of each texel in a fold, 0 to 1.
+        skin: skin of the face.
+        creases: float32[n], 0 to 1, depth of each texel in a fold.
     """
     field, texels = skin.field, skin.texels
     ring = field["mouth"]
@@ -35,7 +36,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     share = field["pores"]
     tile, at = texels.dots(4.2, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
-    # Skin is stretched smooth over the forehead: pores of full depth would look like a rind.
+    # Skin is stretched over the forehead, where pores of full depth would look like orange peel.
     bare = bare * (1 - 0.55 * np.clip(field["forehead"], 0, 1))
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
     out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
@@ -49,11 +50,11 @@ def heights(skin: Skin, creases: Floats) -> Floats:
 
 
 def normals(skin: Skin, height: Floats) -> Floats:
-    """Normals of a relief in texture space, float32[size, size, 3] in [0, 1].
+    """float32[size, size, 3] in [0, 1]: normals of a relief in texture space.
 
     Args:
-        skin: the face.
-        height: float32[n] at the texels.
+        skin: skin of the face.
+        height: float32[n], heights at the texels in decimetres.
     """
     raster = skin.texels.raster
     image = filled(raster.spread(height), raster.covered)
@@ -69,16 +70,16 @@ def normals(skin: Skin, height: Floats) -> Floats:
 
 
 def roughness(skin: Skin, creases: Floats) -> Floats:
-    """Roughness, float32[n] in [0, 1]: cheeks are matte, nose, forehead and lips shine, the mouth
+    """float32[n] in [0, 1]: roughness; cheeks are matte, nose, forehead and lips glossy, the mouth
     is wet.
 
     Args:
-        skin: the face.
-        creases: float32[n], depth of each texel in a fold, 0 to 1.
+        skin: skin of the face.
+        creases: float32[n], 0 to 1, depth of each texel in a fold.
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    # The darker the skin, the more its gloss shows.
+    # Gloss is more visible on dark skin, so dark skin is rougher.
     matte = dry + 0.11 * skin.deep
     out = 0.48 + matte - (0.13 - 0.054 * skin.deep) * field["oil"]
     out += 0.02 * texels.coarse + 0.03 * texels.middle
@@ -86,6 +87,6 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     lips = 0.41 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips
     out += (0.20 - out) * skin.wet
-    if skin.person.hair_style != "none":  # hair shades the skin below it
+    if skin.person.hair_style != "none":  # hair shades the skin below
         out += (0.9 - out) * np.maximum(skin.scalp, skin.field["grown"])
     return np.asarray(np.clip(out + (0.38 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))

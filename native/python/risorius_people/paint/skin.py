@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The colour of the skin: pigment and blood over the person's own tone.
+"""Paints the colour of the skin: pigment and blood on the person's own tone.
 
-Each pigment absorbs light by its own curve, so the amounts add up and the colour is tone *
+Each pigment absorbs light by its own curve, so that amounts add up and the colour is tone *
 exp(-amounts). A blush on dark skin is therefore darker than on light skin.
 """
 
@@ -19,7 +19,7 @@ from .places import HAIRLINES, beard_density, brow_density, hairline_height, thi
 from .raster import Raster
 
 HEAD_SIZE = 2048
-# Absorption of linear red, green and blue by one unit.
+# Absorption of linear red, green and blue by a unit of each pigment.
 _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
@@ -30,13 +30,13 @@ _LID_MARGIN = (0.54, 0.29, 0.26)
 
 
 def linear(colour: Floats) -> Floats:
-    """Linear light from sRGB."""
+    """Converts sRGB to linear light."""
     c = np.asarray(colour, np.float32)
     return np.asarray(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), np.float32)
 
 
 def encoded(light: Floats) -> Floats:
-    """sRGB from linear light."""
+    """Converts linear light to sRGB."""
     c = np.clip(light, 0, 1)
     return np.asarray(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055))
 
@@ -48,8 +48,7 @@ def depth_of(person: Person) -> float:
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """Distance inside the hairline, float64[V], decimetres; less where hair is thin; not on
-    ears."""
+    """float64[V]: distance inside the hairline in decimetres, less for sparse hair; not on ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
@@ -58,7 +57,7 @@ def _hairline(face: regions.Face, person: Person) -> Floats:
 
 
 def _grown_beard(face: regions.Face, person: Person) -> Floats:
-    """Mask of the beard's cards, float64[V], 0 to 1."""
+    """float64[V], 0 to 1: mask of the beard's cards."""
     if person.beard_style == "none":
         return np.zeros(len(face.x))
     at = np.column_stack([face.x, face.y, face.z])
@@ -66,13 +65,13 @@ def _grown_beard(face: regions.Face, person: Person) -> Floats:
 
 
 class Texels:
-    """The covered texels of a head: their places, and patterns laid over them.
+    """The covered texels of a head: their positions, and patterns over them.
 
     Attributes:
-        raster: raster of the texture.
-        place: float32[n, 3], decimetres.
-        step: float32[n, 2], width and height of each texel on the surface, decimetres.
-        scale: texels of this texture per texel of HEAD_SIZE.
+        raster: raster of the head's texture.
+        place: float32[n, 3], position of each texel in decimetres.
+        step: float32[n, 2], width and height of each texel on the surface in decimetres.
+        scale: number of this texture's texels per texel at HEAD_SIZE.
     """
 
     def __init__(self, raster: Raster, positions: Floats) -> None:
@@ -84,12 +83,12 @@ class Texels:
         self.side = max(64, self.size // 2)
 
     def mottling(self, width: float, seed: int, high: float | None = None) -> Floats:
-        """Noise with deviation 1, float32[n].
+        """float32[n]: noise with deviation 1.
 
         Args:
-            width: width of its spots, texels of HEAD_SIZE.
+            width: width of its spots in texels at HEAD_SIZE.
             seed: seed of the spots.
-            high: height of its spots; None: the same as `width`.
+            high: height of its spots in texels at HEAD_SIZE; None: equal to `width`.
         """
         random = np.random.default_rng(seed)
         tall = None if high is None else high * self.scale
@@ -97,42 +96,42 @@ class Texels:
         return np.asarray(tile.ravel()[self.at(seed)])
 
     def dots(self, cell: float, seed: int) -> tuple[patterns.Dots, Ints]:
-        """Dots, and the place of each texel on their tile, int[n].
+        """A tile of dots; and int[n], the tile's texel at each texel of the texture.
 
         Args:
-            cell: side of a cell, texels of HEAD_SIZE.
+            cell: side of a cell in texels at HEAD_SIZE.
             seed: seed of the dots.
         """
         tile = patterns.dots(self.side, cell * self.scale, np.random.default_rng(seed))
         return tile, self.at(seed)
 
     def at(self, seed: int) -> Ints:
-        """The place of each texel on a tile, int[n].
+        """int[n]: the texel of a tile at each texel of the texture.
 
         Args:
-            seed: chooses the tile's offset, so that two tiles do not start together.
+            seed: determines the shift of the tile, so that two tiles do not coincide.
         """
         shift = (37 * seed * self.side // 100, 53 * seed * self.side // 100)
         return patterns.laid(self.raster.where, self.size, self.side, shift)
 
     @cached_property
     def coarse(self) -> Floats:
-        """Mottling of half a centimetre, float32[n]."""
+        """float32[n]: mottling with spots of half a centimetre."""
         return self.mottling(26, 1)
 
     @cached_property
     def middle(self) -> Floats:
-        """Mottling of two millimetres, float32[n]."""
+        """float32[n]: mottling with spots of two millimetres."""
         return self.mottling(9, 2)
 
     @cached_property
     def fine(self) -> Floats:
-        """Mottling of half a millimetre, float32[n]."""
+        """float32[n]: mottling with spots of half a millimetre."""
         return self.mottling(2.6, 3)
 
 
 class Skin:
-    """The fields of a face at its texels, float32[n] each, and the person's colours."""
+    """The fields of a face at the texels, float32[n] each, and the colours made from them."""
 
     def __init__(self, person: Person, face: regions.Face, texels: Texels, eye: Floats) -> None:
         self.person, self.texels, self.eye = person, texels, eye
@@ -164,10 +163,10 @@ class Skin:
         self.scalp = smooth(-0.01, 0.17, self.field["hairline"] + uneven)
 
     def colour(self, creases: Floats) -> Floats:
-        """The colour, float32[n, 3], sRGB.
+        """float32[n, 3]: the colour of the skin, sRGB in [0, 1].
 
         Args:
-            creases: float32[n], depth of each texel in a fold, 0 to 1.
+            creases: float32[n], 0 to 1, depth of each texel in a fold.
         """
         person, tone = self.person, linear(np.array(self.person.skin))
         blush = np.log(tone / np.maximum(linear(np.array(person.flush)), 1e-3))
@@ -197,7 +196,7 @@ class Skin:
         return np.asarray(out)
 
     def _vessels(self) -> Floats:
-        """Fine vessels on old, light cheeks and noses."""
+        """Amount of fine vessels on cheeks and noses that are old and light."""
         amount = self.old * (1 - self.deep)
         if amount <= 0:
             return np.zeros(1, np.float32)
@@ -207,7 +206,7 @@ class Skin:
         return np.asarray(0.5 * amount * there * lines * np.clip(self.texels.coarse, 0, 1.5))
 
     def _spots(self) -> Floats:
-        """Freckles, age spots and moles."""
+        """Amount of melanin in freckles, age spots and moles."""
         field, texels, person = self.field, self.texels, self.person
         out = np.zeros(len(texels.place), np.float32)
         bent = 0.05 * texels.middle
@@ -229,17 +228,17 @@ class Skin:
         return out
 
     def _hair(self, light: Floats) -> Floats:
-        """Roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
+        """Adds roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
         person, texels = self.person, self.texels
         hair = linear(np.array(person.hair))
         scalp = self.scalp
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        # Where hair parts, light passes between the hairs, and each hair absorbs a share.
+        # A product of powers, because light passes between hairs and each absorbs a share.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
-        if person.beard_style != "none":  # roots between the cards
+        if person.beard_style != "none":  # roots between the beard's cards
             share = np.clip(self.field["grown"] * (1 + 0.25 * texels.coarse), 0, 1)
             dark = roots.over(0.9 * share, at, 0.5)
             light = _over(light, _IN_SHADE * hair, 0.5 * share + 0.4 * share * dark)
@@ -254,7 +253,7 @@ class Skin:
         return light
 
     def _brows(self) -> Floats:
-        """Mask of the brows' cards with a frayed edge, float32[n], 0 to 1."""
+        """float32[n], 0 to 1: mask of the brows' cards with a frayed edge."""
         texels = self.texels
         at = texels.place - np.array([0, *self.eye[1:]])
         near = np.flatnonzero((at[:, 1] > 0) & (at[:, 1] < 0.4) & (at[:, 2] > -0.4))
@@ -264,8 +263,8 @@ class Skin:
         return out
 
     def _lips(self, light: Floats) -> Floats:
-        """The red of the lips: pale and pigmented at the rim, with lines across, darker where they
-        meet."""
+        """Adds the red of the lips: pale and pigmented at the rim, with lines across, darker where
+        the lips meet."""
         person, texels, ring = self.person, self.texels, self.field["mouth"]
         if not (ring < regions.FAR_RINGS).any():
             return light
@@ -286,7 +285,7 @@ class Skin:
 
     @cached_property
     def lines(self) -> Floats:
-        """Lines across the lips, float32[n], mean 0 and deviation 1."""
+        """float32[n]: lines across the lips, with mean 0 and deviation 1."""
         texels = self.texels
         tile = patterns.mottling(512, 2.3, np.random.default_rng(41), 14)
         across = np.rint(texels.place[:, 0] / 0.0042 + 1.5 * texels.middle).astype(int) % 512
@@ -294,7 +293,7 @@ class Skin:
         return np.asarray(tile[down, across])
 
     def _inside(self, light: Floats) -> Floats:
-        """The inside of the mouth and the skin behind the lids: wet, and never outer skin."""
+        """Adds the wet colours of the inside of the mouth and of the skin behind the lids."""
         ring, texels = self.field["mouth"], self.texels
         mucosa = linear(np.array(_MUCOSA)) * (1 - 0.25 * self.deep)
         mucosa = mucosa * np.exp(-0.16 * (texels.coarse + texels.middle)[:, None] * [0.3, 1.0, 0.9])
@@ -306,7 +305,7 @@ class Skin:
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
-    """Lay a colour over linear light by a mask."""
+    """Blends a colour over linear light by a mask from 0 to 1."""
     mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
     out = np.asarray(light * (1 - mask))
     out += colour.astype(np.float32) * mask

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The hairs on the cards of scalp, brows, lashes and beard: colour and opacity in one texture."""
+"""Paints the hairs on cards of scalp, brows, lashes and beard, with their opacity."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from ..polygons import Floats
 from .atlas import ATLAS_SIZE, DENSE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
-_LASH_DARK = 0.3  # factor on the brows' colour
-_LOOSE = 0.6
+_LASH_DARK = 0.3  # factor on the brows' colour, which gives that of the lashes
+_LOOSE = 0.6  # see _Hairs.loose
 _CURLY = 0.6  # hair_curl above which single hairs are not visible
 
 
 @dataclass
 class _Hairs:
-    """How the hairs of a kind of tile look.
+    """The look of the hairs in one kind of tile.
 
     Attributes:
-        counts: number of hairs in each tile.
-        thick: half width of a hair at its root, texels, smallest and largest.
-        length: shares of the tile's height, smallest and largest.
-        begin: largest height of the roots, as a share of the tile's height.
-        lean: sideways lean, as a share of the tile's width.
-        bend: sideways bend, as a share of the tile's width.
-        wave: amplitude of the waves, as a share of the tile's width.
-        waves: number of waves over the length.
-        gather: how far tips gather in the middle, 0 to 1.
-        taper: where a hair begins to taper, as a share of its length.
-        loose: how much sparser hairs are at the edges than in the middle, 0 to 1. With even hairs
-            the card shows as a rectangle.
+        counts: number of hairs in each tile; tiles repeat these numbers.
+        thick: smallest and largest half width of a hair at its root, in texels.
+        length: smallest and largest length, as a fraction of the tile's height.
+        begin: largest height of the roots, as a fraction of the tile's height.
+        lean: standard deviation of the sideways lean, as a fraction of the tile's width.
+        bend: standard deviation of the sideways bend, as a fraction of the tile's width.
+        wave: amplitude of waves, as a fraction of the tile's width.
+        waves: number of waves over the tile's height.
+        gather: how far tips move towards the middle, 0 to 1.
+        taper: fraction of a hair's length from which it tapers.
+        loose: how much sparser hairs are at the edges than in the middle, 0 to 1; with evenly
+            spaced hairs the card would look like a rectangle.
     """
 
     counts: tuple[int, ...]
@@ -51,7 +51,7 @@ class _Hairs:
 
 def _kinds(person: Person) -> dict[str, _Hairs]:
     curl = person.hair_curl
-    straight = curl < _CURLY  # single hairs are visible side by side and must be thin
+    straight = curl < _CURLY  # single hairs are visible side by side, so they must be thin
     thin = (0.8, 1.35) if straight else (1.0, 1.7)
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
@@ -80,7 +80,7 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
 
 
 def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
-    """Colours of single hairs, float64[count, 3]."""
+    """float64[count, 3]: colours of single hairs, some of them grey."""
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
     own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some hairs are redder
     white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))
@@ -95,8 +95,7 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """A tile of hairs from the root (row 0) to the tip, later ones on top, float64[height, width,
-    4]."""
+    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later ones on top."""
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height
@@ -107,14 +106,14 @@ def _paint_tile(
     places = (np.arange(count) + random.uniform(0.1, 0.9, count)) / count
     off = 2 * places - 1
     places = 0.5 + 0.5 * np.sign(off) * np.abs(off) ** (1 + hairs.loose)
-    aside = 0.05 + hairs.wave  # a curl beyond the tile would be cut in a straight line
+    aside = 0.05 + hairs.wave  # a curl that leaves the tile would be cut off in a straight line
     for place, shade in zip(random.permutation(places), shades, strict=True):
         begin = random.uniform(0, hairs.begin)
         length = begin + (1 - begin) * random.uniform(*hairs.length)
         s = np.clip((v - begin) / (length - begin), 0, 1)
         lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
         start = aside + (1 - 2 * aside) * place
-        # The tile's edge would cut it in a straight line.
+        # A hair that leaves the tile would be cut in a straight line, so it leans the other way.
         if abs(start + lean + bend - 0.5) > 0.5 - aside:
             lean, bend = -lean, -bend
         middle = start + lean * s + bend * s**2
@@ -133,15 +132,15 @@ def _paint_tile(
 def _lay(
     image: Floats, middle: Floats, half: Floats, shade: Floats, along: Floats, strength: float
 ) -> None:
-    """Lay one hair over a tile.
+    """Paints one hair over a tile.
 
     Args:
-        image: float64[h, w, 4], is changed.
-        middle: float64[h], column of the hair in each row.
-        half: float64[h], half its width; 0 in rows without the hair.
-        shade: float64[3].
+        image: float64[h, w, 4], the tile; changed.
+        middle: float64[h], column of the hair in each row, in texels.
+        half: float64[h], half its width in texels; 0 in rows without the hair.
+        shade: float64[3], colour of the hair.
         along: float64[h], 0 at the root, 1 at the tip.
-        strength: opacity.
+        strength: opacity of the hair, 0 to 1.
     """
     width = image.shape[1]
     low = int(np.clip(middle.min() - 4, 0, width))
@@ -161,10 +160,10 @@ def _lay(
 
 
 def paint_strands(person: Person) -> Floats:
-    """sRGB colour and opacity of the person's hairs, float64[ATLAS_SIZE, ATLAS_SIZE, 4].
+    """float64[ATLAS_SIZE, ATLAS_SIZE, 4]: sRGB colour and opacity of the person's hairs.
 
     Args:
-        person: has the colours, the curl and the share of grey hair.
+        person: the person, with hair colours, curl and share of grey hairs.
     """
     random = np.random.default_rng(11)
     image = np.zeros((ATLAS_SIZE, ATLAS_SIZE, 4))

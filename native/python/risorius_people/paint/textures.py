@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All textures of a person, by file name."""
+"""Paints all textures of a person."""
 
 from __future__ import annotations
 
@@ -23,22 +23,24 @@ from .relief import heights, normals, roughness
 from .skin import HEAD_SIZE, Skin, Texels
 
 MASK_SIZE = 512
-WRINKLE_SHARE = 2  # a texel of the wrinkle sets is this many texels of the colour wide
-# Years, and the share of each fold that stays in the face at rest.
+WRINKLE_SHARE = 2  # width of a texel of the wrinkle sets, in texels of the colour
+# (ages in years), (fraction of each fold's depth that is left in the face at rest).
 STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))
-# Decimetres above the eyes: higher up its lines would cross the lines of the forehead.
+# Decimetres above the eyes over which the frown's lines fade out, because further up they would
+# cross the lines of the forehead.
 _FROWN_ENDS = (0.17, 0.27)
 
 
 def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
-    """Depth of folds, float64[h, w]; less on the fat of the cheeks, which bulges instead.
+    """float64[h, w]: factor on the depth of folds; small on the fat of the cheeks, which bulges
+    instead.
 
     Args:
-        person: has the age.
-        place: float64[h, w, 3], place of each texel on the head, decimetres.
-        eye: float64[3], the left eye's middle.
+        person: the person, with the age.
+        place: float64[h, w, 3], position of each texel on the head in decimetres.
+        eye: float64[3], middle of the left eye.
     """
-    # At 8 years folds are a third as deep as at 30; at 80 nearly twice.
+    # At 8 years folds are a third as deep as at 30, at 80 years nearly twice as deep.
     age = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 1.9)))
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
     cheek = np.exp(-(((x - 0.44) / 0.19) ** 2) - ((y + 0.42) / 0.24) ** 2)
@@ -48,12 +50,12 @@ def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
 
 
 def lasting(place: Floats, eye: Floats) -> Floats:
-    """How strongly folds of expressions stay with age, float64[h, w], 0 to 1: most at brow and
+    """float64[h, w], 0 to 1: how much of an expression's folds stays with age; most at brow and
     eyes.
 
     Args:
-        place: float64[h, w, 3], place of each texel on the head, decimetres.
-        eye: float64[3], the left eye's middle.
+        place: float64[h, w, 3], position of each texel on the head in decimetres.
+        eye: float64[3], middle of the left eye.
     """
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
     brow = smooth(0.15, 0.3, y)
@@ -64,12 +66,12 @@ def lasting(place: Floats, eye: Floats) -> Floats:
 
 
 def between_brows(place: Floats, eye: Floats) -> Floats:
-    """Mask of the frown's own lines, float64[h, w], 0 to 1: other lines across them would form a
+    """float64[h, w], 0 to 1: mask of the frown's lines, where other lines across them would form a
     grid.
 
     Args:
-        place: float64[h, w, 3], place of each texel on the head, decimetres.
-        eye: float64[3], the left eye's middle.
+        place: float64[h, w, 3], position of each texel on the head in decimetres.
+        eye: float64[3], middle of the left eye.
     """
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
     return np.asarray(smooth(0.17, 0.10, x) * smooth(_FROWN_ENDS[1], _FROWN_ENDS[0], y))
@@ -77,12 +79,12 @@ def between_brows(place: Floats, eye: Floats) -> Floats:
 
 @dataclass
 class Wrinkles:
-    """Textures of the folds of expressions.
+    """The textures of the folds of expressions.
 
     Attributes:
-        pictures: masks and normals of the sets, by file name.
-        sets: the file of each set.
-        still: float32[h, w], depth of each texel in a fold of the face at rest, 0 to 1.
+        pictures: file name -> masks, and normals of the sets.
+        sets: number of a set -> file name of its normals.
+        still: float32[h, w], 0 to 1, depth of each texel in a fold of the face at rest.
     """
 
     pictures: dict[str, Floats]
@@ -98,15 +100,15 @@ def head_wrinkles(
     units: dict[str, Expression],
     size: int,
 ) -> Wrinkles:
-    """Masks, and normals of the sets; the normals are differences from flat ones.
+    """Paints masks, and normals of the sets as differences from flat normals.
 
     Args:
-        person: has the age.
-        head: the mesh, not subdivided.
-        positions: float64[v, 3] of its vertices, decimetres.
-        eye: float64[3], the left eye's middle.
-        units: expression of each raw control, by name.
-        size: texels of a side.
+        person: the person, with the age.
+        head: mesh of the head, not subdivided.
+        positions: float64[v, 3] of its vertices, in decimetres.
+        eye: float64[3], middle of the left eye.
+        units: raw control -> expression.
+        size: number of texels of a side.
     """
     uvs = head.polygons.uvs
     raster = Raster(head.polygons, uvs, size)
@@ -152,17 +154,17 @@ def paint_head(
     still: Floats,
     size: int,
 ) -> dict[str, Floats]:
-    """Colour, normals and roughness of the head, by file name.
+    """File name -> image of the head's colour, normals and roughness.
 
     Args:
-        person: has the colours and the age.
-        head: the mesh, with each edge of the base mesh split in two.
-        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
-        own: float64[V, 3], the same on the person; the relief shows this form.
-        eye: float64[3], the left eye's middle.
-        units: expression of each raw control, by name.
-        still: float32[h, w], depth of each texel in a fold, in a smaller texture.
-        size: texels of a side.
+        person: the person, with colours and age.
+        head: mesh of the head at LOD 0, in which each edge of the base mesh is divided in two.
+        positions: float64[V, 3], all vertices of the base mesh of the man, in decimetres.
+        own: float64[V, 3], all vertices of the person, whose form the relief shows.
+        eye: float64[3], middle of the left eye.
+        units: raw control -> expression.
+        still: float32[h, w], 0 to 1, depth of each texel in a fold, in a smaller texture.
+        size: number of texels of a side.
     """
     p = head.carry(positions)
     raster = Raster(head.polygons, head.polygons.uvs, size)
@@ -182,12 +184,12 @@ def paint_head(
 
 
 def flush_masks(head: Part, positions: Floats, eye: Floats) -> dict[str, Floats]:
-    """Masks of the blushing cheeks, by file name.
+    """File name -> mask of a cheek that blushes.
 
     Args:
-        head: the mesh, not subdivided.
-        positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        eye: float64[3], the left eye's middle.
+        head: mesh of the head, not subdivided.
+        positions: float64[V, 3], all vertices of the base mesh, in decimetres.
+        eye: float64[3], middle of the left eye.
     """
     x, y, z = (head.carry(positions) - np.array([0, eye[1], eye[2]])).T
     files = {}
@@ -207,19 +209,19 @@ def paint_textures(
     parts: list[Part],
     largest: int = HEAD_SIZE,
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """The textures.
+    """Paints all textures of a person.
 
     Args:
-        person: has the colours.
-        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
-        own: float64[V, 3], the same on the person.
-        units: expression of each raw control, by name.
-        parts: the meshes.
-        largest: each texture has at most largest * largest texels.
+        person: the person, with the colours.
+        positions: float64[V, 3], all vertices of the base mesh of the man, in decimetres.
+        own: float64[V, 3], all vertices of the person.
+        units: raw control -> expression.
+        parts: the meshes of the face.
+        largest: largest number of texels of a texture, as the side of a square.
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name.
-        The roles are color, normal, roughness, normal:<wrinkle set>, and map:<animated map>, the
+        The roles are color, normal, roughness, normal:<wrinkle set>, and map:<animated map> for the
         mask of that map.
     """
     coarse = next(part for part in parts if part.name == "head_lod1_mesh")
@@ -253,19 +255,19 @@ def paint_textures(
 
 
 def packable(name: str, image: Floats, largest: int) -> Floats:
-    """A texture at its stored size and precision.
+    """A texture at the size and precision in which it is stored.
 
-    Eyes need half the head's side. Small textures go into the zip: they keep seven bits, roughness
-    six, because PNG cannot compress the noise of the remaining bits.
+    Eyes get half the head's side. Small textures are part of the released zip: they keep seven
+    bits, roughness six, because PNG cannot compress the noise of the other bits.
 
     Args:
-        name: file name.
+        name: file name of the texture.
         image: float64[h, w, ...] in [0, 1].
-        largest: each texture has at most largest * largest texels.
+        largest: largest number of texels, as the side of a square.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
     if largest > 1024 or not name.startswith(("head_", "eye_")):
         return out
-    # Both map 128 of 255, a flat normal, to a whole step.
+    # Both numbers of steps map 128 of 255, a flat normal, to a whole step.
     steps = 63.75 if "roughness" in name else 127.5
     return np.round(out * steps) / steps

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The joints that all sample people share, fitted once on the man. joints.npz, made by
-packaging/ship/find_joints.py, has the joints of the shipped people; others are kept in the user's
-cache."""
+"""The joints that all sample people share, fitted once on the man.
+
+joints.npz, made by packaging/ship/find_joints.py, has the joints for build.RIG; joints for other
+options are kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -20,12 +21,12 @@ SHIPPED = Path(__file__).with_name("joints.npz")
 
 
 def shipped() -> Reference:
-    """The reference of build.RIG, which ships with the package."""
+    """The reference for build.RIG, which is part of the package."""
     return Reference.read(SHIPPED)
 
 
 def _path(options: RigOptions) -> Path:
-    """File of a reference; the start of its name is the same for one version of all inputs."""
+    """Path of a cached reference; its name begins with a hash of all inputs but the options."""
     known = hashlib.sha256(SHA256.encode() + fingerprint())
     for entry in sorted(Path(__file__).parent.rglob("*")):
         if entry.suffix in (".py", ".toml"):
@@ -35,7 +36,7 @@ def _path(options: RigOptions) -> Path:
 
 
 def kept(options: RigOptions) -> Reference | None:
-    """The reference of these options, if this version of Risorius made one on this machine.
+    """The cached reference for these options, or None if this version did not make one here.
 
     Args:
         options: options of the joint rig.
@@ -47,11 +48,11 @@ def kept(options: RigOptions) -> Reference | None:
 
 
 def keep(options: RigOptions, reference: Reference) -> None:
-    """Keep a reference and remove other versions; if that fails, the next build makes it again.
+    """Caches a reference, and removes those of other versions; if it fails, the next build refits.
 
     Args:
         options: options of the joint rig.
-        reference: the man's reference.
+        reference: the reference, fitted on the man.
     """
     path = _path(options)
     with contextlib.suppress(OSError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face board and the pictures of expressions, by a hand."""
+"""Tests the face board and the pictures of expressions with a real pointer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BLEND_JOY = r"risorius\.blend_expression\(.*expression=.joy."
 
 
 def board(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """A board is added, a handle is moved by the pointer, who leads is switched, it is removed."""
+    """Add a board, move a handle, switch to sliders and back, and remove the board."""
     clear(hand)
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_board")
@@ -65,7 +65,7 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _smirk(hand: Hand) -> Iterator[Check]:
-    """One corner of the mouth and one brow up, by their handles."""
+    """Raise one corner of the mouth and one brow by their handles."""
     for handle, way in (("face_L_mouth_corner", (14, -26)), ("face_L_brow_outer", (0, -40))):
         at = hand.ask("bone_at", bone=handle)
         hand.click(*at)
@@ -80,11 +80,11 @@ def _smirk(hand: Hand) -> Iterator[Check]:
     hand.picture("board-smirk")
 
 
-HEIGHT_OF_NOTHING = 500  # in the view, where no face lies
+HEIGHT_OF_NOTHING = 500  # y of a point in the view beside the face, pixels
 
 
 def grid(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The pictures of expressions: drawn, clicked, blended in by dragging, taken back."""
+    """Test the pictures of expressions: drawn, clicked, undone, blended by dragging, cancelled."""
     clear(hand)
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_animation", "RISORIUS_PT_expressions")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What several steps of drive.py do with the window."""
+"""Actions in Blender's window that several steps of drive.py share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hand import HEIGHT, WIDTH, Hand, LateError
 
-IN_VIEW = (WIDTH * 0.3, HEIGHT * 0.55)  # beside the face, over nothing
+IN_VIEW = (WIDTH * 0.3, HEIGHT * 0.55)  # a point of the 3D view beside the face, in pixels
 JAW = "CTRL_expressions.jawOpen"
 SMILE = ("CTRL_expressions.mouthCornerPullL", "CTRL_expressions.mouthCornerPullR")
 Check = tuple[str, bool]
@@ -16,7 +16,7 @@ Step = Callable[[Hand, Path], Iterator[Check]]
 
 
 class NotThereError(Exception):
-    """The extension has no such thing."""
+    """This Blender or the extension lacks a part, so a step cannot run."""
 
 
 def slider(hand: Hand, name: str = JAW) -> float:
@@ -28,7 +28,7 @@ def has_face(hand: Hand) -> bool:
 
 
 def open_tab(hand: Hand) -> None:
-    """N over the view, and clicks down the tabs of its sidebar until ours is open."""
+    """Press N over the view, and click on the sidebar's tabs until the tab Risorius is open."""
     hand.move(*IN_VIEW)
     hand.key("n")
     hand.wait("the sidebar", lambda: hand.ask("layout")["sidebar"][2] > 20)
@@ -48,27 +48,27 @@ def ready_tab(hand: Hand) -> None:
 
 
 def look_at_face(hand: Hand) -> None:
-    """The face alone in the view, from the front."""
+    """Show the face from the front, so that it fills the view."""
     hand.ask("settle")
     hand.ask("center")
     hand.still()
 
 
 def take_up(hand: Hand) -> None:
-    """The tool that drags the face, by the button at the top of the tab."""
+    """Activate the tool that drags the face by the button at the top of the tab."""
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is in the hand", lambda: hand.ask("drags"))
 
 
 def put_down(hand: Hand) -> None:
-    """The tool of before, by the same button."""
+    """Return to the previous tool by the same button."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is put down", lambda: not hand.ask("drags"))
 
 
 def clear(hand: Hand) -> None:
-    """A face at rest, without layers, keys and colours."""
+    """Put the face into the neutral pose and remove layers, keys, tweaks and heat map."""
     hand.ask("run", code=REST)
     hand.still()
 
@@ -91,14 +91,14 @@ with over(*view()[:2]):
 
 
 def open_section(hand: Hand, *panels: str) -> None:
-    """Fold all sections of the tab but one that lies in another, by clicks on their headers.
+    """Open a section of the tab by clicks on headers, and fold the others.
 
-    Headers have no shortcut that names them. So all are folded, and from below each is clicked on
-    until the wanted one is drawn; one that is not wanted is folded again. Buttons and values, which
-    have such shortcuts, are left alone.
+    No shortcut tells the name of a header. So all sections are folded, and headers are clicked from
+    the bottom up until the wanted section is drawn. A wrong section is folded again. Buttons and
+    values, which shortcuts can identify, are not clicked.
 
     Args:
-        panels: the section, after the one that it lies in.
+        panels: class names of the parent section, if any, and of the section.
     """
     scroll(hand, -40)
     left, top, _width, _height = hand.ask("layout")["sidebar"]
@@ -108,14 +108,14 @@ def open_section(hand: Hand, *panels: str) -> None:
     for panel in panels:
         hand.ask("watch", panel=panel)
         if not _opened(hand, panel):
-            scroll(hand)  # it lies below the window's end
+            scroll(hand)  # the section may be below the window's lower edge
             if not _opened(hand, panel):
                 raise LateError(f"no section {panel}")
     hand.still()
 
 
 def need_section(hand: Hand, panel: str) -> None:
-    """Open a section of the tab unless it is open. Args: panel  the section."""
+    """Open a section of the tab if it is closed. Args: panel  class name of the section."""
     scroll(hand, -40)
     hand.ask("watch", panel=panel)
     hand.ask("draw_again", panel=panel)
@@ -126,7 +126,7 @@ def need_section(hand: Hand, panel: str) -> None:
 
 
 def _opened(hand: Hand, panel: str) -> bool:
-    """Click on what may be a header, from below, until the section is drawn."""
+    """Click on possible headers from the bottom up. Returns whether the section was drawn."""
     left, top, _width, height = hand.ask("layout")["sidebar"]
     for y in range(top + height - 8, top + 8, -9):
         if hand.is_button(left + 60, y):
@@ -136,14 +136,14 @@ def _opened(hand: Hand, panel: str) -> bool:
         hand.ask("ready")
         if hand.ask("drawn", panel=panel):
             return True
-        hand.key("Escape")  # a menu, if it was one
+        hand.key("Escape")  # closes a menu, if the click opened one
         hand.click(left + 60, y)
         hand.key("Escape")
     return False
 
 
 def scroll(hand: Hand, notches: int = 25) -> None:
-    """Turn the wheel over the sidebar. Args: notches  down; below 0 up."""
+    """Turn the wheel over the sidebar. Args: notches  steps down; negative values go up."""
     left, top, width, height = hand.ask("layout")["sidebar"]
     hand.move(left + width - 40, top + height / 2)
     hand.wheel(notches)
@@ -151,12 +151,12 @@ def scroll(hand: Hand, notches: int = 25) -> None:
 
 
 def add_idle_life(hand: Hand) -> None:
-    """A layer of idle life, by the menu of the layers' list."""
+    """Add a layer of idle life by the menu of the layer list."""
     open_section(hand, "RISORIUS_PT_layers")
     x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
-    hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
+    hand.click(x, y - 21)  # the menu button above the minus; no shortcut identifies it
     hand.still()
-    # Inside of it from the first place on: above it the pointer closes it.
+    # The search starts inside the menu, because the menu closes if the pointer is above it.
     menu = [round(x) - 10, round(y) - 2, 150, 300]
     hand.click(*hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu))
     hand.wait("a layer is there", lambda: hand.ask("state")["layers"])

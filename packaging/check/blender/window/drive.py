@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""An animator's hand in a real window, and whether the face followed; see real_window.sh.
+"""Tests the user interface in a real window with a real pointer; see real_window.sh.
 
     python drive.py OUT USER STEPS COMMAND...
 
-OUT gets pictures and logs; USER is the folder of this Blender's user, with inside.py and man.dna;
-STEPS are names of functions of this file, with commas, or nothing; COMMAND starts Blender. Prints
-rows `row<TAB>check<TAB>passed<TAB>failed`, and `say` for what this Blender or the extension lacks.
+OUT is the folder of pictures and logs. USER is Blender's user folder with inside.py and man.dna.
+STEPS are names of steps, separated by commas; an empty string runs all. COMMAND starts Blender.
+Prints rows `row<TAB>check<TAB>passed<TAB>failed`, and `say<TAB>text` for steps that cannot run.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from voice import voice
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The empty tab, and its first button."""
+    """Open the empty tab and click on its first button, which adds a face."""
     hand.ask("quiet")
     open_tab(hand)
     yield "N and a click open the tab", hand.see("view()[2].active_panel_category") == "Risorius"
@@ -65,7 +65,7 @@ def start(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def import_file(hand: Hand, dna: Path) -> Iterator[Check]:
-    """File > Import > MetaHuman DNA, by menus and the file browser."""
+    """Import a file by File > Import > MetaHuman DNA and the file browser."""
     count = "len([o for o in bpy.data.objects if 'risorius_controls' in o])"
     hand.ask("run", code=f"bpy.app.driver_namespace['before'] = {count}")
     open_import(hand)
@@ -90,10 +90,10 @@ bpy.context.view_layer.update()
 
 
 def open_import(hand: Hand) -> None:
-    """Open the menus down to our entry and click on it."""
-    for x in (42, 50, 60, 34):  # File, behind Blender's own sign
-        for y in range(38, 560, 15):  # Import is the entry whose submenu has ours
-            # Anew for each: a pointer that looks where no submenu is closes the menu.
+    """Open File > Import and click on the entry for DNA files."""
+    for x in (42, 50, 60, 34):  # possible places of the menu File beside Blender's logo
+        for y in range(38, 560, 15):  # possible places of the entry Import
+            # The menu is opened again for each place, because it closes beside a submenu.
             hand.move(WIDTH / 2, HEIGHT / 2)
             hand.click(x, 13)
             hand.still()
@@ -107,23 +107,30 @@ def open_import(hand: Hand) -> None:
 
 
 def entry_beside(hand: Hand, y: int) -> tuple[float, float] | None:
-    """Our entry, where the entry of the File menu at this height has opened Import."""
+    """Find the entry for DNA files in an open submenu.
+
+    Args:
+        hand: the pointer.
+        y: height of the tried entry of the menu File, pixels.
+
+    Returns: place of the entry, or None if the submenu is not Import.
+    """
     import time
 
-    time.sleep(0.35)  # Blender opens a submenu when the pointer has rested
+    time.sleep(0.35)  # Blender opens a submenu after the pointer rests
     x, misses = 300, 0
     for below in range(y, HEIGHT - 30, 11):
         said = hand.under(x, below, "ctrl+c")
         if "risorius.import_dna" in said:
             return x, below
         misses = 0 if "import" in said else misses + 1
-        if misses == 2:  # one may be between two entries
+        if misses == 2:  # a single miss may be between two entries
             return None
     return None
 
 
 def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """A slider under the pointer: pressed, dragged, let go; undone by the keyboard."""
+    """Drag a slider with the pointer, release it, and undo by the keyboard."""
     look_at_face(hand)
     ready_tab(hand)
     need_section(hand, "RISORIUS_PT_controls")
@@ -156,7 +163,7 @@ def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """A layer by its menu: idle life, which moves the face when frames play."""
+    """Add a layer of idle life by its menu, and check that it moves the face over time."""
     clear(hand)
     ready_tab(hand)
     add_idle_life(hand)
@@ -168,7 +175,7 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
         hand.key("Right")
     frame = hand.ask("state")["frame"]
     yield f"frames go on by the keyboard (to {frame})", frame == 4
-    # A face that rests moves little until it blinks, which it does there.
+    # The first blink is the first large movement of idle life.
     hand.ask("run", code=f"bpy.context.scene.frame_end = {FIRST_BLINK}")
     hand.key("shift+Right")
     seen = difference(first, hand.still(), box)
@@ -178,11 +185,11 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
 
 
-FIRST_BLINK = 72  # frame of 24 a second, of idle life with the seed 0 of a first layer
+FIRST_BLINK = 72  # frame of the first blink of idle life at 24 frames per second, seed 0
 
 
 def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Heat map, a vertex under the pointer, solo: by clicks."""
+    """Use See Why by clicks: heat map, causes of a vertex, mute and show all."""
     clear(hand)
     hand.ask("run", code=POSE)
     look_at_face(hand)
@@ -254,7 +261,13 @@ STEPS: tuple[Step, ...] = (
 
 
 def run(hand: Hand, dna: Path, wanted: list[str]) -> int:
-    """All steps; prints their rows. Returns how many checks failed."""
+    """Run the steps and print their rows. Returns the number of failed checks.
+
+    Args:
+        hand: the pointer.
+        dna: the DNA file to import.
+        wanted: names of the steps; empty for all.
+    """
     strange = set(wanted) - {step.__name__ for step in STEPS}
     failed = len(strange)
     for name in sorted(strange):
@@ -277,14 +290,14 @@ def run(hand: Hand, dna: Path, wanted: list[str]) -> int:
 
 
 def hand_over(hand: Hand, name: str) -> None:
-    """After a failure: what the screen shows, and a face at rest for the next step."""
+    """After a failed step: save a picture of the screen, release the button and press Esc."""
     subprocess.run(["import", "-window", "root", str(hand.out / f"failed-{name}.png")], check=False)
     for keys in ("Escape", "Escape"):
         subprocess.run(["xdotool", "mouseup", "1", "key", keys], check=False)
 
 
 def main() -> int:
-    """See above; exit code 0 only if nothing failed."""
+    """Start Blender and run the steps. Exit code 0 only if no check failed."""
     out, user, wanted, *command = sys.argv[1:]
     folder = Path(out)
     with tempfile.TemporaryDirectory(prefix="talk", dir=user) as talk:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An animator's tasks, by a hand: two faces, a rig from a head, a studio and a bake; the menu."""
+"""Does tasks with a real pointer: the menu Face, two faces, a rig from a head, studio and bake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FACES = "[o.name for o in bpy.data.objects if 'risorius_controls' in o]"
 
 
 def face_menu(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The menu Face in the header, Frame Face, the outlines; all of it by F3 too."""
+    """Test the menu Face, Frame Face, the outlines, and the same operators by search (F3)."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -65,7 +65,7 @@ bpy.context.view_layer.objects.active = c
 
 
 def two_faces(hand: Hand, dna: Path) -> Iterator[Check]:
-    """A pose goes from one face to another; Shift-D; undo and redo; a face into another file."""
+    """Duplicate a face, copy a pose to it, undo and redo, and append faces from another file."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -122,7 +122,7 @@ bpy.context.view_layer.update()
 
 
 def _undo(hand: Hand) -> Iterator[Check]:
-    """Ten steps back and forth by the keyboard."""
+    """Undo and redo ten steps by the keyboard."""
     go_to(hand, 1)
     for step in range(10):
         go_to(hand, 2 + step)
@@ -147,7 +147,7 @@ for one in [o for o in bpy.data.objects if "risorius_controls" in o]:
 
 
 def _append(hand: Hand, dna: Path) -> Iterator[Check]:
-    """File > Append of another file's face."""
+    """Append the faces of another file by File > Append."""
     path = dna.parent / "other.blend"
     hand.ask("run", code=f"bpy.ops.wm.save_as_mainfile(filepath={str(path)!r}, copy=True)")
     before = hand.see("len(bpy.data.objects)")
@@ -158,7 +158,8 @@ def _append(hand: Hand, dna: Path) -> Iterator[Check]:
     hand.still()
     hand.picture("append-browser")
     area = hand.ask("ready")["areas"]["FILE_BROWSER"]
-    hand.click(area[0] + area[2] * 0.5, area[1] + area[3] * 0.5)  # 5.2 goes on editing a folder
+    # Click on the list, because Blender 5.2 otherwise keeps editing the folder's field.
+    hand.click(area[0] + area[2] * 0.5, area[1] + area[3] * 0.5)
     hand.key("a")
     hand.key("Return")
     hand.wait("the view is back", lambda: "VIEW_3D" in hand.ask("state")["areas"])
@@ -171,7 +172,7 @@ def _append(hand: Hand, dna: Path) -> Iterator[Check]:
 
 
 def own_head(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Make Rig from Shape Keys, of a head of few vertices."""
+    """Test Make Rig from Shape Keys on a head with few vertices, and its studio."""
     clear(hand)
     look_at_face(hand)
     hand.ask("run", code=HEAD)
@@ -237,7 +238,7 @@ bpy.context.view_layer.objects.active = own
 
 
 def studio(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Studio and F12, a bake and its way back by the banner, an export."""
+    """Test the studio with a rendering (F12), Bake Face and its undoing, and an export."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -284,7 +285,7 @@ bpy.app.handlers.render_complete.clear()
 
 
 def _bake(hand: Hand) -> Iterator[Check]:
-    """Two keys, Bake Face by the search, Done in the banner; glTF out."""
+    """Key two frames, bake the face by the search, undo it by Done, and export glTF."""
     ready_tab(hand)
     go_to(hand, 1)
     key_all(hand)

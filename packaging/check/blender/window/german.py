@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tab in another language: a picture of each panel, for people to look at."""
+"""Takes a picture of each panel in German, for visual inspection."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from take_tasks import REMOVE_ACTION
 
 
 def german(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The whole interface in German, each panel called by itself, and the menu Face."""
+    """Switch the interface to German, and take pictures of the tab, panels and menu Face."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -40,7 +40,13 @@ def german(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _call(hand: Hand, name: str, picture: str) -> None:
-    """A panel or menu under the pointer, its picture, and away with it."""
+    """Open a panel or menu under the pointer, take a picture, and close it.
+
+    Args:
+        hand: the pointer.
+        name: class name of the panel or menu.
+        picture: name of the picture.
+    """
     hand.move(*IN_VIEW)
     hand.ask("run", code=CALL.format(name))
     hand.picture(picture)

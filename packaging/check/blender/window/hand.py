@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A pointer and a keyboard on a Blender's window, its screen as an array, and questions to it."""
+"""Controls pointer and keyboard in Blender's window, reads the screen, and queries Blender."""
 
 from __future__ import annotations
 
@@ -18,35 +18,42 @@ from PIL import Image
 
 Pixels = npt.NDArray[np.int16]  # rows, columns, red green blue
 WIDTH, HEIGHT = 1440, 900
-PATIENCE = 240.0  # seconds for what a busy machine may take; waiting ends as soon as it is so
+PATIENCE = 240.0  # longest wait in seconds, for busy machines; waits end once the condition holds
 _PYTHON = "ctrl+c"  # over a button: copies the command that it runs
 _PATH = "ctrl+shift+alt+c"  # over a field: copies the path of its value
 
 
 class LateError(Exception):
-    """Something did not come to be, in a time that is long for every machine."""
+    """A condition did not become true within PATIENCE, or a search found nothing."""
 
 
 class Hand:
-    """Moves the pointer of a display; asks Blender only to know where things are and what is so."""
+    """Moves the pointer of a display. Asks Blender only for places on the screen and for its state.
+
+    Attributes:
+        talk: folder of the questions and answers; see inside.py.
+        out: folder of the pictures.
+        user: Blender's user folder.
+        blender: Blender's process.
+    """
 
     def __init__(self, talk: Path, out: Path, user: Path, blender: subprocess.Popen[bytes]) -> None:
         self.talk, self.out, self.user, self.blender = talk, out, user, blender
         self.count = 0
-        self.places: dict[str, tuple[float, float]] = {}  # where what was sought lay last
+        self.places: dict[str, tuple[float, float]] = {}  # pattern -> last place of the button
 
     # ---- questions
 
     def ask(self, name: str, **arguments: object) -> Any:
-        """What a function of inside.py gives.
+        """Call a function of inside.py in Blender and return its result.
 
         Args:
-            name: of the function.
-            arguments: of it.
+            name: name of the function.
+            arguments: its arguments; JSON must be able to represent them.
 
         Raises:
-            RuntimeError: it failed, or Blender is gone.
-            LateError: no answer.
+            RuntimeError: the function raised an exception, or Blender has ended.
+            LateError: no answer came within PATIENCE.
         """
         number, self.count = self.count, self.count + 1
         part = self.talk / "ask.part"
@@ -66,15 +73,15 @@ class Hand:
         return given["value"]
 
     def wait(self, what: str, holds: Callable[[], Any], patience: float = PATIENCE) -> Any:
-        """Wait until something holds.
+        """Wait until a condition is true, and return its value.
 
         Args:
-            what: in words, for the one who reads that it never did.
-            holds: gives what is true in the end.
-            patience: seconds.
+            what: text of the error.
+            holds: function that returns a true value in the end.
+            patience: longest wait in seconds.
 
         Raises:
-            LateError: it never held.
+            LateError: the condition stayed false.
         """
         end = time.monotonic() + patience
         while True:
@@ -88,11 +95,11 @@ class Hand:
     # ---- the pointer
 
     def do(self, *words: object) -> None:
-        """One command of xdotool."""
+        """Run a command of xdotool."""
         subprocess.run(["xdotool", *map(str, words)], check=True)
 
     def move(self, x: float, y: float) -> None:
-        """Put the pointer somewhere; Blender knows of it when this returns."""
+        """Move the pointer, and wait until Blender has handled the move."""
         self.do("mousemove", "--sync", round(x), round(y) - 1)
         self.do("mousemove", "--sync", round(x), round(y))
         self.ask("ready")
@@ -103,7 +110,12 @@ class Hand:
         self.ask("ready")
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
-        """Press, go there in steps, let go. Args: start, end  on the screen; steps  on the way."""
+        """Press the left button, move the pointer in steps, and release the button.
+
+        Args:
+            start, end: places on the screen, pixels.
+            steps: number of moves.
+        """
         self.begin_drag(start)
         self.go(start, end, steps)
         self.do("mouseup", 1)
@@ -115,7 +127,7 @@ class Hand:
         self.ask("ready")
 
     def go(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
-        """Move in steps, each of which Blender has seen."""
+        """Move the pointer in steps, and wait after each until Blender has handled it."""
         for number in range(1, steps + 1):
             share = number / steps
             at = [a + (b - a) * share for a, b in zip(start, end, strict=True)]
@@ -127,7 +139,7 @@ class Hand:
         self.ask("ready")
 
     def wheel(self, notches: int) -> None:
-        """Turn the wheel. Args: notches  down; below 0 up."""
+        """Turn the wheel. Args: notches  steps down; negative values go up."""
         self.do("click", "--repeat", abs(notches), "--delay", 12, 5 if notches > 0 else 4)
         self.ask("ready")
 
@@ -136,39 +148,39 @@ class Hand:
         self.ask("ready")
 
     def see(self, code: str) -> Any:
-        """The value of an expression, with the names of inside.py; only numbers, texts, lists."""
+        """The value of an expression evaluated in inside.py; JSON must be able to represent it."""
         return self.ask("see", code=code)
 
-    # ---- what stands under the pointer
+    # ---- buttons and fields under the pointer
 
     def under(self, x: float, y: float, *keys: str) -> str:
-        """What the shortcuts of the button at a place copy; empty where there is none."""
+        """The text that shortcuts copy from the button at a place; "" if there is no button."""
         there = [round(x), round(y)]
         self.do("mousemove", there[0], there[1] - 1, "mousemove", *there, "key", *keys)
         self.ask("ready")
         return str(self.ask("taken")).strip()
 
     def is_button(self, x: float, y: float) -> bool:
-        """Whether a button that runs something, or a value, is at a place."""
+        """Whether an operator button or a value field is at a place."""
         self.ask("taken")
         return bool(self.under(x, y, _PYTHON, _PATH))
 
     def find(self, pattern: str, of_field: bool = False, columns: tuple[float, ...] = (0.5,),
              area: list[int] | None = None, step: int = 10) -> tuple[float, float]:  # fmt: skip
-        """Where in the sidebar the button is that runs a command, or the field of a value.
+        """Find the button of a command or the field of a value in the sidebar. Returns its place.
 
-        Each place is asked by the shortcuts that Blender has for it, so this needs no knowledge of
-        the layout.
+        Moves the pointer over many places. At each, Blender's shortcut copies the command of the
+        button or the path of the value, so the search does not depend on the layout.
 
         Args:
-            pattern: regular expression of the command or of the path of the value.
-            of_field: whether it is a value.
-            columns: where across the sidebar it is looked for, 0 to 1.
-            area: left, top, width, height instead of the sidebar.
-            step: pixels from one place to the next.
+            pattern: regular expression of the command or of the value's path.
+            of_field: search for a value instead of a command.
+            columns: horizontal places to search, as fractions of the width.
+            area: left, top, width, height of another area than the sidebar.
+            step: vertical distance of the places, pixels.
 
         Raises:
-            LateError: it is not there.
+            LateError: no place matches.
         """
         left, top, width, height = (area or self.ask("layout")["sidebar"])[:4]
         keys = _PATH if of_field else _PYTHON
@@ -189,8 +201,11 @@ class Hand:
         return np.frombuffer(raw, np.uint8).reshape(HEIGHT, WIDTH, 3).astype(np.int16)
 
     def still(self) -> Pixels:
-        """The screen when two looks at it in a row are the same, all drawn anew before each: on a
-        busy machine it stands still for a while because nothing has been drawn yet."""
+        """The screen once two pictures in a row are equal.
+
+        Blender redraws before each picture, because on a busy machine an undrawn screen is
+        unchanged too.
+        """
         seen = self._drawn()
         end = time.monotonic() + PATIENCE
         while True:
@@ -203,12 +218,17 @@ class Hand:
             seen = now
 
     def _drawn(self) -> Pixels:
-        for _ in range(2):  # the second answer comes after what the first asked for
+        for _ in range(2):  # the second answer comes after the redraw of the first request
             self.ask("redraw")
         return self.screen()
 
     def picture(self, name: str, box: tuple[int, int, int, int] | None = None) -> None:
-        """Keep the screen as OUT/NAME.png. Args: box  left, top, right, bottom of a part."""
+        """Save the screen as OUT/NAME.png.
+
+        Args:
+            name: name of the picture.
+            box: left, top, right, bottom of the saved part; None saves the whole screen.
+        """
         pixels = self.still().astype(np.uint8)
         image = Image.fromarray(pixels)
         (image.crop(box) if box else image).save(self.out / f"{name}.png")
@@ -223,11 +243,11 @@ def _grid(
 
 
 def difference(one: Pixels, other: Pixels, box: list[float]) -> float:
-    """Share of the pixels in a box that differ, visibly.
+    """The fraction of pixels in a box that differ by more than 12 of 255 in a channel.
 
     Args:
-        one, other: screens.
-        box: left, top, right, bottom.
+        one, other: pictures of the screen.
+        box: left, top, right, bottom in pixels.
     """
     left, top, right, bottom = (round(max(v, 0)) for v in box)
     part = np.abs(one[top:bottom, left:right] - other[top:bottom, left:right]).max(axis=2)

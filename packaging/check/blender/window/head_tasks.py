@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A head without expressions becomes a face, by a hand: landmarks, one moved, Esc, the rig."""
+"""Makes a rig from a head without expressions with a real pointer: landmarks, Esc, the rig."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from file_tasks import FACES
 from hand import Hand, difference
 from menus import save_as, search
 
-LONG = 1800.0  # seconds: the machine may have other work
+LONG = 1800.0  # longest wait in seconds, because the machine may be busy
 
 
 def plain_head(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Find Landmarks, Make Rig from Head and Conform Face to Head, of the man's remeshed head."""
+    """Test Find Landmarks, Make Rig from Head and Conform Face to Head on a decimated head."""
     clear(hand)
     look_at_face(hand)
     hand.ask("run", code=PLAIN)
@@ -81,7 +81,7 @@ def _conform(hand: Hand) -> Iterator[Check]:
     hand.ask("run", code=REMOVE_NEW)
 
 
-# The man's own head: other polygons, nothing but the skin.
+# Adds the man's head with fewer polygons and without shape keys, as the object "Plain Head".
 PLAIN = """
 source = next(o for o in bpy.data.objects if o.get("dna_mesh") == 0)
 mesh = source.data.copy()

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Answers, in a Blender with a window, what drive.py asks of it; the hand itself is the X server's.
+"""Runs in a Blender with a window, and answers the questions of drive.py.
 
     blender --python inside.py -- TALK
 
-TALK is a folder: ask-N.json comes, answer-N.json goes, N from 0 on. What is asked are the functions
-of this file by their names. Questions are answered by the event loop, so that an answer also says
-that what the pointer did before has been dealt with.
+TALK is a folder. drive.py writes ask-N.json with the name and the arguments of a function of this
+file; this file writes its result to answer-N.json, N = 0, 1, 2 and so on. Blender's event loop
+answers, so an answer also proves that Blender has handled all earlier input of the pointer.
 """
 
 import json
@@ -20,7 +20,7 @@ from bpy_extras import view3d_utils
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
 
-__all__ = ["Vector", "world_to_camera_view"]  # what questions of `see` use
+__all__ = ["Vector", "world_to_camera_view"]  # names that expressions of see() use
 
 TALK = Path(sys.argv[sys.argv.index("--") + 1])
 _next = [0]
@@ -32,7 +32,7 @@ def window():
 
 
 def view():
-    """The 3D view of the main window: area, its drawing region, its sidebar."""
+    """The 3D view of the main window: its area, its drawing region and its sidebar."""
     area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
     regions = {r.type: r for r in area.regions}
     return area, regions["WINDOW"], regions["UI"]
@@ -43,7 +43,7 @@ def header_of_view():
 
 
 def rectangle(item):
-    """Of an area or region: left, top, width, height on the screen."""
+    """Left, top, width and height of an area or region on the screen, pixels."""
     return [item.x, window().height - item.y - item.height, item.width, item.height]
 
 
@@ -64,11 +64,11 @@ def module(name):
     return sys.modules[f"bl_ext.user_default.risorius.{name}"]
 
 
-# ---- what is asked
+# ---- functions for drive.py
 
 
 def ready():
-    """Versions, and what areas there are."""
+    """Blender's version, and the rectangles of the areas by type."""
     return {
         "blender": bpy.app.version_string,
         "areas": {a.type: rectangle(a) for a in window().screen.areas},
@@ -76,30 +76,30 @@ def ready():
 
 
 def layout():
-    """Where the 3D view and its sidebar are."""
+    """The rectangles of the 3D view and of its sidebar."""
     _area, drawing, sidebar = view()
     return {"view": rectangle(drawing), "sidebar": rectangle(sidebar)}
 
 
 def show_tab(wide=0):
-    """The sidebar with our tab."""
+    """Open the sidebar with the tab Risorius. Returns whether the tab is active."""
     area, _drawing, sidebar = view()
     area.spaces.active.show_region_ui = True
     try:
         sidebar.active_panel_category = "Risorius"
-    except (AttributeError, TypeError):  # before it was first drawn
+    except (AttributeError, TypeError):  # raised until the sidebar is first drawn
         return False
     area.tag_redraw()
     return sidebar.active_panel_category == "Risorius"
 
 
 def quiet():
-    """The file browser in this window, no cube; a light that shows relief."""
+    """Set preferences for the tests, such as the file browser in this window; remove the cube."""
     preferences = bpy.context.preferences
     preferences.view.filebrowser_display_type = "SCREEN"
     preferences.view.show_tooltips = False
     preferences.use_preferences_save = False
-    preferences.system.use_region_overlap = False  # a click beside the sections is nobody's
+    preferences.system.use_region_overlap = False  # so that clicks in the sidebar miss the view
     for name in ("Cube", "Light"):
         if name in bpy.data.objects:
             bpy.data.objects.remove(bpy.data.objects[name])
@@ -107,7 +107,7 @@ def quiet():
 
 
 def clipboard(text=None):
-    """What a button's shortcut copied; or put another text there."""
+    """The text of the clipboard. Args: text  a new text; None keeps the old one."""
     manager = bpy.context.window_manager
     if text is not None:
         manager.clipboard = text
@@ -115,7 +115,7 @@ def clipboard(text=None):
 
 
 def taken():
-    """What a button's shortcut copied since this was asked last."""
+    """The text that a shortcut has copied since the last call; blank if none."""
     text = clipboard()
     if text.strip():
         clipboard(" ")
@@ -128,7 +128,7 @@ def see(code):
 
 
 def state():
-    """What the face has now."""
+    """Frame, areas, last operator and, if there is a face, its sliders, layers and modes."""
     found = rig()
     operators = bpy.context.window_manager.operators
     out = {
@@ -154,14 +154,14 @@ def state():
 
 
 def head():
-    """The mesh that has most vertices of those that are shown."""
+    """The visible mesh of the face with the most vertices."""
     shown = [o for o in bpy.data.objects if o.get("risorius_rig") and o.type == "MESH"]
     shown = [o for o in shown if "dna_mesh" in o and o.visible_get()]
     return max(shown, key=lambda o: len(o.data.vertices))
 
 
 def points():
-    """float64[V, 3] of the head as it is shown, in the world."""
+    """float64[V, 3]: the evaluated vertices of the head in world space."""
     seen = head().evaluated_get(bpy.context.evaluated_depsgraph_get())
     flat = np.empty(len(seen.data.vertices) * 3, np.float32)
     seen.data.vertices.foreach_get("co", flat)
@@ -170,7 +170,7 @@ def points():
 
 
 def on_screen(place):
-    """A place of the world on the screen, or None behind the eye."""
+    """The pixel of a point of world space on the screen, or None behind the viewer."""
     area, drawing, _sidebar = view()
     at = view3d_utils.location_3d_to_region_2d(drawing, area.spaces.active.region_3d, place)
     if at is None:
@@ -180,13 +180,13 @@ def on_screen(place):
 
 
 def face_box():
-    """Where the head lies on the screen: left, top, right, bottom."""
+    """The bounds of the head on the screen: left, top, right, bottom in pixels."""
     spots = np.array([on_screen(p) for p in points()[::7]])
     return [*spots.min(axis=0), *spots.max(axis=0)]
 
 
 def moved_by(control):
-    """Where on the screen the vertex is that a control moves most, and the vertex."""
+    """The vertex that a control moves most, and its place on the screen."""
     live = module("scene.character.runtime").of(rig())
     rests = np.array(live.rests, np.float32)
     raised = rests.copy()
@@ -199,14 +199,17 @@ def moved_by(control):
 
 
 def vertex_at(vertex):
-    """Where a vertex of the head is now: in the world and on the screen."""
+    """The place of a vertex of the head in world space and on the screen."""
     place = points()[vertex]
     return {"world": place.tolist(), "at": on_screen(place)}
 
 
 def seen_in_front(vertex):
-    """Where a vertex of the head is in the view that shows the face most from the front: of one
-    view or four."""
+    """The place of a vertex on the screen, in the view that shows the face best from the front.
+
+    Args:
+        vertex: index of a vertex of the head.
+    """
     area, _drawing, _sidebar = view()
     regions = [r for r in area.regions if r.type == "WINDOW" and r.data is not None]
     region = max(regions, key=lambda r: -r.data.view_matrix.inverted().col[2].y)
@@ -216,12 +219,12 @@ def seen_in_front(vertex):
 
 
 def drags():
-    """Whether the tool that drags the face is in the hand."""
+    """Whether the tool that drags the face is active."""
     return module("ui.drag.tool").is_active(bpy.context)
 
 
 def two_handles():
-    """The lowest handle and the next that lies 20 pixels away, with their numbers and places."""
+    """The lowest handle, and the nearest handle more than 20 pixels away: points and places."""
     one, live = rig(), module("scene.character.runtime").of(rig())
     found = module("scene.drag.picking").handles_of(bpy.context, one, live)
     found = [f for f in found if on_screen(f[1]) is not None]
@@ -233,17 +236,17 @@ def two_handles():
 
 
 def kept(key):
-    """A list that the controls bear; empty where they do not."""
+    """A list property of the control armature; empty if it is missing."""
     return list(rig()["risorius_controls"].get(key, ()))
 
 
 def bone_at(bone):
-    """Where the middle of a bone of the controls is on the screen."""
+    """The place of the middle of a control bone on the screen."""
     return on_screen(bone_in_world(bone))
 
 
 def outline_at(bone):
-    """A point of a control bone's outline on the screen, one that lies in the view."""
+    """The rightmost point of a control bone's outline inside the view, on the screen."""
     one = rig()["risorius_controls"].pose.bones[bone]
     size = one.bone.length if one.use_custom_shape_bone_size else 1.0
     turn = one.custom_shape_translation, one.custom_shape_rotation_euler.to_quaternion()
@@ -262,18 +265,18 @@ def bones():
 
 
 def active_bone():
-    """The bone that was clicked last."""
+    """The name of the active pose bone, or ""."""
     bone = bpy.context.active_pose_bone
     return bone.name if bone else ""
 
 
 def is_modal():
-    """Whether an operator has the pointer."""
+    """Whether a modal operator is running."""
     return len(window().modal_operators) > 0
 
 
 def board_in_view(names):
-    """Whether the face and all of these bones lie in the view."""
+    """Whether the face and all named control bones are inside the view."""
     left, top, width, height = rectangle(view()[1])
     spots = [on_screen(bone_in_world(n)) for n in names] + [face_box()[:2], face_box()[2:]]
     inside = [s and left <= s[0] <= left + width and top <= s[1] <= top + height for s in spots]
@@ -281,13 +284,13 @@ def board_in_view(names):
 
 
 def least_travel(names):
-    """Pixels on the screen from rest to the end of the shortest way of these handles."""
+    """The smallest travel of these handles from rest to the end of an axis, pixels."""
     controls, found = rig()["risorius_controls"], []
     for bone in (controls.pose.bones[n] for n in names):
         limit = next((c for c in bone.constraints if c.type == "LIMIT_LOCATION"), None)
         if limit is None:
             continue
-        board = bone.parent  # it is scaled, and its handles with it
+        board = bone.parent  # the scale of the board also applies to its handles
         held = board.matrix @ board.bone.matrix_local.inverted() if board else Matrix()
         rest = controls.matrix_world @ held @ bone.bone.matrix_local
         start = np.array(on_screen(rest.translation))
@@ -300,7 +303,7 @@ def least_travel(names):
 
 
 def bone_in_world(name):
-    """The middle of a bone of the controls."""
+    """The middle of a control bone in world space."""
     controls = rig()["risorius_controls"]
     bone = controls.pose.bones[name]
     return controls.matrix_world @ ((bone.head + bone.tail) / 2)
@@ -312,7 +315,7 @@ def board_leads():
 
 
 def browser_region(kind):
-    """Where a region of the file browser is."""
+    """The rectangle of a region of the file browser. Args: kind  type of the region."""
     area = next(a for a in window().screen.areas if a.type == "FILE_BROWSER")
     return rectangle(next(r for r in area.regions if r.type == kind))
 
@@ -324,7 +327,7 @@ def timeline():
 
 
 def timeline_at(frame):
-    """Where on the screen a frame is in the timeline's ruler."""
+    """The place of a frame in the timeline's ruler, on the screen."""
     region = timeline()
     x, _y = region.view2d.view_to_region(frame, 0, clip=False)
     left, top, _width, _height = rectangle(region)
@@ -332,26 +335,30 @@ def timeline_at(frame):
 
 
 def timeline_header():
-    """The timeline's header on the screen, and the scene's last frame."""
+    """The rectangle of the timeline's header, and the scene's last frame."""
     area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
     region = next(r for r in area.regions if r.type == "HEADER")
     return [*rectangle(region), bpy.context.scene.frame_end]
 
 
 def keyed_frames_of_active():
-    """The same of the face whose armature is the active object."""
+    """keyed_frames() of the face whose control armature is the active object."""
     return keyed_frames(bpy.context.view_layer.objects.active)
 
 
 def keyed_frames(controls=None):
-    """Frames at which the action of the face has keys."""
+    """Frames at which a face's action has keys.
+
+    Args:
+        controls: control armature; None takes the first face.
+    """
     data = (controls or rig()["risorius_controls"]).animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
 
 
 def seen_keys(editor="DOPESHEET_EDITOR"):
-    """Frames of the keys of the face that the timeline, or another editor in its place, shows."""
+    """Frames of the keys that the timeline, or another editor in its place, shows."""
     area = next(a for a in window().screen.areas if a.type == editor)
     region = next(r for r in area.regions if r.type == "WINDOW")
     with over(area, region):
@@ -360,7 +367,7 @@ def seen_keys(editor="DOPESHEET_EDITOR"):
 
 
 def curves_below():
-    """Keys of the face's own action: path and index, frames and values."""
+    """(data path, array index, [[frame, value], ...]) of each curve of the face's action."""
     data = rig()["risorius_controls"].animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     keys = [(c.data_path, c.array_index, [list(p.co) for p in c.keyframe_points]) for c in curves]
@@ -368,23 +375,23 @@ def curves_below():
 
 
 def curves_of_empty():
-    """Curves of the Empty that the eyes follow."""
+    """The curves of the Empty "Look Here", which the eyes follow."""
     action = bpy.data.objects["Look Here"].animation_data.action
     return list(module("scene.base.compat").curves_of(action))
 
 
 def tweaks():
-    """Whether a tweak is on."""
+    """Whether a tweak is active."""
     return module("scene.animation.tweaks").of(rig()["risorius_controls"]) is not None
 
 
 def given_by_board(control):
-    """What the board gives of a raw control."""
+    """The value that the board gives to a raw control."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))
 
 
 def pictures_drawn(expression):
-    """Whether the picture of an expression is there."""
+    """Whether the picture of an expression has been drawn."""
     previews = module("ui.expressions.previews")
     items, _troubles = module("scene.expressions.library").all_items(
         module("scene.expressions.library").folder(bpy.context)
@@ -394,19 +401,19 @@ def pictures_drawn(expression):
 
 
 def has(operator):
-    """Whether there is an operator of this name."""
+    """Whether an operator exists. Args: operator  for example "risorius.key"."""
     group, _, name = operator.partition(".")
     return name in dir(getattr(bpy.ops, group))
 
 
 def found_causes():
-    """What See Why last found of a vertex."""
+    """The last result of See Why: the vertex and its first cause; None without a result."""
     found = module("scene.see_why.causes").last(rig())
     return None if found is None else {"vertex": found.vertex, "first": found.causes[0].name}
 
 
 def settle():
-    """The view from the front on the face, as an import leaves it."""
+    """Set the 3D view to the orthographic front view, as an import does."""
     area, drawing, _sidebar = view()
     with over(area, drawing):
         bpy.ops.view3d.view_axis(type="FRONT")
@@ -416,7 +423,7 @@ def settle():
 
 
 def center(zoom=1.0):
-    """The face in the middle of the view, so high that it fills it."""
+    """Centre the face in the view so that it fills the height. Args: zoom  magnification."""
     area, _drawing, _sidebar = view()
     spots = points()
     eye = area.spaces.active.region_3d
@@ -426,7 +433,11 @@ def center(zoom=1.0):
 
 
 def watch(panel):
-    """Count from now on how often a section of the tab is drawn: only open ones are."""
+    """Start to count the draw calls of a panel or menu. Blender draws only open ones.
+
+    Args:
+        panel: class name.
+    """
     kind = getattr(bpy.types, panel)
     draw = kind.draw
 
@@ -441,7 +452,7 @@ def watch(panel):
 
 
 def draw_again(panel):
-    """Let the sidebar be drawn anew, which it is before the next question is answered."""
+    """Request a redraw of the sidebar, which happens before the next answer. Resets the count."""
     _drawn[panel] = 0
     _area, _drawing, sidebar = view()
     sidebar.tag_redraw()
@@ -449,13 +460,15 @@ def draw_again(panel):
 
 
 def drawn(panel):
-    """Whether a section was drawn since `draw_again`."""
+    """Whether a panel or menu was drawn since draw_again()."""
     return _drawn[panel] > 0
 
 
 def redraw():
-    """Let the main regions be drawn anew, which they are before the next question is answered: of
-    the sidebar 4.3 would close the menus."""
+    """Request a redraw of the main regions, which happens before the next answer.
+
+    The sidebar is left out, because Blender 4.3 would close open menus.
+    """
     for area in window().screen.areas:
         for region in area.regions:
             if region.type == "WINDOW":
@@ -464,19 +477,19 @@ def redraw():
 
 
 def run(code):
-    """Python that sets the scene for a picture; the checks never use it."""
+    """Run Python code that prepares the scene."""
     exec(code, globals())
     return True
 
 
 def leave():
-    """End Blender, without a word on unsaved work."""
+    """End Blender without the question about unsaved changes."""
     sys.stdout.flush()
     os._exit(0)
 
 
 def answer():
-    """Answer all that is asked, and come again."""
+    """Answer all waiting questions. Returns the seconds until Blender's timer calls again."""
     while True:
         path = TALK / f"ask-{_next[0]}.json"
         if not path.exists():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A step of drive.py: keys are seen, and a tweak takes them; I is pressed over a slider."""
+"""A step of drive.py: keys are visible in the timeline, and a tweak layer takes new keys."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FIELD = r'CTRL_expressions\.jawOpen"\]$'
 
 
 def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Key All with the head in hand, I over a slider, the same during a tweak, and Done."""
+    """Test Key All with the head selected, I over a slider, I during a tweak, and Done."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -44,11 +44,17 @@ def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _press_i(hand: Hand, frame: int, notches: int) -> None:
-    """Go to a frame, turn the wheel over the slider of the jaw with Ctrl held, press I over it."""
+    """Go to a frame, change the jaw's slider by Ctrl and the wheel, and press I over it.
+
+    Args:
+        hand: the pointer.
+        frame: the frame.
+        notches: steps of the wheel.
+    """
     go_to(hand, frame)
     place = hand.find(FIELD, of_field=True, columns=(0.62, 0.8))
     before = slider(hand, JAW)
-    # A drag has no bound here: Blender moves the pointer back while it lasts.
+    # The wheel is used because Blender moves the pointer back during a drag.
     hand.move(*place)
     hand.do("keydown", "ctrl")
     hand.wheel(-notches)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Blender's search, the menu Face in the view's header, and dialogs, by keys and clicks."""
+"""Uses Blender's search, the menu Face, dialogs and the file browser by keys and clicks."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from hand import Hand, LateError
 
 
 def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> None:
-    """F3 over the view, words, Return.
+    """Run an operator by Blender's search (F3).
 
     Args:
-        hand: has the window.
-        words: of the entry.
-        operator: what has run in the end, as Blender notes it; "" where it opens something.
-        keys: what takes the entry.
+        hand: the pointer.
+        words: search text.
+        operator: bl_idname of the last operator afterwards; "" does not check it, for dialogs.
+        keys: keys that confirm the entry.
 
     Raises:
-        LateError: it has not run.
+        LateError: the operator did not run.
     """
     hand.move(*IN_VIEW)
     hand.key("F3")
-    for _ in range(3):  # the first search of a session makes all menus
+    for _ in range(3):  # the first search of a session is slow, because it builds all menus
         hand.ask("ready")
     hand.type(words)
-    time.sleep(0.4)  # the list follows the words
+    time.sleep(0.4)  # Blender updates the list of results after typing
     hand.ask("ready")
     hand.key(keys)
     hand.ask("ready")
@@ -37,7 +37,7 @@ def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> 
 
 
 def open_face_menu(hand: Hand) -> tuple[float, float]:
-    """Click on the menus of the view's header until the menu Face is drawn; returns where it is."""
+    """Click on the menus of the view's header until Face opens. Returns its x and upper edge."""
     hand.ask("watch", panel="RISORIUS_MT_face")
     left, top, width, height = hand.see("rectangle(header_of_view())")
     hand.do("key", "Escape")
@@ -53,40 +53,49 @@ def open_face_menu(hand: Hand) -> tuple[float, float]:
 
 
 def in_menu(hand: Hand, pattern: str, x: float, top: float, high: int = 420) -> None:
-    """Click on the entry of an open menu that runs a command."""
+    """Click on the entry of an open menu whose command matches a pattern.
+
+    Args:
+        hand: the pointer.
+        pattern: regular expression of the command.
+        x, top: place of the menu, pixels.
+        high: height of the searched area, pixels.
+    """
     area = [round(x) - 20, round(top), 200, high]
     hand.click(*hand.find(pattern, columns=(0.35,), area=area, step=9))
 
 
 def accept(hand: Hand, done: Callable[[], bool]) -> None:
-    """Return in a dialog that has just been opened under the pointer, which goes off its fields.
+    """Confirm a dialog that has just opened under the pointer.
+
+    Return over a field would edit the field, so the pointer is first moved to the title.
 
     Args:
-        hand: has the window.
-        done: whether it has done what it is for.
+        hand: the pointer.
+        done: whether the dialog's operator has run.
 
     Raises:
-        LateError: it has not.
+        LateError: the operator did not run.
     """
-    for above in (30, 55, 80):  # over its title, which lies above the first row or the second
+    for above in (30, 55, 80):  # possible heights of the title above the pointer, pixels
         hand.move(IN_VIEW[0], IN_VIEW[1] - above)
         hand.key("Return")
         try:
             hand.wait("a dialog", done, 15.0)
         except LateError:
-            hand.key("Return")  # it was over a field: that is left
+            hand.key("Return")  # ends editing, if the pointer was over a field
         else:
             return
     raise LateError("the dialog does nothing")
 
 
 def name_file(hand: Hand, path: Path, ending: str = "Return") -> None:
-    """Write a path into the file browser's upper field, and go.
+    """Type a path into the upper field of the file browser and confirm.
 
     Args:
-        hand: has the window.
-        path: of a file that is there, or of a folder.
-        ending: the key that goes, or "".
+        hand: the pointer.
+        path: path of an existing file, or of a folder.
+        ending: key that confirms the file browser; "" opens the folder only.
     """
     hand.wait("the file browser", lambda: "FILE_BROWSER" in hand.ask("state")["areas"])
     hand.still()
@@ -96,7 +105,7 @@ def name_file(hand: Hand, path: Path, ending: str = "Return") -> None:
 
 
 def save_as(hand: Hand, path: Path) -> None:
-    """Write a folder into the upper field, a name into the lower one, and go."""
+    """Type a folder and a file name into the fields of the file browser and confirm."""
     name_file(hand, path.parent, ending="")
     _write(hand, "EXECUTE", 0.3, path.name)
     hand.key("Return")
@@ -104,7 +113,14 @@ def save_as(hand: Hand, path: Path) -> None:
 
 
 def _write(hand: Hand, region: str, column: float, text: str) -> None:
-    """Into the field of a region of the file browser; the pointer is over its files in the end."""
+    """Type text into the field of a region of the file browser, then move over the file list.
+
+    Args:
+        hand: the pointer.
+        region: type of the region.
+        column: horizontal place of the field, as a fraction of the region's width.
+        text: the text.
+    """
     left, top, width, height = hand.ask("browser_region", kind=region)
     hand.move(left + width * column, top + height / 2)
     hand.do("click", "--repeat", 2, "--delay", 60, 1)

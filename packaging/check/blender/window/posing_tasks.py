@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An animator's tasks, by a hand: a smirk with one brow up, two seconds of keys, a gaze."""
+"""Does animators' tasks with a real pointer: a smirk with one brow up, two seconds, a gaze."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BROW = ("CTRL_expressions.browRaiseOuterL", "CTRL_expressions.browRaiseOuterR")
 
 
 def smirk(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """One corner of the mouth up and one brow: by sliders, by dragging, mirrored."""
+    """Raise one corner of the mouth and one brow: by sliders, by dragging, and mirrored."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -65,7 +65,7 @@ def _other(name: str) -> str:
 
 
 def _type_search(hand: Hand, words: str) -> None:
-    """Words typed into the field of the panel Controls."""
+    """Type words into the search field of the panel Controls; "" clears the field."""
     scroll(hand, -40)
     x, y = hand.find("risorius_search$", of_field=True, columns=(0.3,))
     hand.move(x, y)
@@ -80,7 +80,13 @@ def _type_search(hand: Hand, words: str) -> None:
 
 
 def _wheel(hand: Hand, control: str, notches: int) -> None:
-    """The wheel over a slider with Ctrl held."""
+    """Change a slider by Ctrl and the wheel.
+
+    Args:
+        hand: the pointer.
+        control: name of the control.
+        notches: steps of the wheel.
+    """
     pattern = control.replace(".", r"\.") + r'"\]$'
     hand.move(*hand.find(pattern, of_field=True, columns=(0.62, 0.8)))
     hand.do("keydown", "ctrl")
@@ -90,7 +96,7 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Rest, a blink, surprise, rest; keys are seen in every editor, one column is moved."""
+    """Key rest, a blink, surprise and rest. Check the keys in all editors, and move one column."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -112,7 +118,7 @@ def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
-    """Dope sheet and graph editor in the place of the timeline, as large as the window."""
+    """Check dope sheet and graph editor, which replace the timeline and fill the window."""
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
     hand.ask("run", code=KEEP_EDITOR)
@@ -160,7 +166,7 @@ for area in window().screen.areas:
 
 
 def gaze(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Eyes follow an Empty that moves, the head turns against it, a blink on the turn."""
+    """Let the eyes follow a moving Empty, turn the head the other way, and add a blink."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -197,7 +203,7 @@ def gaze(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _turn(hand: Hand) -> Iterator[Check]:
-    """Select the outline of the head by a click, turn it, key it; blink on the way."""
+    """Select the head bone by a click on its outline, turn and key it, and add a blink."""
     hand.ask("center", zoom=0.6)
     hand.still()
     hand.click(*hand.ask("outline_at", bone="head"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ten seconds of docs/animator.md, step by step, by a hand; its pictures are that page's."""
+"""Does the steps of docs/animator.md with a real pointer, and takes the pictures of that page."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from common import (
 )
 from hand import WIDTH, Hand, difference
 
-LAST = 240  # frames: ten seconds
+LAST = 240  # last frame; ten seconds
 
 
 def go_to(hand: Hand, frame: int) -> None:
-    """A click into the timeline."""
+    """Go to a frame by a click into the timeline."""
     hand.click(*hand.ask("timeline_at", frame=frame))
     hand.wait(f"frame {frame}", lambda: hand.ask("state")["frame"] == frame)
 
 
 def key_all(hand: Hand) -> None:
-    """The button at the top of the tab."""
+    """Click on Key All at the top of the tab."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.key\(", columns=(0.85, 0.75)))
 
 
 def expression(hand: Hand, name: str) -> None:
-    """Search for an expression and click on it, in its open section."""
+    """Search for an expression and click on its picture. The section must be open."""
     hand.ask("run", code=f"bpy.context.window_manager.risorius_expressions.search = {name!r}")
     hand.wait("its picture is drawn", lambda: hand.ask("pictures_drawn", expression=name))
     scroll(hand)
@@ -46,7 +46,7 @@ def expression(hand: Hand, name: str) -> None:
 
 
 def shot(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """From the fresh face to ten seconds that play: steps 3 to 12 of the page."""
+    """Animate ten seconds, starting with a new face: steps 3 to 12 of the page."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -98,11 +98,11 @@ def _idle(hand: Hand) -> Iterator[Check]:
 
 
 def _play(hand: Hand) -> Iterator[Check]:
-    """The end of the scene is typed in, the frames are looked at, and it plays."""
+    """Type the scene's last frame, compare the pixels of some frames, and play."""
     header = hand.ask("timeline_header")
     columns = tuple(1.0 - 0.015 * step for step in range(40))
     place = hand.find("frame_end", of_field=True, columns=columns, area=header)
-    hand.move(place[0] - 30, place[1])  # at its end is an arrow, which adds one
+    hand.move(place[0] - 30, place[1])  # away from the arrow at the field's end, which adds 1
     hand.do("click", "--repeat", 2, "--delay", 60, 1)
     hand.key("ctrl+a")
     hand.type(str(LAST))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tool that drags the face by its skin, by a hand: in all views, with pins and handles."""
+"""Tests the tool that drags the skin with a real pointer: in all views, with pins and handles."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Place = tuple[float, float]
 
 
 def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The skin itself: the corner of the mouth is dragged by the pointer, with the tool in hand."""
+    """Drag the corner of the mouth; test Esc, undo, dragging a single control, pins and handles."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
     take_up(hand)
-    hand.ask("run", code=HANDLES.format(False))  # a press near one takes that, not what is measured
+    hand.ask("run", code=HANDLES.format(False))  # because a press near a handle takes the handle
     corner = hand.ask("moved_by", control=SMILE[0])
     start = corner["at"]
     end = (start[0] + 14, start[1] - 12)
@@ -65,7 +65,7 @@ def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def handles(hand: Hand) -> Iterator[Check]:
-    """Handles are selected by clicks, dragged together, keyed by I, hidden by H, shown by Alt-H."""
+    """Test handles: select by clicks, drag together, key by I, hide by H, show by Alt-H."""
     hand.ask("run", code=HANDLES.format(True))
     selected = "risorius_handles_selected"
     low, high = hand.ask("two_handles")
@@ -96,7 +96,7 @@ def handles(hand: Hand) -> Iterator[Check]:
 
 
 def _end(hand: Hand, start: Place, end: Place) -> Iterator[Check]:
-    """The tool is put down."""
+    """Deactivate the tool, and check that its handles are hidden and the skin cannot be dragged."""
     before = hand.still()
     put_down(hand)
     box = hand.ask("face_box")
@@ -117,7 +117,10 @@ bpy.context.view_layer.objects.active = rig()["risorius_controls"]
 
 
 def _pressed(hand: Hand, start: Place) -> tuple[int, Place]:
-    """The vertex that a press takes, and how far from the pointer it is: tried, and undone."""
+    """The vertex that a press takes, and its offset from the pointer in pixels.
+
+    Drags once to find the vertex, and undoes the drag.
+    """
     hand.move(*start)
     hand.drag(start, (start[0] + 6, start[1] - 6))
     vertex = hand.ask("state")["dragged"]
@@ -129,7 +132,7 @@ def _pressed(hand: Hand, start: Place) -> tuple[int, Place]:
 
 
 def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The skin of a turned head, in a perspective, through a camera, and in one of four views."""
+    """Drag the skin of a turned head: in perspective, through a camera, and in a quad view."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -144,7 +147,7 @@ def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
         hand.move(*start)
         hand.drag(start, end)
         state = hand.ask("state")
-        # Of a small head a pixel is millimetres: the press takes the vertex that is under it.
+        # If the head is small, a pixel covers millimetres. So the vertex under the press is used.
         at = hand.ask("seen_in_front", vertex=state["dragged"])
         moved = len(state["sliders"]) > 0
         hand.picture("skin-" + name.replace(" ", "-"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An animator's task, by a hand: a capture with a layer and a tweak over it."""
+"""Tests a capture with a real pointer: import a take, add a layer and a tweak over it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIELD = r'CTRL_expressions\.jawOpen"\]$'
 
 
 def capture(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """A Live Link take, a smile over half of it, a tweak of the jaw that leaves it as it is."""
+    """Import a Live Link take, add a layer with a smile, and tweak the jaw. The take stays."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -57,7 +57,7 @@ def _span(curve: list) -> float:
 
 
 def _smile(hand: Hand) -> Iterator[Check]:
-    """A layer of a smile at frame 36, by the search."""
+    """Add a layer with a smile at frame 36 by the search."""
     go_to(hand, 36)
     below = hand.ask("curves_below")
     search(hand, "Add Layer Smile Closed", "RISORIUS_OT_layer_add")
@@ -70,7 +70,7 @@ def _smile(hand: Hand) -> Iterator[Check]:
 
 
 def _tweak(hand: Hand) -> Iterator[Check]:
-    """The jaw more open around frame 50: by the wheel and I over the slider."""
+    """Open the jaw more around frame 50 in a tweak, by the wheel and I over the slider."""
     below = hand.ask("curves_below")
     go_to(hand, 50)
     search(hand, "Tweak over a Range")
@@ -101,7 +101,7 @@ def _tweak(hand: Hand) -> Iterator[Check]:
 
 
 def take() -> str:
-    """A table as Live Link Face writes it: speech-like jaw, a tongue, a head that turns."""
+    """A CSV take in the format of Live Link Face, with jaw, tongue, blink and a turning head."""
     names = [*SHAPES.split(), "HeadYaw", "HeadPitch", "HeadRoll"]
     lines = ["Timecode,BlendShapeCount," + ",".join(names)]
     for row in range(ROWS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An animator's task, by a hand: a voice speaks, one of its sounds is replaced, one is moved."""
+"""Tests speech with a real pointer: speak a voice, replace a sound, move a sound."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ SOUNDS = """[[s.name, s.word, s.start, s.length] for s in rig()["risorius_contro
 .action.risorius_spoken.sounds]"""
 MARKERS = "[[m.name, m.frame] for m in bpy.context.scene.timeline_markers]"
 CHOSEN = 'rig()["risorius_controls"].animation_data.action.risorius_spoken.active'
-NEAR = 12.0  # frames beside a sound in which keys may follow it
+NEAR = 12.0  # distance in frames from a sound within which its keys may change
 
 
 def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Speak from Audio: what lacks is said before anything is chosen; then it speaks."""
+    """Test Speak from Audio. Without PocketSphinx, a message must come before the file browser."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -57,11 +57,11 @@ def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _replace(hand: Hand) -> Iterator[Check]:
-    """A row of the list is clicked, its sound replaced by the menu; undone by the keyboard."""
+    """Select a sound in the list and replace it by the menu. Only keys near it may change."""
     word_set = hand.find(r"risorius\.word_set")
     x, y = hand.find(r"risorius\.sound_insert", columns=(0.93, 0.97, 1.0))
     before, frame = hand.see(CHOSEN), hand.ask("state")["frame"]
-    hand.click(x - 180, y + 66)  # the fourth of the rows of 22 pixels
+    hand.click(x - 180, y + 66)  # the fourth row; a row is 22 pixels high
     chosen = hand.see(CHOSEN)
     sounds = hand.see(SOUNDS)
     name, _word, start, length = sounds[chosen]
@@ -88,7 +88,7 @@ def _replace(hand: Hand) -> Iterator[Check]:
 
 
 def _changed(before: list[Any], after: list[Any]) -> list[float]:
-    """Frames at which keys of curves came, went or have another value."""
+    """Frames of keys that were added, removed or changed between two states of the curves."""
     one, other = _keys(before), _keys(after)
     differ = (one.get(c, set()) ^ other.get(c, set()) for c in {*one, *other})
     return sorted({frame for keys in differ for frame, _value in keys})
@@ -99,17 +99,17 @@ def _keys(curves: list[Any]) -> dict[tuple[str, int], set[tuple[float, float]]]:
 
 
 def _markers(hand: Hand) -> Iterator[Check]:
-    """The sounds as markers: one is clicked and moved in the timeline, Update Speech reads it."""
+    """Show the sounds as markers, move one in the timeline, and run Update Speech."""
     hand.click(*hand.find(r"risorius\.speech_markers", columns=(0.3,)))
     sounds = hand.see(SOUNDS)
     markers = hand.wait("markers", lambda: hand.see(MARKERS))
     yield f"Markers: {len(markers)} of {len(sounds)} sounds", len(markers) == len(sounds)
-    # The longest: one that is moved past its neighbour stays beside it.
+    # The longest sound is moved, because a sound cannot move past its neighbour.
     place = max(range(1, len(sounds) - 1), key=lambda i: sounds[i][3])
     name, frame = markers[place]
     left, top = hand.ask("timeline_at", frame=frame)
     hand.move(left, top + 20)
-    hand.key("ctrl+space")  # a low timeline has no room for its row of markers
+    hand.key("ctrl+space")  # maximised, because a low timeline does not show markers
     hand.wait("large", lambda: len(hand.ask("state")["areas"]) == 1)
     hand.key("Home")
     hand.still()

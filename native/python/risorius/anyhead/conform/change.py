@@ -21,11 +21,11 @@ from ...author.geometry.simplify import fan_triangles
 from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 
-_EVENED = 0.24  # of the skin's spread, which is 8.4 cm of a head of 24: 2 cm
-_CELL = 0.4  # of that: edge length of the grid cells that the smoothing sums up first
-_STEADY = 1e-6
+_EVENED = 0.24  # smoothing radius / RMS radius of the skin; 2 cm on a head of 24 cm (RMS 8.4 cm)
+_CELL = 0.4  # of the smoothing radius: edge length of the grid cells that are summed first
+_STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems regular
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
-_AT_ONCE = 1024
+_AT_ONCE = 1024  # vertices that are smoothed together
 # The point with the same texture coordinates is taken if its distance is at most _LONGER times the
 # distance of the closest point plus _BESIDE times the reach. _SAME_TEXEL: share of the UV square.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
@@ -95,7 +95,7 @@ class Change:
     """
 
     def __init__(self, mesh: Mesh, before: Doubles, after: Doubles) -> None:
-        """Compute the gradients.
+        """Compute the deformation gradients.
 
         Args:
             mesh: gives the polygons.

@@ -31,9 +31,10 @@ _FAR, _NEAR, _APART, _LEAST = 0.1, 0.05, 0.12, 0.004
 _FACING = 0.2  # least cosine between one normal and the opposite of the other normal
 # Shares of the reach: smoothing of the correction around a contact, for joints and for shapes.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
-_SEEN = 0.001  # of the reach: the least delta that is added to a blend shape
+_SEEN = 0.001  # of the reach: smaller deltas are not added to a blend shape
 _MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
 _LARGEST, _FADES = 0.15, 0.5  # of the reach: largest delta of one step, and its fall-off
+_OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
 _LIDS = 1.7  # of the radius of an eye: skin within this distance of its centre is a lid
 
 
@@ -54,7 +55,7 @@ class Touch(NamedTuple):
 
 
 class _Posed:
-    """The skin of a face with one control at 1."""
+    """Vertex positions of the skin of a face, at rest or with one control at 1."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self.dna, self.skin = dna, skin
@@ -94,7 +95,7 @@ def keep_contacts(
         change: the deformation of the skin.
         eyes: the eyeballs.
         holds: bindings of the meshes that follow the skin, by mesh index.
-        tell: told the share that is done, 0 to 1.
+        tell: receives the finished share of the work, 0 to 1.
     """
     if not eyes or not len(dna.raw_control_names):
         return out
@@ -167,7 +168,10 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
     gaps = _gaps(face, posed, touch, change)
     square = np.einsum("nd,nd->n", way, way)
     share = np.einsum("nd,nd->n", gaps, way) / np.maximum(square, 1e-12 * change.reach**2)
-    if np.median(np.abs(share) * np.sqrt(square)) < _LEAST * change.reach:
+    length = np.sqrt(square)
+    # LODs without blend shapes have the joints alone: lids that overlap are better than a gap.
+    share += _OVERLAP * np.std(share * length) / np.maximum(length, 1e-6 * change.reach)
+    if np.median(np.abs(share) * length) < _LEAST * change.reach:
         return None
     out = np.zeros(len(posed))
     moving = _moving(ways, change)

@@ -22,7 +22,7 @@ from .contacts import keep_contacts
 from .joints import Places, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
-Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
+Progress = Callable[[float], object]  # receives the finished share, 0 to 1; False stops the work
 
 
 class Moved(NamedTuple):
@@ -58,13 +58,14 @@ def conform(
         dna: the source face; it is not changed.
         moved: float64[V, 3] by mesh name, the new vertex positions in the axes and the unit of the
             file; the skin of LOD 0 is required.
-        progress: told the share that is done, 0 to 1; False stops.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
         balls: eyeballs of the target head; each eye of the face moves to the one near it.
 
     Raises:
         ArgumentError: the face has no skin mesh, or `moved` lacks the skin, names an unknown mesh,
             or has a wrong number of positions or a position that is not finite.
-        Stopped: progress said False.
+        Stopped: `progress` returned False.
     """
     tell = telling(progress, 0.0, 1.0)
     skin = skin_of(dna)
@@ -101,7 +102,7 @@ def telling(progress: Progress | None, begin: float, end: float) -> Callable[[fl
     It raises Stopped if `progress` returns False.
 
     Args:
-        progress: told the share of the whole work.
+        progress: receives the finished share of the whole work, 0 to 1.
         begin, end: shares of the whole work at which the part begins and ends.
     """
 

@@ -34,7 +34,7 @@ _DIRECTIONS = {
     "front": (0, 0, 1),
     "back": (0, 0, -1),
 }
-_STOOD, _LAID = 0.15, 0.75  # shares of the work at whose ends the steps are
+_STOOD, _LAID = 0.15, 0.75  # progress after landmarks are found, and after the skin is registered
 
 
 @dataclass
@@ -76,18 +76,19 @@ def conform_face(
         dna: the source face; it is not changed.
         parts: the meshes of the head in one space.
         marks: landmarks that the user placed, in the space of the parts.
-        progress: told the share that is done, 0 to 1; False stops.
-        where: what errors call the head.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
+        where: name of the head in error messages.
         unit: the unit of the head's file format, "cm" or "m".
         wishes: values that the user gave and that are not guessed.
-        threads: 0: one for each core.
+        threads: number of threads; 0: one for each core.
 
     Raises:
         AnyHeadError: the head has no polygons, the face has no skin, or a value of `wishes` is
             invalid.
         LandmarkError: no face was found in the head, or landmarks are missing.
         RegistrationError: no surface of the head is near the face.
-        Stopped: progress said False.
+        Stopped: `progress` returned False.
     """
     wishes = wishes or Wishes()
     skin = skin_of(dna)
@@ -114,7 +115,7 @@ def conform_face(
 
 
 def parts_of(dna: Dna) -> list[HeadPart]:
-    """The meshes of LOD 0 of a face as parts of a head, standing.
+    """The meshes of LOD 0 of a face as parts of a head, in the axes x left, y up, z front.
 
     Args:
         dna: the face.

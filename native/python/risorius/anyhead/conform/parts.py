@@ -22,8 +22,8 @@ from .change import Change, Similar, similar
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
 _INNER = 0.35  # of the radius: joints closer to the centre of an eye move with the eye
-_RIM, _BAND = 1.1, 0.03  # of the radius: distance of the lid rims from the centre, and its width
-_STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more than this weight of it
+_RIM, _BAND = 1.1, 0.03  # of the radius: distance of the lid rims from the centre, and its spread
+_STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more of its skin weights
 _PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims
 _ROUNDS = 20
 
@@ -34,10 +34,10 @@ class Eye:
 
     Attributes:
         middle: float64[3], the centre on the source head.
-        radius: on the source head.
+        radius: the radius on the source head.
         way: the similarity transform to the target head.
-        joints: joints at its centre; joints of lids that slide on the eye are among them.
-        holds: joints with most of the skin weights of the eyeball.
+        joints: joints close to its centre, also joints of lids that slide on the eye.
+        holds: joints with more than half of the skin weights of the eyeball.
     """
 
     middle: Doubles
@@ -63,7 +63,7 @@ class Stiff(NamedTuple):
 
 
 def kind(name: str) -> str:
-    """How a mesh follows: "eyes", "mouth", or "skin" for a mesh that is bound to the skin.
+    """How a mesh is moved: "eyes", "mouth", or "skin" for a mesh that is bound to the skin.
 
     Args:
         name: the name of the mesh.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sculpts with the topology of a face: matching of meshes, axes and unit."""
+"""Finds meshes of a head that have the topology of a face, and converts their axes and unit."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ...author.input.obj import ObjMesh
 from .parts import finest, skin_of
 
 _AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
-_LEANS = np.cos(np.radians(30.0))  # largest angle between a head and the axes of its file
-_FIVE = 5  # triangulations of polygons with more corners are not compared
+_LEANS = np.cos(np.radians(30.0))  # cosine of the largest angle of a head to the axes of its file
+_FIVE = 5  # triangles of polygons with more corners are not compared
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
-    """float64[V, 3] by mesh name: vertex positions of the LOD 0 meshes that a head has.
+    """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
     A mesh matches if it has the same polygons, also triangulated. If several meshes match, such as
     both eyes, the most similar name is taken, then the first.

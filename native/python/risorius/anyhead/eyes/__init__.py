@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Eyes as lids meet them: where they are seen, and lids that close on them and stay out of them."""
+"""Finds the opening between the lids of an eye, and fits lid expressions to the eyeball."""

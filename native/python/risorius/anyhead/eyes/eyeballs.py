@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An eye as lids meet it: its middle, and how far its surface is from there."""
+"""An eyeball with its cornea, and the distance of its surface from its centre in any direction."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles, Ints
 
-_OUTSIDE = 3.0  # of the radius: where a ray begins that ends at the eye's surface
+_OUTSIDE = 3.0  # of the radius: distance from the centre at which rays towards the eye begin
 
 
 @dataclass(frozen=True)
 class Eyeball:
-    """A ball and its cornea at rest, in the target's unit.
+    """An eyeball and its cornea at rest, in the target's unit.
 
     Attributes:
         side: "L" or "R".
-        middle: float64[3].
-        radius: of the white.
-        points: float64[V, 3], of the ball and of what turns with it.
+        middle: float64[3], the centre.
+        radius: the radius of the white of the eye.
+        points: float64[V, 3], vertices of the ball and of the meshes that turn with it.
         triangles: int64[T, 3].
     """
 
@@ -36,19 +36,19 @@ class Eyeball:
     )
 
     def keep(self, directions: Doubles) -> None:
-        """Remember how far the resting surface is in directions that are asked for often.
+        """Cache the result of `reach` at rest for an array of directions that is used often.
 
         Args:
-            directions: float64[n, 3] of length 1; the same array is asked for later.
+            directions: float64[n, 3] of length 1; `reach` recognizes this array object.
         """
         self._known[id(directions)] = (directions, self.reach(directions))
 
     def reach(self, directions: Doubles, turn: Doubles | None = None) -> Doubles:
-        """float64[n], how far the surface is from the middle; the radius where there is none.
+        """float64[n]: distance of the eye's surface from the centre; the radius if a ray misses it.
 
         Args:
-            directions: float64[n, 3] of length 1, from the middle.
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            directions: float64[n, 3] of length 1, from the centre.
+            turn: float64[3, 3], the rotation of the eye; None: at rest.
         """
         if not self._surface:
             self._surface.append(

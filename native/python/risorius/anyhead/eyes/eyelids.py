@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Lids that close on this eye without a gap, and stay out of it in every expression.
+"""Corrects lid expressions, so that closed lids leave no gap and no lid cuts into the eye.
 
-A lid moves by a turn about the axis through the eye's middle along both corners. What was
-transferred is kept, but scaled so that the edges meet; what goes into the eye is lifted out.
+A lid turns about an axis through the eye's centre, parallel to the line between both eye corners.
+The transferred motion is scaled so that the edges meet, and vertices inside the eye are lifted out.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from ..surface import Surface
 from .eyeballs import Eyeball
 from .opening import FAR, Opening, find_opening, gap_rays, near_eye, visible_gap
 
-_RADIUS_MM = 12.0  # of a human eye: lengths below are meant on it
-_BAND = 3.0  # mm from the edge: what goes all of the way
-_FADE = 16.0  # mm from the edge: what goes none of it
-_CORNER = 4.0  # mm beyond a corner: what goes none of it
-_CLEAR = 0.3  # mm above the eye at rest: what is outside of it, no rim that touches
-_SKIN = 0.5  # mm above the eye, least of what was further from it
-_PRESSED = 0.15  # mm that edges overlap which are brought together
-_OVER = 0.4  # mm that an edge goes further than its own column asks for
-_BESIDE = 0.5  # mm beyond the edges, where the eye is seen between lids still
+_RADIUS_MM = 12.0  # radius of a human eye; the lengths in mm below are scaled to the actual eye
+_BAND = 3.0  # mm from the edge: vertices up to here move with the edge
+_FADE = 16.0  # mm from the edge: vertices beyond keep their place
+_CORNER = 4.0  # mm beyond an eye corner: vertices beyond keep their place
+_CLEAR = 0.3  # mm above the eye at rest: higher vertices are on the outside of a lid
+_SKIN = 0.5  # mm: largest height above the eye that a rim vertex has to keep
+_PRESSED = 0.15  # mm by which closed edges overlap
+_OVER = 0.4  # mm that smoothing may move an edge beyond the gap of its column
+_BESIDE = 0.5  # mm beyond the edges in which a visible eye still counts as a gap
 _THROUGH = 0.8  # mm that the edges of closed lids may overlap
-_LOWER = 0.15  # of the gap: what the lower lid takes
-_VIEW = 80  # rays each way of who looks at closed lids
+_LOWER = 0.15  # share of the gap that the lower lid closes
+_VIEW = 80  # rays per axis of the grid of a view of closed lids
 _VIEWS = ((0.0, 0.0), (-25.0, 0.0), (25.0, 0.0), (0.0, 20.0), (0.0, -20.0))  # degrees
 _ROUNDS = 8
-_ENOUGH = 0.04  # mm of an eye that is seen between closed lids
-_SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # shares of columns
-_HELD = 1.5  # of the radius: what is further from the eye's middle goes less far
-_LOOKS = 64  # directions each way that are looked along
-_LIFTS = 4
-_SCALES = (0.6, 2.5)  # of the transferred turn
-_SPREAD = 6  # rounds in which a lift goes to what is beside it
-_MOVED = 0.1  # mm: what moves less rests
-_WIDE = np.radians(75.0)  # from the front: what is further aside is no lid
+_ENOUGH = 0.04  # mm: largest visible gap of closed lids
+_SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # smoothing weights of neighbouring columns
+_HELD = 1.5  # of the radius: from this distance to the eye's centre on, lid motion fades out
+_LOOKS = 64  # rays per axis of the grid that finds where the eye comes through the lids
+_LIFTS = 4  # rounds
+_SCALES = (0.6, 2.5)  # least and largest factor of the transferred turn
+_SPREAD = 6  # smoothing rounds that spread a lift to neighbouring vertices
+_MOVED = 0.1  # mm: smaller motions are ignored
+_WIDE = np.radians(75.0)  # largest angle above or below the front of a lid vertex
 
 
 class Eyelids:
@@ -46,23 +46,23 @@ class Eyelids:
 
     Attributes:
         ball: the eye.
-        opening: where it is seen.
+        opening: the opening between the lids.
         upper, lower: int64[n], vertices of each lid.
     """
 
     def __init__(self, skin: Surface, ball: Eyeball, opening: Opening) -> None:
-        """Begins.
+        """Find the lid vertices.
 
         Args:
-            skin: the target at rest.
+            skin: the skin of the target at rest.
             ball: the eye.
-            opening: of the same skin.
+            opening: the opening between the lids in this skin.
         """
         self.ball, self.opening = ball, opening
-        self.mm = ball.radius / _RADIUS_MM  # what a millimetre of a human eye is here
+        self.mm = ball.radius / _RADIUS_MM  # length of 1 mm of a human eye in the target's unit
         lids = near_eye(skin, ball)
         near, triangles = np.unique(lids.triangles, return_inverse=True)
-        self._around = skin.points[near]  # lids, and the corners of triangles that end in them
+        self._around = skin.points[near]  # lids, and all corners of triangles near the eye
         self._triangles: Ints = triangles.reshape(-1, 3)
         across, up, away = opening.frame.angles(skin.points[near])
         lid = (away < FAR * ball.radius) & (np.abs(up) < _WIDE) & (away > 0.8 * ball.radius)
@@ -95,35 +95,36 @@ class Eyelids:
         ball.keep(self._through)
 
     def _number(self) -> None:
-        """Edges and triangles of the lids by their own numbers."""
+        """Number the edges and triangles of the lids by rows of `self.vertices`."""
         place = np.full(len(self._around), -1)
         place[self._lid] = np.arange(len(self._lid))
-        self._own = place[self._triangles]  # -1: no lid
+        self._own = place[self._triangles]  # -1: not a lid vertex
         whole: Ints = self._own[(self._own >= 0).all(axis=1)]
         sides = np.sort(whole[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         self._edges: Ints = np.unique(sides, axis=0)
 
     def _posed(self, points: Doubles) -> ClosestPoints:
-        """The skin near the eye with lids at other places."""
+        """The skin near the eye with the lid vertices at the given points."""
         posed = self._around.copy()
         posed[self._lid] = points
         return ClosestPoints(posed, np.ascontiguousarray(self._triangles, np.int32))
 
     def rim(self, reach: float) -> tuple[Ints, Doubles]:
-        """Vertices of both edges that lie on the eye at rest, and float64[n] how high above it.
+        """Vertices of both lid edges that touch the eye at rest, and their heights above the eye
+        (float64[n], in the target's unit).
 
         Args:
-            reach: mm of a human eye from the edges.
+            reach: largest distance from the edges, in mm of a human eye.
         """
         own = (self._from_edge < reach) & (np.abs(self._height) < 0.08 * self.ball.radius)
         own &= self._held > 0
         return self.vertices[own], self._height[own]
 
     def apart(self, points: Doubles) -> float:
-        """How far upper and lower edge are from each other in the mean, a share of their width.
+        """The mean distance between the upper and the lower edge, divided by the edge's width.
 
         Args:
-            points: float64[V, 3], of the whole target, or of what has its vertices.
+            points: float64[V, 3], vertex positions of the target in any pose or shape.
         """
         across = self.opening.frame.angles(self.rest)[0]
         edge = (self._from_edge < _BAND / 3) & (self._held > 0)
@@ -140,37 +141,37 @@ class Eyelids:
         """Whether an expression moves these lids.
 
         Args:
-            displacement: float64[V, 3], of the whole target.
+            displacement: float64[V, 3], displacements of all vertices of the target.
         """
         near = self.vertices[self._from_edge < _FADE / 2]
         far = np.linalg.norm(displacement[near], axis=1).max(initial=0.0)
         return bool(far > _MOVED * self.mm)
 
     def gap(self, displacement: Doubles, turn: Doubles | None = None) -> float:
-        """The widest place at which the eye is seen, in the target's unit.
+        """The largest height of the visible part of the eye, in the target's unit; 0 if hidden.
 
         Args:
-            displacement: float64[V, 3], of the whole target.
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            displacement: float64[V, 3], displacements of all vertices of the target.
+            turn: float64[3, 3], the rotation of the eye; None: at rest.
         """
         return self._gap(self.rest + displacement[self.vertices], turn)
 
     def cut(self, displacement: Doubles, turn: Doubles | None = None) -> float:
-        """How deep the outside of the lids lies in the eye, in the target's unit.
+        """The largest depth of the outside of the lids inside the eye, in the target's unit.
 
         Args:
-            displacement: float64[V, 3], of the whole target.
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            displacement: float64[V, 3], displacements of all vertices of the target.
+            turn: float64[3, 3], the rotation of the eye; None: at rest.
         """
         points = self.rest + displacement[self.vertices]
         return float(self._lacks(points, turn, 0.0).max(initial=0.0))
 
     def closed(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
-        """float64[V, 3]: a blink whose edges meet on the eye.
+        """float64[V, 3]: the displacements of a blink, corrected so that the lid edges meet.
 
         Args:
-            displacement: float64[V, 3], of the whole target.
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            displacement: float64[V, 3], displacements of all vertices of the target.
+            turn: float64[3, 3], the rotation of the eye; None: at rest.
         """
         frame = self.opening.frame
         rest_up = frame.angles(self.rest)[1]
@@ -200,8 +201,8 @@ class Eyelids:
         return out
 
     def _level(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """Closed lids whose edges are equally far from the eye: who looks from aside or from above
-        sees no step that opens."""
+        """Closed lids with both edges at the same height above the eye, so that no gap is visible
+        from the side or from above. Unchanged if this does not help."""
         seen = self._viewed(points)
         if not seen:
             return points
@@ -221,8 +222,8 @@ class Eyelids:
         return leveled if closed and self._viewed(leveled) < seen else points
 
     def _viewed(self, points: Doubles) -> int:
-        """How much of the resting ball is seen by those who look from in front, from aside and
-        from above: rays that all go the same way."""
+        """The number of parallel rays that reach the resting ball past the lids, from the front,
+        both sides, above and below."""
         frame, radius, tree, seen = self.opening.frame, self.ball.radius, self._posed(points), 0
         at = radius * np.linspace(-1, 1, _VIEW)
         x, y = (grid.ravel()[:, None] for grid in np.meshgrid(at, at))
@@ -234,16 +235,16 @@ class Eyelids:
             begin = (frame.middle + x * side + y * np.cross(way, side) + 3 * radius * way)[on]
             rays = np.broadcast_to(-way, begin.shape)
             lid, _, distance = tree.first_hit(begin, rays)
-            away = np.sqrt(radius**2 - (x**2 + y**2)[on, 0])  # of the ball's front from its middle
+            away = np.sqrt(radius**2 - (x**2 + y**2)[on, 0])  # height of the ball's front
             seen += int(((lid < 0) | (distance > 3 * radius - away)).sum())
         return seen
 
     def lifted(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
-        """float64[V, 3]: an expression whose lids are not in the eye.
+        """float64[V, 3]: the displacements of an expression with the lids lifted out of the eye.
 
         Args:
-            displacement: float64[V, 3], of the whole target.
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            displacement: float64[V, 3], displacements of all vertices of the target.
+            turn: float64[3, 3], the rotation of the eye; None: at rest.
         """
         points = self._lifted(self.rest + displacement[self.vertices], turn)
         out = displacement.copy()
@@ -254,15 +255,15 @@ class Eyelids:
         return float(self._seen(points, turn).max(initial=0.0))
 
     def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: how much of the eye is seen between the edges, in the target's unit."""
+        """float64[columns]: height of the visible eye between the edges, in the target's unit."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         beside = _BESIDE * self.mm / self.ball.radius
         edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
         return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: what edges are to come together by, radians; below 0 where the upper
-        lid goes through the lower one, further than closed lids press on each other."""
+        """float64[columns]: the angle, in radians, by which the edges have to approach each other;
+        negative if they overlap by more than closed lids may."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
@@ -271,16 +272,19 @@ class Eyelids:
             return np.zeros(len(apart))
         columns = np.arange(len(apart))
         apart = np.interp(columns, columns[known], apart[known])
-        # What is hidden in the eye overlaps a little where the eye is seen.
+        # Columns in which the eye is visible also close by a small overlap.
         seen = self._seen(points, turn) / self.ball.radius
         lacks = np.where(seen > 0, np.maximum(apart, seen) + _PRESSED * unit, 0.0)
         through = np.minimum(apart + _THROUGH * unit, 0.0)
-        most = self.opening.high - self.opening.low  # a corner is no place to go far
+        most = self.opening.high - self.opening.low  # limits the motion near the eye corners
         even = np.minimum(_even(lacks), np.maximum(apart, 0.0) + _OVER * unit)
         return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
-        """float64[n]: how much of a turn each vertex takes; most: radians an edge is turned by."""
+        """float64[n]: the share of a turn that each vertex takes, 0 to 1.
+
+        most: the largest angle of an edge in radians; it widens the fade.
+        """
         reach = max(_FADE, 2.5 * most * self.ball.radius / self.mm)
         along = (self._from_edge - _BAND) / (reach - _BAND)
         return np.asarray((1 - smooth_step(along)) * self._held)
@@ -293,11 +297,12 @@ class Eyelids:
         turn: Doubles | None,
         wanted: Doubles,
     ) -> Doubles:
-        """float64[n], radians: what the upper lid goes down by, so that its edge goes down by
-        `wanted`: as a share of its own turn, and the rest by _fade."""
+        """float64[n]: the angles, in radians, by which vertices of the upper lid go down, so that
+        its edge goes down by `wanted`. The lid's own turn is scaled first; `_fade` adds the rest.
+        """
         columns = self.opening.across
         high = self._edge(points, turn)
-        own = np.nan_to_num(self.opening.high - high)  # of the edge, downwards
+        own = np.nan_to_num(self.opening.high - high)  # downward turn of the edge
         least = np.radians(2.0)
         scale = np.where(own > least, 1 + wanted / np.maximum(own, least), 1.0)
         scale = np.clip(scale, *_SCALES)
@@ -312,8 +317,9 @@ class Eyelids:
     def _edge_line(
         self, points: Doubles, turn: Doubles | None, *, upper: bool
     ) -> tuple[Doubles, Doubles]:
-        """float64[columns]: the lowest place of the upper lid or the highest of the lower one,
-        where the lid is over the eye, and how far it is from the middle; NaN where it has none."""
+        """float64[columns]: the lowest angle of the upper lid, or the highest of the lower lid, of
+        points above the eye, and their distances from the eye's centre; NaN without such a point.
+        """
         across, up, away = self.opening.frame.angles(points)
         own = self._above == upper
         a, b = self._edges[own[self._edges].all(axis=1)].T
@@ -336,8 +342,8 @@ class Eyelids:
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
-        """float64[n]: how far the eye comes through the skin that is clear of it at rest, or lies
-        less than `above` below it, at the corners of the triangles that it comes through."""
+        """float64[n]: for each vertex the height that its triangles lack to be `above` over the
+        eye. Only triangles that are clear of the eye at rest count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -354,7 +360,7 @@ class Eyelids:
         return lacks
 
     def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """Points on their rays from the eye's middle, outside of the eye."""
+        """The points, moved out of the eye on rays from its centre."""
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
@@ -374,7 +380,7 @@ class Eyelids:
         return np.asarray(points + lift[:, None] * ray)
 
     def _spread(self, need: Doubles) -> Doubles:
-        """What is needed, and softly less around."""
+        """The lifts with a smooth fall-off to neighbouring vertices, nowhere less than `need`."""
         lift = need.copy()
         a, b = self._edges.T
         count = np.bincount(a, minlength=len(lift)) + np.bincount(b, minlength=len(lift))
@@ -385,16 +391,16 @@ class Eyelids:
 
 
 def _even(values: Doubles) -> Doubles:
-    """Columns as their neighbours have them: edges of coarse lids have no notches."""
+    """Values smoothed over neighbouring columns, so that edges of coarse lids have no notches."""
     wide = np.pad(values, len(_SOFT) // 2, mode="edge")
     return np.convolve(wide, _SOFT / _SOFT.sum(), mode="valid")
 
 
 def find_eyelids(skin: Surface, ball: Eyeball) -> Eyelids | None:
-    """The lids of an eye; None where skin covers it, or where there are none.
+    """The lids of an eye; None if skin covers the eye, or if there are no lids.
 
     Args:
-        skin: the target at rest.
+        skin: the skin of the target at rest.
         ball: the eye.
     """
     opening = find_opening(near_eye(skin, ball), ball)

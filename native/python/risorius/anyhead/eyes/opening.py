@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The opening between the lids of an eye, found by rays from the eye's middle.
+"""Finds the opening between the lids of an eye by rays from the eye's centre.
 
-A ray that meets no lid leaves through the opening. So upper and lower lid are known on a mesh of
-any topology, without names and without a template.
+A ray that hits no lid leaves through the opening. This tells upper from lower lid on a mesh of any
+topology, without names and without a template.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from ..surface import Surface
 from .eyeballs import Eyeball
 
 Mask = npt.NDArray[np.bool_]
-FAR = 1.9  # of the radius: what is further from the eye's middle is no lid
-COLUMNS = 48
-_WIDE, _HIGH = 72.0, 60.0  # degrees from the front in which the opening is sought
-_STEP = 2.0  # degrees of the first look
-_FINE = 0.5  # degrees of the second look, whose edges are then halved
+FAR = 1.9  # of the radius: largest distance of a lid from the eye's centre
+COLUMNS = 48  # directions across the opening at which the edges are known
+_WIDE, _HIGH = 72.0, 60.0  # degrees across and up from the front that are searched
+_STEP = 2.0  # degrees between the rays of the first search
+_FINE = 0.5  # degrees between the rays of the second search, before the edges are bisected
 _HALVINGS = 6
-_ABOVE = 1.001  # of the eye's surface: where rays begin
-_LEAST = 6  # directions of the first look that an opening has at least
-_SURE = 12  # directions that it has where ways out of it were cut but once
-_CUTS = 4
+_ABOVE = 1.001  # rays begin at this multiple of the distance of the eye's surface
+_LEAST = 6  # least number of rays of the first search in an opening, after repeated erosion
+_SURE = 12  # the same after the first erosion
+_CUTS = 4  # largest number of erosions
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Directions about an eye's middle: across (to the character's left), up and front.
+    """Axes at an eye's centre: across (to the character's left), up and front, float64[3] each.
 
-    A turn about `across` changes the second angle and keeps the first, as lids move.
+    A lid turns about `across`: this changes the angle up and keeps the angle across.
     """
 
     middle: Doubles
@@ -45,7 +45,7 @@ class Frame:
     front: Doubles
 
     def angles(self, points: Doubles) -> tuple[Doubles, Doubles, Doubles]:
-        """Angle across and angle up, radians, and the distance from the middle, float64[n] each.
+        """Angle across and angle up in radians, and distance from the centre, float64[n] each.
 
         Args:
             points: float64[n, 3].
@@ -57,7 +57,7 @@ class Frame:
         return across, np.arctan2(ray @ self.up, ray @ self.front), length
 
     def rays(self, across: Doubles, up: Doubles) -> Doubles:
-        """float64[..., 3] of length 1.
+        """float64[..., 3]: unit directions of angles.
 
         Args:
             across: float64[...], radians.
@@ -72,12 +72,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class Opening:
-    """Where an eye is seen at rest.
+    """The opening between the lids of an eye at rest.
 
     Attributes:
-        frame: its first axis goes through both corners.
-        across: float64[COLUMNS], radians, from corner to corner, ascending.
-        low, high: float64[COLUMNS], radians, the edges of the lower and the upper lid.
+        frame: axes at the eye's centre; `across` is parallel to the line between the eye corners.
+        across: float64[columns], angles from corner to corner in radians, ascending; at most
+            COLUMNS.
+        low, high: float64[columns], angles of the lower and the upper lid's edge in radians.
     """
 
     frame: Frame
@@ -86,23 +87,24 @@ class Opening:
     high: Doubles
 
     def line(self, across: Doubles, share: float = 0.5) -> Doubles:
-        """float64[n]: a height between both edges.
+        """float64[n]: angles up, in radians, of a line between both edges.
 
         Args:
-            across: float64[n], radians.
-            share: 0: the lower edge, 1: the upper one.
+            across: float64[n], angles across in radians.
+            share: 0: the lower edge, 1: the upper edge.
         """
         return np.interp(across, self.across, self.low + share * (self.high - self.low))
 
 
 def near_eye(surface: Surface, ball: Eyeball) -> Surface:
-    """The triangles that may be lids, with the numbers of vertices that the surface has.
+    """The skin triangles near an eye, which may belong to lids; vertex indices are unchanged.
 
     Args:
-        surface: of the skin.
+        surface: the skin.
         ball: the eye.
     """
-    corners = surface.points[surface.triangles]  # a large triangle has none of its corners near
+    # Boxes are tested because a large triangle may pass the eye with all corners far away.
+    corners = surface.points[surface.triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     off = ball.middle - np.clip(ball.middle, low, high)
     return Surface(surface.points, surface.triangles[(off**2).sum(axis=1) < _far(ball) ** 2])
@@ -113,10 +115,10 @@ def _far(ball: Eyeball) -> float:
 
 
 def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
-    """The opening of an eye; None where skin covers the eye or where there are no lids.
+    """The opening of an eye; None if skin covers the eye or if there are no lids.
 
     Args:
-        lids: the skin near the eye, see near_eye.
+        lids: the skin near the eye, the result of near_eye.
         ball: the eye.
     """
     if not len(lids.triangles):
@@ -128,7 +130,7 @@ def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
     across = np.radians(np.arange(-_WIDE, _WIDE + 1e-9, _STEP))
     up = np.radians(np.arange(-_HIGH, _HIGH + 1e-9, _STEP))
     blob = None
-    for _ in range(3):  # at last about the axis through both corners
+    for _ in range(3):  # each round aligns the frame better with both eye corners
         frame = frame if blob is None else _turned(frame, across, up, blob)
         seen = _seen(tree, ball, frame.rays(*np.meshgrid(across, up, indexing="ij")))
         blob = _between_lids(seen)
@@ -141,17 +143,17 @@ def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
 
 
 def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | None = None) -> Mask:
-    """bool[...]: whether a ray from the middle leaves between the lids."""
+    """bool[...]: whether a ray from the eye's centre hits no lid."""
     flat = rays if rays.ndim == 2 else rays.reshape(-1, 3)
-    # From the eye's surface: a socket behind it, and the part of a rim within it, hide nothing.
+    # Rays begin at the eye's surface, so that skin inside the eye does not stop them.
     begin = ball.middle + (_ABOVE * ball.reach(flat, turn))[:, None] * flat
     triangle, _, _ = tree.first_hit(begin, flat, farthest=(FAR - 1.0) * ball.radius)
     return np.asarray(triangle).reshape(rays.shape[:-1]) < 0
 
 
 def _between_lids(seen: Mask) -> Mask | None:
-    """The largest region of directions that does not reach the border of the look: what does lies
-    beside the lids. Ways that leak out of it, through holes of a scan, are cut first."""
+    """The largest region of free rays that does not reach the border of the searched grid; a region
+    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan."""
     core = seen
     for cuts in range(_CUTS):
         core = core & _beside(core, np.minimum.reduce)
@@ -170,7 +172,7 @@ def _between_lids(seen: Mask) -> Mask | None:
 
 
 def _regions(core: Mask) -> Ints:
-    """int64 as `core`: a number for each region that hangs together, 0 outside."""
+    """int64, shape of `core`: a label for each connected region, 0 outside."""
     place = np.where(core, np.arange(1, core.size + 1).reshape(core.shape), 0)
     while True:
         spread = np.where(core, _beside(place, np.maximum.reduce), 0)
@@ -180,7 +182,7 @@ def _regions(core: Mask) -> Ints:
 
 
 def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any]:
-    """Of each place and the four beside it the least or the most."""
+    """The minimum or maximum (`of`) of each cell and its four neighbours."""
     padded = np.pad(values, 1, mode="edge")
     return np.asarray(
         of([padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],
@@ -189,7 +191,7 @@ def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any
 
 
 def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
-    """A frame whose first axis goes through the corners, whose front is the opening's middle."""
+    """A frame with `across` parallel to the line between the eye corners, facing the opening."""
     columns = np.flatnonzero(blob.any(axis=1))
     heights = np.array([up[blob[c]].mean() for c in columns])
     ends = frame.rays(across[columns[[0, -1]]], heights[[0, -1]])
@@ -204,9 +206,10 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
 def _refined(
     tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
 ) -> Opening | None:
-    """Edges by column, each halved until it is known to a hundredth of a degree.
+    """The lid edges of each column, bisected to a hundredth of a degree.
 
-    columns and bounds: of the first look, the lowest and the highest direction of each.
+    columns: angles across of the first search. bounds: float64[n, 2], lowest and highest free angle
+    of each column. All in radians.
     """
     step = np.radians(_STEP)
     ends = columns[[0, -1]] + [-step / 2, step / 2]
@@ -233,15 +236,15 @@ def _refined(
     return Opening(frame, across, edges[0], edges[1])
 
 
-_MARGIN = np.radians(4.0)  # beyond the opening
-_HEIGHTS = 240
+_MARGIN = np.radians(4.0)  # that rays of visible_gap go beyond the opening
+_HEIGHTS = 240  # rays per column
 
 
 def gap_rays(opening: Opening) -> Doubles:
-    """float64[columns * heights, 3]: directions for visible_gap.
+    """float64[columns * heights, 3]: unit directions for visible_gap.
 
     Args:
-        opening: at rest.
+        opening: the opening at rest.
     """
     return opening.frame.rays(*_grid(opening)).reshape(-1, 3)
 
@@ -254,16 +257,16 @@ def visible_gap(
     edges: tuple[Doubles, Doubles],
     turn: Doubles | None = None,
 ) -> Doubles:
-    """float64[columns]: how much of the eye is seen in each column, in the surface's unit.
+    """float64[columns]: height of the visible part of the eye in each column, in the skin's unit.
 
     Args:
         lids: the skin near the eye in some pose.
         ball: the eye.
-        opening: at rest, of the same skin.
-        rays: what gap_rays gives of it.
-        edges: float64[columns] each, radians: between which the lids' edges lie in this pose; NaN
-            where it is not known. What is seen beyond them is a hole of the skin.
-        turn: float64[3, 3], what the eye is turned by; None: it rests.
+        opening: the opening of the same skin at rest.
+        rays: the result of gap_rays for this opening.
+        edges: float64[columns] each, lowest and highest angle, in radians, that count as between
+            the lids in this pose; NaN if unknown. Free rays beyond are holes of the skin.
+        turn: float64[3, 3], the rotation of the eye; None: at rest.
     """
     up = _grid(opening)[1]
     seen = _seen(lids, ball, rays, turn).reshape(up.shape)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a head lacks, fitted in from a template: eyeballs, teeth, gums, tongue and lashes."""
+"""Fits eyeballs, teeth, gums, tongue and lashes of a template into a head that lacks them."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ from .sorting import sort_parts
 from .template_parts import template_parts
 
 Mask = npt.NDArray[np.bool_]
-_RIM = 1.5  # mm from the edge of a lid: what lies on the eye
-_PATCH = 40  # vertices of the skin that lashes are laid on by
-_SEEN = 0.3  # of the template's opening: where less is seen the eye is painted or closed
-_OPENED = 0.45  # of how far the template's lids are apart: where they are nearer, they are closed
-_AROUND = 2.5  # cm around the teeth: the skin that says where they belong
-_STEP, _STEPS = 0.05, 16  # cm that teeth go back by where they come through the skin
-_THROUGH = 0.02  # cm that they may
+_RIM = 1.5  # mm from the edge of a lid: width of the rim that touches the eye
+_PATCH = 40  # skin vertices that determine the place of a lash
+_SEEN = 0.3  # of the template's opening: an eye with a smaller opening is painted or closed
+_OPENED = 0.45  # of the template's lid distance: lids that are closer are closed
+_AROUND = 2.5  # cm around the teeth: skin that determines their place
+_STEP, _STEPS = 0.05, 16  # cm per step, and number of steps, that move teeth back behind the lips
+_THROUGH = 0.02  # cm that teeth may come through the skin
 _SIDES = {"L": "left", "R": "right"}
 
 
 def complete(found: Fittings, template: Dna, laid: Doubles) -> Fittings:
-    """A head with what it lacks from a template.
+    """The meshes of a head, completed with meshes of a template.
 
     Args:
-        found: what the head has.
+        found: the meshes of the head.
         template: a face of a DNA file.
-        laid: float64[V, 3], where the vertices of the template's skin lie on the head.
+        laid: float64[V, 3], positions of the vertices of the template's skin on the head.
 
     Raises:
-        ArgumentError: as many vertices as the template's skin has were expected.
+        ArgumentError: the length of `laid` is not the vertex count of the template's skin.
     """
     number, parts = template_parts(template)
     skin = parts[number].mesh
@@ -77,7 +77,7 @@ class _Completing:
         return self.out
 
     def _eye(self, side: str) -> bool:
-        """Whether an eyeball of the template is now in the head."""
+        """Fit an eyeball of the template into the head; False if the head has no open lids."""
         ball = self.like.eyes.get(side)
         lids = find_eyelids(self.skin, ball) if ball is not None else None
         if ball is None or lids is None:
@@ -100,12 +100,12 @@ class _Completing:
         return True
 
     def _seat(self, ball: Eyeball, lids: Eyelids) -> Similarity:
-        """An eyeball behind the lids: as large as the opening asks for, and so deep that the lids
-        lie on it as they do on the template's."""
+        """The transform of an eyeball to its place behind the lids. The lid rims determine its
+        size; its depth gives the rims the same height above it as on the template."""
         rim, height = lids.rim(_RIM)
         near = similarity(self.skin.points[rim], self.laid[rim])
         front = near.turn @ lids.opening.frame.front
-        # Where the eye lies the lids say, not where it looks.
+        # The lids determine the place of the eye but not its rotation.
         way = Similarity(np.eye(3), near.scale, ball.middle, near.point(ball.middle))
         middle, radius = way.point(ball.middle), way.scale * ball.radius
         low, high = -radius, radius
@@ -117,7 +117,7 @@ class _Completing:
         return way.shifted((low + high) / 2 * front)
 
     def _laid_on(self, kind: str) -> None:
-        """Lashes and the like, carried by the skin that they lie on."""
+        """Add the template's meshes of a kind; each moves with the skin below it."""
         rows = self.like.of(kind)
         for row in rows:
             mesh = row.part.mesh
@@ -129,10 +129,10 @@ class _Completing:
             self.out.notes.append("the lashes are the template's")
 
     def _mouth(self) -> None:
-        """Teeth, gums and tongue, each that is missing, by one similarity."""
+        """Add missing teeth, gums and tongue, all by one similarity transform."""
         missing = [kind for kind in (TEETH, GUMS, TONGUE) if not self.found.of(kind)]
         if TEETH not in missing and GUMS in missing:
-            missing.remove(GUMS)  # its own teeth have gums of their own, or none are wanted
+            missing.remove(GUMS)  # the head's teeth may include gums or do without
         rows = self.like.of(*missing)
         teeth = self.like.of(TEETH, GUMS)
         if not rows or not teeth:
@@ -152,7 +152,7 @@ class _Completing:
         self.out.notes.append(f"from the template: {', '.join(said)}")
 
     def _behind(self, way: Similarity, near: Mask, teeth: list[Fitted]) -> Similarity:
-        """Teeth that go back until they do not come through the lips."""
+        """The transform, shifted back in steps until the teeth do not come through the lips."""
         rest = self._through(self.skin.points[near], teeth, None)
         for _ in range(_STEPS):
             deep = self._through(self.laid[near], teeth, way)
@@ -162,7 +162,7 @@ class _Completing:
         return way
 
     def _through(self, points: Doubles, teeth: list[Fitted], way: Similarity | None) -> Doubles:
-        """float64[n]: how deep points of the skin are in teeth, cm."""
+        """float64[n]: depth of skin points inside the teeth in cm, 0 outside."""
         out = np.zeros(len(points))
         for row in teeth:
             solid = row.surface()
@@ -185,18 +185,18 @@ class _Completing:
 
 
 def _size(opening: Opening) -> float:
-    """How much is seen, a share of the sphere around the eye."""
+    """The area of the opening on a unit sphere around the eye."""
     heights = (opening.high - opening.low) * np.cos(opening.across)
     return float(heights.mean() * (opening.across[-1] - opening.across[0]))
 
 
 def head_parts(fittings: Fittings, expressions: Mapping[str, Doubles]) -> list[HeadPart]:
-    """All meshes of a head with what expressions do to them: lashes go with their lids, brows and
-    the like with their skin; the rest is rigid, or has shapes of its own.
+    """All meshes of a head with their expressions. Lashes, brows and meshes that lie on the skin
+    follow it; other meshes keep their own shapes or are rigid.
 
     Args:
-        fittings: of the head.
-        expressions: float64[V, 3] of the skin by raw control.
+        fittings: the meshes of the head.
+        expressions: float64[V, 3] by raw control, displacements of the skin.
     """
     face = fittings.face
     skin = Surface.of_polygons(face.mesh.positions, face.mesh.faces)

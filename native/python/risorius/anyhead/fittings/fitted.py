@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a head beside its skin: what each is, and what it hangs on."""
+"""The meshes of a head other than its skin: the kind of each, and the bone that it follows."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Fitted:
     """A mesh of a head.
 
     Attributes:
-        kind: EYE, TEETH and so on; SKIN is what lies on the skin, such as the tears' edge.
-        part: its mesh; `shapes` gives what expressions do to it where it is known.
-        side: "L" or "R" of eyes, else "".
-        hangs: HEAD or JAW, of what is rigid in the mouth; "" of the rest.
-        own: whether it is of the target, not of the template.
+        kind: EYE, TEETH and so on; SKIN is a mesh that lies on the skin, such as a tear line.
+        part: its mesh; `shapes` are its displacements by expression, if known.
+        side: "L" or "R" for eyes, else "".
+        hangs: HEAD or JAW, the bone of a rigid mesh in the mouth; "" for others.
+        own: True for a mesh of the target, False for a mesh of the template.
     """
 
     kind: str
@@ -44,13 +44,13 @@ class Fitted:
 
 @dataclass
 class Fittings:
-    """A head's skin and all that belongs to it.
+    """The meshes of a head.
 
     Attributes:
         face: the skin.
         rows: all other meshes.
-        eyes: by side, L and R, of those that there are.
-        notes: what was found and what was fitted in, a sentence each.
+        eyes: the eyeballs by side, "L" and "R"; a missing eye is left out.
+        notes: sentences about meshes that were found or fitted in.
     """
 
     face: HeadPart
@@ -68,15 +68,15 @@ class Fittings:
 
 
 class Bodies:
-    """Where the eyes and the teeth are in each expression, which the skin is kept out of."""
+    """Positions of teeth and gums in each expression. The skin must not cut into them."""
 
     def __init__(self, fittings: Fittings, skin: Surface, shapes: Mapping[str, Doubles]) -> None:
-        """Begins.
+        """Find the jaw's motion in each expression.
 
         Args:
-            fittings: of the target.
-            skin: of the target at rest.
-            shapes: float64[V, 3] by raw control.
+            fittings: the meshes of the target.
+            skin: the skin of the target at rest.
+            shapes: float64[V, 3] by raw control, displacements of the skin.
         """
         rows = fittings.of(TEETH, GUMS)
         self.jaw = _jaw(skin, shapes)
@@ -85,10 +85,10 @@ class Bodies:
         self._on_jaw = [row.hangs == JAW for row in rows]
 
     def posed(self, controls: tuple[str, ...]) -> list[Doubles]:
-        """float64[n, 3] of teeth and gums.
+        """float64[n, 3] for each mesh of teeth and gums: its posed vertices.
 
         Args:
-            controls: raw controls that are 1.
+            controls: names of the raw controls with value 1.
         """
         motion = self._motion(controls)
         if self.jaw is None or motion is None:
@@ -112,11 +112,11 @@ class Bodies:
 
 
 def eye_turn_of(side: str, controls: tuple[str, ...]) -> Doubles | None:
-    """float64[3, 3]: what controls turn an eye by; None where it rests.
+    """float64[3, 3]: the rotation of an eye; None if no control turns it.
 
     Args:
         side: "L" or "R".
-        controls: raw controls that are 1.
+        controls: names of the raw controls with value 1.
     """
     out = None
     for look in LOOKS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lashes, brows and what else lies on a skin: carried and turned by the skin at their roots."""
+"""Moves lashes, brows and other meshes that lie on the skin with the skin at their roots."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 
-_PATCH = 16  # vertices of the skin that turn a point
-_BLOCK = 256  # patches whose distances are looked at together
-_MOVED = 1e-5  # cm: a patch that moves less rests
+_PATCH = 16  # skin vertices whose rotation a point follows
+_BLOCK = 256  # patches that are computed together, to limit memory
+_MOVED = 1e-5  # cm: smaller motions are ignored
 
 
 class Followers:
-    """Points that the skin carries along, each with a patch of skin around its root."""
+    """Points that follow the skin; each has a patch of skin vertices around its root."""
 
     def __init__(self, skin: Surface, points: Doubles, islands: Ints | None, patch: int = _PATCH):
-        """Begins.
+        """Find the patch of each point.
 
         Args:
-            skin: at rest.
-            points: float64[n, 3], at rest.
-            islands: int64[n], the island of each point; the points of an island that are nearest
-                to the skin are its root, and all of it goes with roots. None: each point goes with
-                the skin nearest to it.
-            patch: vertices of the skin around a root.
+            skin: the skin at rest.
+            points: float64[n, 3], the points at rest.
+            islands: int64[n], the island of each point. The points of an island closest to the skin
+                are its roots, and its other points follow the nearest root. None: each point
+                follows the skin nearest to it.
+            patch: number of skin vertices around a root.
         """
         self.skin, self.points = skin, points
         tree = ClosestPoints(skin.points, np.ascontiguousarray(skin.triangles, np.int32))
@@ -41,11 +41,11 @@ class Followers:
         self._patches = _patches(skin, self._anchors, min(patch, len(skin.points)))
 
     def carried(self, displacement: Doubles, *, sized: bool = False) -> Doubles:
-        """float64[n, 3]: where the points are when the skin is displaced.
+        """float64[n, 3]: positions of the points on the displaced skin.
 
         Args:
-            displacement: float64[V, 3].
-            sized: whether they become larger and smaller with the skin.
+            displacement: float64[V, 3], displacements of the skin vertices.
+            sized: whether the points also scale with their patch.
         """
         out = self.points.copy()
         moving = np.abs(displacement[self._patches]).max(axis=(1, 2)) > _MOVED
@@ -67,10 +67,11 @@ class Followers:
         return out
 
     def ways(self, expressions: dict[str, Doubles]) -> dict[str, Doubles]:
-        """float64[n, 3] by name of what moves the points.
+        """float64[n, 3] by name: displacements of the points; expressions without motion are left
+        out.
 
         Args:
-            expressions: float64[V, 3] of the skin by name.
+            expressions: float64[V, 3] by name, displacements of the skin.
         """
         out = {}
         for name, displacement in expressions.items():
@@ -81,7 +82,7 @@ class Followers:
 
 
 def _roots(skin: Surface, points: Doubles, nearest: Ints, distance: Doubles, islands: Ints) -> Ints:
-    """int64[n]: the skin's vertex at the root nearest to each point, on its own island."""
+    """int64[n]: for each point, the skin vertex at the nearest root of its island."""
     out = nearest.copy()
     for island in np.unique(islands):
         own = np.flatnonzero(islands == island)
@@ -94,13 +95,14 @@ def _roots(skin: Surface, points: Doubles, nearest: Ints, distance: Doubles, isl
 
 
 def _patches(skin: Surface, anchors: Ints, size: int) -> Ints:
-    """int64[anchors, size]: the nearest vertices of the skin, those that look the same way."""
+    """int64[anchors, size]: the skin vertices nearest to each anchor; a vertex with an opposite
+    normal counts as 1 cm farther."""
     normals = skin.normals()
     out = np.zeros((len(anchors), size), np.int64)
     for begin in range(0, len(anchors), _BLOCK):
         own = anchors[begin : begin + _BLOCK]
         away = np.linalg.norm(skin.points[own][:, None] - skin.points[None], axis=2)
-        # The other lid, or the inside of a lip, looks elsewhere.
+        # Excludes the other lid and the inside of a lip.
         against: npt.NDArray[np.bool_] = normals[own] @ normals.T < 0.0
         away = np.where(against, away + 1.0, away)
         out[begin : begin + _BLOCK] = np.argpartition(away, size - 1, axis=1)[:, :size]
@@ -108,7 +110,7 @@ def _patches(skin: Surface, anchors: Ints, size: int) -> Ints:
 
 
 def _turns(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """float64[n, 3, 3] rotations and float64[n] sizes of patches (Umeyama 1991)."""
+    """float64[n, 3, 3]: rotations, float64[n]: scale factors of patches (Umeyama 1991)."""
     u, s, vt = np.linalg.svd(np.einsum("npi,npj->nij", after, before))
     sign = np.sign(np.linalg.det(u @ vt))
     u[:, :, 2] *= sign[:, None]

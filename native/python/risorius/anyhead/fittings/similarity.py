@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A turn, a size and a shift that bring points near others."""
+"""Similarity transforms (rotation, scale and translation) and their least-squares fit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from ...author.geometry.skeleton import Doubles
 
 @dataclass(frozen=True)
 class Similarity:
-    """p -> scale * turn @ (p - before) + after."""
+    """The transform p -> scale * turn @ (p - before) + after.
+
+    Attributes:
+        turn: float64[3, 3], the rotation.
+        scale: the scale factor.
+        before, after: float64[3], a point and its image.
+    """
 
     turn: Doubles
     scale: float
@@ -20,35 +26,35 @@ class Similarity:
     after: Doubles
 
     def point(self, points: Doubles) -> Doubles:
-        """float64[..., 3].
+        """float64[..., 3]: transformed points.
 
         Args:
-            points: float64[..., 3].
+            points: float64[..., 3], positions.
         """
         return np.asarray(self.way(points - self.before) + self.after)
 
     def way(self, ways: Doubles) -> Doubles:
-        """float64[..., 3]: ways turned and sized.
+        """float64[..., 3]: vectors, rotated and scaled but not translated.
 
         Args:
-            ways: float64[..., 3].
+            ways: float64[..., 3], vectors.
         """
         return np.asarray(self.scale * (ways @ self.turn.T))
 
     def shifted(self, by: Doubles) -> Similarity:
-        """The same with a shift behind it.
+        """This transform, followed by a translation.
 
         Args:
-            by: float64[3].
+            by: float64[3], the translation.
         """
         return Similarity(self.turn, self.scale, self.before, self.after + by)
 
 
 def similarity(before: Doubles, after: Doubles) -> Similarity:
-    """The least-squares similarity of points (Umeyama 1991).
+    """The least-squares similarity between two sets of points (Umeyama 1991).
 
     Args:
-        before, after: float64[n, 3], n at least 3.
+        before, after: float64[n, 3], corresponding points; n at least 3.
     """
     first, then = before.mean(axis=0), after.mean(axis=0)
     a, b = before - first, after - then

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each mesh of a head without expressions is, by names, by form and by place."""
+"""Finds the kind of each mesh of a head (teeth, lashes, hair ...) by its name, form and place."""
 
 from __future__ import annotations
 
@@ -45,23 +45,23 @@ _NAMES = (
 )  # fmt: skip
 _LOWER = re.compile(r"low|bottom|down|mandib|(?:^|[_\W])[dl](?:[_\W]|$)", re.IGNORECASE)
 _UPPER = re.compile(r"upp?|top|maxill|(?:^|[_\W])u(?:[_\W]|$)", re.IGNORECASE)
-_HEIGHT = 23.0  # cm, of a face
-_NEAR = 2.6  # of an eye's radius: where its lids are
-_AT_EYE = 2.4  # of an eye's radius: how far lashes reach
-_LASH = 0.25  # of the face's height: nothing at an eye is larger
-_MOUTH_HALF, _MOUTH_HIGH = 3.6, 4.0  # cm about the middle, of what may be teeth or a tongue
-_APART = 0.3  # cm between the middles of both rows of teeth, at least
-_LARGE = 9.0  # cm: hair at least
+_HEIGHT = 23.0  # cm: height of a face
+_NEAR = 2.6  # of an eye's radius: largest distance of lids from its centre
+_AT_EYE = 2.4  # of an eye's radius: largest distance of lashes from its centre
+_LASH = 0.25  # of the face's height: largest extent of a mesh at an eye
+_MOUTH_HALF, _MOUTH_HIGH = 3.6, 4.0  # cm: largest half width and height of teeth or a tongue
+_APART = 0.3  # cm: least distance between the middles of both rows of teeth
+_LARGE = 9.0  # cm: least extent of hair
 
 
 def sort_parts(parts: Sequence[HeadPart]) -> Fittings:
-    """The skin of a head, its eyes, and what each other mesh is.
+    """Sort the meshes of a head into the skin, the eyes and other kinds.
 
     Args:
         parts: all meshes, in cm, y up, the face towards +z, left at +x.
 
     Raises:
-        ArgumentError: no mesh with polygons.
+        ArgumentError: no mesh has polygons.
     """
     able = [part for part in parts if part.mesh.faces]
     if not able:
@@ -76,12 +76,12 @@ def sort_parts(parts: Sequence[HeadPart]) -> Fittings:
     place = _Place(face, eyes)
     others = [piece for piece in islands if piece is not face]
     own = [piece for piece in others if piece.source == face.source and _is_skin(piece, place)]
-    if own:  # crumbs of a scan, ears: the mesh stays one
+    if own:  # fragments of a scan or ears: they stay in the mesh of the face
         others = [piece for piece in others if all(piece is not crumb for crumb in own)]
         face = out.face = _in_one([face, *own], face.name)
     whole = [part for part in rest if part.source == face.source]
     if len(whole) == 1 and len(whole[0].mesh.faces) == len(face.mesh.faces):
-        out.face = whole[0]  # nothing was taken out of it: its vertices keep their numbers
+        out.face = whole[0]  # no island was separated: the vertices keep their indices
     for piece in _gathered(others, place):
         out.rows.append(piece)
     _divide_mouth(out, place)
@@ -90,10 +90,10 @@ def sort_parts(parts: Sequence[HeadPart]) -> Fittings:
 
 
 def eyeball_of(eye: Eye) -> Eyeball:
-    """An eye's ball with its cornea as lids meet it.
+    """The eyeball with its cornea as one surface.
 
     Args:
-        eye: what take_eyes found.
+        eye: an eye that take_eyes found.
     """
     points, triangles, first = [], [], 0
     for part in eye.parts:
@@ -107,7 +107,8 @@ def eyeball_of(eye: Eye) -> Eyeball:
 
 
 def _pieces(part: HeadPart, eyes: Sequence[Eye]) -> list[HeadPart]:
-    """A mesh, or its islands where one of them may be the skin of the face."""
+    """The islands of a mesh, the island most likely to be the face first; a mesh with a known name
+    stays whole."""
     if _named(part.name) is not None:
         return [part]
     labels = islands_of(part.mesh)
@@ -138,7 +139,7 @@ def _named(name: str) -> str | None:
 
 
 def _face(islands: Sequence[HeadPart], eyes: Sequence[Eye]) -> HeadPart:
-    """The island with most vertices around both eyes, else the largest one."""
+    """The island with the most vertices around both eyes; without eyes the largest island."""
     able = [piece for piece in islands if _named(piece.name) is None] or list(islands)
 
     def around(piece: HeadPart) -> tuple[int, int]:
@@ -153,7 +154,7 @@ def _face(islands: Sequence[HeadPart], eyes: Sequence[Eye]) -> HeadPart:
 
 
 class _Place:
-    """Where the eyes and the mouth of a face are, roughly."""
+    """The approximate places of the eyes and the mouth of a face."""
 
     def __init__(self, face: HeadPart, eyes: Sequence[Eye]) -> None:
         self.eyes = eyes
@@ -166,7 +167,7 @@ class _Place:
         else:
             self.eye_height = float(points[:, 1].max()) - 0.45 * _HEIGHT
             apart = 6.3
-        self.unit = max(apart / 6.3, 0.5)  # of a human face
+        self.unit = max(apart / 6.3, 0.5)  # length of 1 cm of a human face
         near = np.abs(points[:, 0] - self.middle) < 2.5 * self.unit
         near &= np.abs(points[:, 1] - self.mouth_height) < 2.0 * self.unit
         self.front = float(points[near, 2].max()) if near.any() else float(points[:, 2].max())
@@ -176,7 +177,7 @@ class _Place:
         return self.eye_height - 7.0 * self.unit
 
     def in_mouth(self, points: Doubles) -> bool:
-        """Whether a mesh lies behind the lips."""
+        """Whether points have the size and the place of a mesh behind the lips."""
         low, high = points.min(axis=0), points.max(axis=0)
         middle = (low + high) / 2
         return bool(
@@ -189,7 +190,7 @@ class _Place:
         )
 
     def at_eye(self, points: Doubles) -> bool:
-        """Whether a small mesh lies around an eye."""
+        """Whether points belong to a small mesh around an eye."""
         if np.ptp(points, axis=0).max() > _LASH * _HEIGHT * self.unit:
             return False
         return any(
@@ -200,7 +201,7 @@ class _Place:
 
 
 def _gathered(pieces: Sequence[HeadPart], place: _Place) -> list[Fitted]:
-    """Each mesh with its kind; islands of one mesh and one kind are one again."""
+    """The meshes with their kinds; islands of the same mesh and kind are joined again."""
     groups: dict[tuple[str, str], list[HeadPart]] = {}
     for piece in pieces:
         kind = _named(piece.name) or _by_place(piece, place)
@@ -220,7 +221,7 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
         deep, wide = float(np.ptp(points[:, 2])), float(np.ptp(points[:, 0]))
         low = (points[:, 1].min() + points[:, 1].max()) / 2 < place.mouth_height
         full = len(points) > 30 and deep > 0.9 * wide and deep > 2.5 * place.unit
-        # Rows of teeth are arches: there is nothing in their middle.
+        # A row of teeth is an arch with an empty middle, a tongue is not.
         middle = np.abs(points[:, 0] - place.middle) < 0.15 * wide
         filled = np.ptp(points[middle, 2]) > 0.7 * deep if middle.any() else False
         return TONGUE if full and filled and low else TEETH
@@ -230,13 +231,13 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
 
 
 def _is_flat(points: Doubles) -> bool:
-    """Whether a mesh is no shell around a ball: lashes are wide and of little height."""
+    """Whether the smallest extent is below 0.6 of the largest, as of lashes but not of a shell."""
     extent = np.sort(np.ptp(points, axis=0))
     return bool(extent[0] < 0.6 * extent[2])
 
 
 def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
-    """Islands of a mesh in one mesh again."""
+    """Islands of a mesh, joined into one mesh."""
     first = pieces[0]
     name = first.name if len(pieces) == 1 and _named(first.name) else _called(first, kind)
     if len(pieces) == 1:
@@ -246,7 +247,7 @@ def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
 
 
 def _in_one(pieces: Sequence[HeadPart], name: str) -> HeadPart:
-    """Parts of one object as one mesh, their polygons in the object's order."""
+    """Parts of one object, joined into one mesh with the polygons in the order of the object."""
     first = pieces[0]
     numbers = np.concatenate(
         [
@@ -277,7 +278,7 @@ def _called(piece: HeadPart, kind: str) -> str:
 
 
 def _divide_mouth(out: Fittings, place: _Place) -> None:
-    """Upper teeth on the head, lower teeth and tongue on the jaw."""
+    """Attach upper teeth to the head, and lower teeth and tongue to the jaw."""
     rows: list[Fitted] = []
     middle = _between_rows(out, place)
     for row in out.rows:
@@ -292,7 +293,7 @@ def _divide_mouth(out: Fittings, place: _Place) -> None:
 
 
 def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
-    """The island of each vertex, and the height of the middle of each island."""
+    """int64[V]: the island of each vertex; float64[islands]: the middle height of each island."""
     labels: Ints = islands_of(part.mesh)
     heights, count = part.mesh.positions[:, 1], int(labels.max()) + 1
     low, high = np.full(count, np.inf), np.full(count, -np.inf)
@@ -302,7 +303,7 @@ def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
 
 
 def _between_rows(out: Fittings, place: _Place) -> float:
-    """The height between upper and lower teeth."""
+    """The height of the line between upper and lower teeth; without two rows, of the mouth."""
     middles = [_heights(row.part)[1] for row in out.of(TEETH)]
     every = np.concatenate(middles) if middles else np.zeros(0)
     apart = float(np.ptp(every)) if len(every) > 1 else 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a face of a DNA file, as the parts that a head without expressions may lack."""
+"""Reads the meshes of a template (a DNA file) that can be fitted into a head that lacks them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ...author.input.obj import ObjMesh
 from ...author.work import listed_meshes
 from ...gameface.parts import axes_of
 
-_CM = 100.0  # of what axes_of gives, which is in metres
-_LEAST = 1e-3  # cm: what moves less rests
-_OWN = ("tongue", "lash", "eye")  # meshes with shapes that no skin gives them
+_CM = 100.0  # cm per metre, the unit of axes_of
+_LEAST = 1e-3  # cm: smaller motions are ignored
+_OWN = ("tongue", "lash", "eye")  # meshes with shapes that do not follow from the skin
 
 
 def template_parts(dna: Dna) -> tuple[int, list[HeadPart]]:
-    """The index of the skin and all meshes of the finest level, in cm, standing.
+    """The index of the skin and all meshes of LOD 0, in cm, y up, the face towards +z.
 
-    Shapes are those of tongue and lashes, and of the pupils: what the skin does not carry.
+    Only shapes that do not follow from the skin are kept: tongue, lashes and pupils.
 
     Args:
-        dna: with geometry.
+        dna: a face with geometry.
     """
     axes = _CM * axes_of(dna)
     flipped = bool(np.linalg.det(axes) < 0)
@@ -59,11 +59,11 @@ def _polygons(mesh: Mesh, axes: Doubles, *, flipped: bool) -> ObjMesh:
 def _shapes(
     dna: Dna, own: list[int], names: list[str], axes: Doubles
 ) -> dict[int, dict[str, Doubles]]:
-    """float64[V, 3] by control of some meshes."""
+    """For each mesh of `own`: float64[V, 3] by control, the displacements."""
     out: dict[int, dict[str, Doubles]] = {m: {} for m in own}
     if not own:
         return out
-    poser = Poser(dna, own[0], own[1:])  # its first mesh may be any
+    poser = Poser(dna, own[0], own[1:])  # the order of the meshes is arbitrary
     rest = poser.neutral
     for control, name in enumerate(names):
         for m, before, after in zip(own, rest, poser.pose((control,)), strict=True):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A small statistical model of the form of heads, and its fit to any surface."""
+"""A small statistical model of the form of heads, and its fit to a surface."""

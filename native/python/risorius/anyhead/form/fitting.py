@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The model of form laid onto a surface: its place, its size, its parts (iterative closest points).
+"""Fits the statistical head model to a surface by iterative closest points.
 
-Each round pairs the model's vertices with the closest points of the surface whose normals agree,
-and solves place, size and parts together (Gauss-Newton; parts as likely as the model says).
+Each round pairs vertices of the model with the closest points of the surface with a similar normal.
+A Gauss-Newton step then solves rotation, translation, scale and weights of the model together.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 from .heads import HeadForm, head_form
 
-_NOISE = 0.1  # cm of the model, of what parts explain
-_ALIKE = 0.08  # neighbours err alike: what share of the pairs counts as a measurement of its own
-_ALONG = 0.15  # how much a pair says of places along the surface, where that across it says 1
-_EXPRESSED = 4.0  # an expression of 0.5 is as seldom as a part of 1
-_SELDOM = ("smile", "pucker")  # of a neutral face: they would take the place of its own mouth
-_OPEN = (0.0, 1.2)  # what an expression may be
-_BEYOND = 3.5  # standard deviations that a part may have
+_NOISE = 0.1  # cm: standard deviation of distances that the model cannot explain
+_ALIKE = 0.08  # share of the pairs that count as independent, because neighbours err alike
+_ALONG = 0.15  # weight of distances along the surface, against 1 across it
+_EXPRESSED = 4.0  # prior of an expression against a part: a weight of 0.5 is as rare as 1 of a part
+_SELDOM = ("smile", "pucker")  # held strongly, or they would imitate the neutral mouth of a person
+_OPEN = (0.0, 1.2)  # range of the weight of an expression
+_BEYOND = 3.5  # standard deviations: largest weight of a part
 
 
 @dataclass
 class Pose:
-    """Where a form is: point = scale * rotation @ form + shift.
+    """A fitted model and its place: point = scale * rotation @ form + shift.
 
     Attributes:
         rotation: float64[3, 3].
-        scale: units of the surface in a cm of the form.
-        shift: float64[3].
-        parts: float64[K].
-        expressions: float64[E].
+        scale: units of the surface per cm of the form.
+        shift: float64[3], the translation.
+        parts: float64[K], weights of the form's parts in standard deviations.
+        expressions: float64[E], weights of the form's expressions, 0 to 1.2.
     """
 
     rotation: Doubles
@@ -46,26 +46,26 @@ class Pose:
     expressions: Doubles = field(default_factory=lambda: np.zeros(len(head_form().expressions)))
 
     def points(self, form: HeadForm) -> Doubles:
-        """float64[V, 3] in the surface's space."""
+        """float64[V, 3]: vertices of the fitted form in the surface's space."""
         return self.place(form.shaped(self.parts, self.expressions))
 
     def place(self, points: Doubles) -> Doubles:
-        """float64[n, 3] of the form's space -> of the surface's."""
+        """Transform points from the form's space to the surface's: float64[n, 3]."""
         return np.asarray(self.scale * points @ self.rotation.T + self.shift)
 
     def back(self, points: Doubles) -> Doubles:
-        """float64[n, 3] of the surface's space -> of the form's."""
+        """Transform points from the surface's space to the form's: float64[n, 3]."""
         return np.asarray((points - self.shift) @ self.rotation / self.scale)
 
 
 class Target:
-    """A surface that forms are laid onto.
+    """A surface to which the model is fitted.
 
     Attributes:
-        surface: it.
-        closest: finds its points.
-        normals: float64[T, 3] of length 1, of its triangles.
-        open_side: bool[T, 3], whether the side across from each corner is at a border.
+        surface: the triangles.
+        closest: search tree for closest points.
+        normals: float64[T, 3], unit normals of the triangles.
+        open_side: bool[T, 3], whether the side opposite to each corner is a border of the surface.
     """
 
     def __init__(self, surface: Surface) -> None:
@@ -82,13 +82,13 @@ class Target:
         """The closest points of the surface.
 
         Args:
-            points, normals: float64[n, 3] of what is laid onto it.
-            least_cosine: between the normals of a pair.
-            farthest: distance.
+            points, normals: float64[n, 3], points with normals whose partners are searched for.
+            least_cosine: least cosine between the normals of a pair.
+            farthest: largest distance of a pair.
 
         Returns:
-            bool[n] whether there is one, within the surface and not at its border; float64[n, 3]
-            points; float64[n, 3] normals.
+            bool[n], False for points without a partner or with one at a border of the surface;
+            float64[n, 3], the partners; float64[n, 3], their normals.
         """
         triangle, shares, _ = self.closest.nearest(points, normals, least_cosine, farthest)
         at = np.maximum(triangle, 0)
@@ -105,16 +105,16 @@ def _open_sides(triangles: Ints, count: int) -> npt.NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Step:
-    """How a part of a fit is done.
+    """Settings of one step of a fit.
 
     Attributes:
-        rounds: of pairs.
-        reach: cm of the form: a pair farther apart counts little.
-        vertices: of the form that are paired.
-        parts: how many of the form's parts may change.
-        prior: how strongly these are held; 1 as likely as the model says.
-        least_cosine: between the normals of a pair.
-        expressions: whether these may change.
+        rounds: number of rounds; each finds new pairs.
+        reach: cm of the form; pairs farther apart have little weight.
+        vertices: number of vertices of the form that are paired.
+        parts: number of the form's parts whose weights may change.
+        prior: strength of the pull of weights towards 0; 1: the model's standard deviations.
+        least_cosine: least cosine between the normals of a pair.
+        expressions: whether weights of expressions may change.
     """
 
     rounds: int
@@ -145,14 +145,14 @@ def fit(
     held: Held | None = None,
     weights: Doubles | None = None,
 ) -> Pose:
-    """A form laid onto a surface, from a pose that is near.
+    """Fit the model to a surface, beginning with an approximate pose.
 
     Args:
         target: the surface.
-        pose: to begin with; it stays as it is.
-        steps: one after the other.
-        held: vertices of the form whose places are known.
-        weights: float64[V], how much each vertex of the form says; None: as the form has it.
+        pose: the pose to begin with; it is not changed.
+        steps: the steps of the fit in order.
+        held: vertices of the form with known positions.
+        weights: float64[V], weight of each vertex of the form; None: the weights of the form.
     """
     form = head_form()
     if weights is not None:
@@ -170,12 +170,12 @@ def fit(
 
 @dataclass(frozen=True)
 class Held:
-    """Vertices of the form whose places are known.
+    """Vertices of the form with known positions.
 
     Attributes:
-        vertices: int64[n].
-        points: float64[n, 3] in the surface's space.
-        weights: float64[n]; 1: as much as a pair of the middle of the face.
+        vertices: int64[n], indices of vertices of the form.
+        points: float64[n, 3], their positions in the surface's space.
+        weights: float64[n]; 1 is the weight of a pair in the middle of the face.
     """
 
     vertices: Ints
@@ -184,7 +184,7 @@ class Held:
 
 
 def _chosen(form: HeadForm, count: int) -> Ints:
-    """int64[n]: vertices spread over the form, denser where it says more."""
+    """int64[n]: vertices spread over the form, denser where the weights of the form are high."""
     if count >= form.skin:
         return np.arange(form.skin)
     areas = np.zeros(form.skin)
@@ -197,11 +197,11 @@ def _chosen(form: HeadForm, count: int) -> Ints:
 
 
 def form_normals(form: HeadForm, shaped: Doubles) -> Doubles:
-    """float64[skin, 3], normals of a form in its own space.
+    """float64[skin, 3]: unit vertex normals of a form in its own space.
 
     Args:
-        form: its triangles count.
-        shaped: float64[V, 3].
+        form: gives the triangles.
+        shaped: float64[V, 3], the vertex positions.
     """
     a, b, c = (shaped[form.triangles[:, k]] for k in range(3))
     across = np.cross(b - a, c - a)
@@ -212,7 +212,7 @@ def form_normals(form: HeadForm, shaped: Doubles) -> Doubles:
 
 @cache
 def _around() -> tuple[Ints, Ints]:
-    """Corners of triangles in the order of their vertices, and where each vertex begins."""
+    """The triangle corners sorted by vertex, and the index of the first corner of each vertex."""
     flat = head_form().triangles.ravel()
     order = np.argsort(flat, kind="stable")
     return order, np.searchsorted(flat[order], np.arange(head_form().skin))
@@ -224,12 +224,12 @@ def _mean_normals() -> Doubles:
 
 
 def pose_normals(form: HeadForm, pose: Pose, shaped: Doubles) -> Doubles:
-    """float64[skin, 3], normals of a form in the surface's space.
+    """float64[skin, 3]: unit vertex normals of a form in the surface's space.
 
     Args:
         form: the model.
-        pose: of it.
-        shaped: float64[V, 3], the form that the pose has.
+        pose: the pose of the form.
+        shaped: float64[V, 3], vertex positions of the form with the weights of the pose.
     """
     as_mean = not pose.parts.any() and not pose.expressions.any()
     normals = _mean_normals() if as_mean else form_normals(form, shaped)
@@ -248,7 +248,7 @@ def _round(
     used = chosen[found]
     if len(used) < 30:
         return pose
-    # All in the form's space: a surface's point goes there by the pose as it is.
+    # The equations are in the form's space; points of the surface are transformed to it.
     away = shaped[used] - pose.back(near[found])
     across = across[found] @ pose.rotation
     weight = form.weights[used] / (1 + (np.linalg.norm(away, axis=1) / step.reach) ** 2) ** 2
@@ -261,7 +261,8 @@ def _round(
 
 
 class _System:
-    """The normal equations of a round: turn, shift and growth, then parts, then expressions."""
+    """The normal equations of a round. Unknowns: rotation (3), translation (3), growth (1), then
+    the weights of parts and of expressions."""
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:
         self.form, self.shaped, self.step = form, shaped, step
@@ -271,13 +272,13 @@ class _System:
         self.left, self.right = np.zeros((size, size)), np.zeros(size)
 
     def add(self, used: Ints, away: Doubles, across: Doubles | None, weight: Doubles) -> None:
-        """Pairs: what is left of them shall go.
+        """Add equations that reduce the distances of pairs.
 
         Args:
             used: int64[n], vertices of the form.
-            away: float64[n, 3], from their partners to them.
-            across: float64[n, 3], normals; None: each direction counts alike.
-            weight: float64[n].
+            away: float64[n, 3], vectors from their partners to these vertices.
+            across: float64[n, 3], normals at the partners; None: all directions have equal weight.
+            weight: float64[n], weights of the pairs.
         """
         ways = self._ways(used)
         amount = _ALIKE * weight / _NOISE**2
@@ -291,7 +292,7 @@ class _System:
             self.right -= (ways[:, k] * amount[:, None]).T @ away[:, k]
 
     def _ways(self, used: Ints) -> Doubles:
-        """float64[n, 3, size]: where each unknown takes the vertices."""
+        """float64[n, 3, size]: derivatives of the vertex positions by each unknown."""
         points, form = self.shaped[used], self.form
         turn = np.cross(np.eye(3)[None], points[:, None])  # [n, axis, 3]
         out = [turn.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (len(used), 3, 3))]
@@ -301,7 +302,7 @@ class _System:
         return np.concatenate(out, axis=2)
 
     def solved(self, pose: Pose) -> Pose:
-        """The pose after the step."""
+        """The pose after a Gauss-Newton step from `pose`."""
         values = np.concatenate([pose.parts[: self.parts], pose.expressions[: self.more]])
         hold = np.full(len(values), float(self.step.prior))
         hold[self.parts :] *= _EXPRESSED
@@ -327,7 +328,7 @@ class _System:
 
 
 def _turn(vector: Doubles) -> Doubles:
-    """float64[3, 3]: the rotation about a vector by its length, half a radian at most."""
+    """float64[3, 3]: the rotation about a vector by its length in radians, at most 0.5."""
     angle = float(np.linalg.norm(vector))
     if angle < 1e-12:
         return np.eye(3)

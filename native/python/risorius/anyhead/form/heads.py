@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The model of form: a mean head, the ways in which heads differ, and what some expressions add."""
+"""The statistical head model: a mean head, its principal variations and some expressions."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ FILE_NAME = "heads.npz"  # made by packaging/ship/make_head_form.py
 
 @dataclass(frozen=True)
 class HeadForm:
-    """Heads as a mean plus weighted parts, in cm, 0 between the eyes, standing.
+    """A mean head plus weighted parts, in cm, y up, face towards +z, origin between the eyes.
 
-    The last four vertices belong to no triangle: the middle and the foremost place of the left
-    eyeball, then those of the right one.
+    The last four vertices belong to no triangle: the centre and the foremost point of the left
+    eyeball, then of the right eyeball.
 
     Attributes:
-        mean: float64[V, 3].
-        parts: float64[K, V, 3], each as large as one standard deviation.
-        expressions: float64[E, V, 3]; each is added 0 to 1 times.
-        expression_names: of these.
+        mean: float64[V, 3], vertex positions of the mean head.
+        parts: float64[K, V, 3], principal displacements of one standard deviation.
+        expressions: float64[E, V, 3], displacements of expressions, for weights from 0 to 1.
+        expression_names: the names of the expressions.
         triangles: int64[T, 3].
-        weights: float64[V], how much each vertex says of where a face is, 0 to 1.
-        places: vertex of each landmark by name.
+        weights: float64[V], weight of each vertex in a fit, 0 to 1.
+        places: the vertex index of each landmark by name.
     """
 
     mean: Doubles
@@ -42,15 +42,15 @@ class HeadForm:
 
     @property
     def skin(self) -> int:
-        """How many vertices are of the skin; those of the eyes follow."""
+        """The number of skin vertices, which precede the four eye vertices."""
         return len(self.mean) - 4
 
     def shaped(self, parts: Doubles, expressions: Doubles) -> Doubles:
-        """float64[V, 3], a head.
+        """float64[V, 3]: vertex positions of a head with given weights.
 
         Args:
-            parts: float64[K].
-            expressions: float64[E].
+            parts: float64[K], weights of the parts in standard deviations.
+            expressions: float64[E], weights of the expressions.
         """
         out = self.mean + np.tensordot(parts, self.parts, 1)
         return np.asarray(out + np.tensordot(expressions, self.expressions, 1))
@@ -58,7 +58,7 @@ class HeadForm:
 
 @cache
 def head_form() -> HeadForm:
-    """The model that the package brings."""
+    """The model in the data file of this package."""
     data = files(__package__).joinpath(FILE_NAME).read_bytes()
     with np.load(io.BytesIO(data), allow_pickle=False) as packed:
         form = packed["form"] * packed["form_scale"][:, None, None]

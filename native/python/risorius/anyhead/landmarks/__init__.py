@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Named places of a face: found without clicks, refused where there is no face, saved as JSON."""
+"""Landmarks of a face: found automatically, checked, and stored as JSON."""

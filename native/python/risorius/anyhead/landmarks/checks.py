@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes that are no head, or none that a rig can be made of: a sentence each."""
+"""Checks that a mesh is a head that a rig can be made of; an error explains why it is not."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from ..surface import Surface
 from .marks import LandmarkError
 
 LEAST, MOST = 200, 1_000_000  # vertices of a head
-_FLAT = 0.02  # of a mesh' size: so near to a plane its border lies in it
-_CUT = 0.3  # of the border: where so much of it lies in a plane the mesh was cut there
-_DEEP = 0.12  # cm of the form: a step so deep between the lids is an opening
-_ROWS, _COLUMNS = 25, 5  # rays through an eye
-_CROSSED = 0.04  # of the edges of a face that go through it, where it intersects itself
+_FLAT = 0.02  # of a mesh's size: border vertices within this distance of a plane lie in it
+_CUT = 0.3  # of the border: a mesh with more of its border in one end plane was cut there
+_DEEP = 0.12  # cm of the form: least depth of a step between the lids that counts as an opening
+_ROWS, _COLUMNS = 25, 5  # grid of rays through an eye
+_CROSSED = 0.06  # largest share of the edges of a face that may pass through the face
 
 
 def check_mesh(where: str, surface: Surface) -> None:
-    """Ends where a mesh cannot be looked at.
+    """Refuse a mesh in which no landmarks can be searched for.
 
     Args:
-        where: what the error calls it.
+        where: name of the mesh in error messages.
         surface: the mesh.
 
     Raises:
-        LandmarkError: no numbers, too few vertices or too many.
+        LandmarkError: a vertex position is not finite, or there are too few or too many vertices.
     """
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
     if len(bad):
@@ -47,10 +47,11 @@ def check_mesh(where: str, surface: Surface) -> None:
 
 
 def pieces(surface: Surface) -> list[Surface]:
-    """The parts of a surface that stand apart, the largest first; what overlaps is one part.
+    """The connected pieces of a surface, the piece with most triangles first. Pieces with
+    overlapping bounding boxes count as one.
 
     Args:
-        surface: it stays as it is.
+        surface: the surface; it is not changed.
     """
     corners = surface.triangles
     label = connected(len(surface.points), corners.ravel(), np.full(len(corners), 3))
@@ -66,7 +67,8 @@ def pieces(surface: Surface) -> list[Surface]:
 
 
 def _overlapping(low: Doubles, high: Doubles) -> Ints:
-    """int64[n]: a number for the boxes that overlap one another, directly or through others."""
+    """int64[n]: a group number for each box; boxes that overlap, directly or through others, have
+    the same number."""
     out = np.arange(len(low))
     if len(low) > 2000:  # hair of many strands
         return np.zeros(len(low), np.int64)
@@ -80,10 +82,11 @@ def _overlapping(low: Doubles, high: Doubles) -> Ints:
 
 
 def completed(surface: Surface) -> list[Surface]:
-    """A surface with its mirror image, for each side on which it ends in a plane along the axes.
+    """Completes a half head: one surface with its mirror image for each side on which the given
+    surface was cut along an axis plane.
 
     Args:
-        surface: it stays as it is.
+        surface: the surface; it is not changed.
     """
     points = surface.points
     border = points[surface.border()]
@@ -109,16 +112,16 @@ def completed(surface: Surface) -> list[Surface]:
 
 
 def check_eyes(where: str, target: Target, pose: Pose, points: dict[str, Doubles]) -> None:
-    """Ends where neither eye has an opening between its lids.
+    """Refuse a head if neither eye has an opening between its lids.
 
     Args:
-        where: what the error calls the head.
+        where: name of the head in error messages.
         target: the surface.
-        pose: of the form in it.
-        points: float64[3] of the landmarks by name.
+        pose: the pose of the model in the surface.
+        points: float64[3] by landmark name.
 
     Raises:
-        LandmarkError: both are closed or painted on.
+        LandmarkError: both eyes are closed or painted on.
     """
     if not any(_opens(target, pose, points, side) for side in "LR"):
         raise LandmarkError(
@@ -128,7 +131,7 @@ def check_eyes(where: str, target: Target, pose: Pose, points: dict[str, Doubles
 
 
 def _opens(target: Target, pose: Pose, points: dict[str, Doubles], side: str) -> bool:
-    """Whether rays from the front meet a step, an end or another piece between the lids."""
+    """Whether the depth along rays from the front has a step between the lids."""
     names = [f"{n}_{side}" for n in ("eye_inner", "eye_outer", "lid_upper", "lid_lower")]
     inner, outer, upper, lower = (pose.back(points[name][None])[0] for name in names)
     rows = np.linspace(-0.6, 1.6, _ROWS)[:, None, None]
@@ -145,12 +148,12 @@ def _opens(target: Target, pose: Pose, points: dict[str, Doubles], side: str) ->
 
 
 def lips_apart(target: Target, pose: Pose, points: dict[str, Doubles]) -> bool:
-    """Whether the lips are two: no short way along the surface leads from one to the other.
+    """Whether the lips are separate: no triangles near the mouth line connect them.
 
     Args:
         target: the surface.
-        pose: of the form in it.
-        points: float64[3] of the landmarks by name.
+        pose: the pose of the model in the surface.
+        points: float64[3] by landmark name.
     """
     left, right = (pose.back(points[f"mouth_corner_{s}"][None])[0] for s in "LR")
     upper, lower = (pose.back(points[f"lip_{n}_outer"][None])[0] for n in ("upper", "lower"))
@@ -171,12 +174,31 @@ def lips_apart(target: Target, pose: Pose, points: dict[str, Doubles]) -> bool:
     return bool(ends[0] != ends[1])
 
 
+def check_crossings(where: str, target: Target, pose: Pose) -> None:
+    """Refuse a face that intersects itself in many places.
+
+    Args:
+        where: name of the head in error messages.
+        target: the surface.
+        pose: the pose of the model in the surface.
+
+    Raises:
+        LandmarkError: more than 6 % of its edges pass through the face. A few do in any nostril.
+    """
+    share = crossed(target, pose)
+    if share > _CROSSED:
+        raise LandmarkError(
+            f"{where}: the face intersects itself at {100 * share:.0f} % of its edges: make the "
+            "mesh anew (in Blender: the modifier Remesh)"
+        )
+
+
 def crossed(target: Target, pose: Pose) -> float:
-    """Share of the edges of a face that go through it.
+    """The share of the edges of a face that pass through the surface, 0 to 1.
 
     Args:
         target: the surface.
-        pose: of the form in it.
+        pose: the pose of the model in the surface.
     """
     surface = target.surface
     inside = pose.back(surface.points)

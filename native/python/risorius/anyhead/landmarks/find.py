@@ -13,7 +13,7 @@ from ..form.fitting import FINE, Held, Pose, Target, fit, form_normals
 from ..form.heads import head_form
 from ..form.standing import NO_FACE, Standing, find_standing
 from ..surface import Surface
-from .checks import LEAST, check_eyes, check_mesh, completed, lips_apart, pieces
+from .checks import LEAST, check_crossings, check_eyes, check_mesh, completed, lips_apart, pieces
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
@@ -107,6 +107,7 @@ def find_form(target: Surface, hints: Hints | None = None) -> Found:
         pose = fit(seen, pose, FINE[1:], held)
     points = refined(seen, pose)
     landmarks = _on_surface(seen, pose, points)
+    check_crossings(hints.where, seen, pose)
     if hints.open_eyes:
         check_eyes(hints.where, seen, pose, points)
     for name, point in hints.marks.items():

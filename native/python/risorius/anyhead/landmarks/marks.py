@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The landmarks of one head, each found, moved by hand or missing, and their file."""
+"""The landmarks of a head (found, moved by hand or missing), and their JSON file."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _MOST_BYTES = 1 << 20
 
 
 class LandmarkError(RisoriusError):
-    """A head whose landmarks cannot be found, or a file of them that is not as it should be."""
+    """The landmarks of a head cannot be found, or a landmark file is invalid."""
 
     code = "landmarks"
 
 
 @dataclass
 class Landmarks:
-    """Places of a face by name, in the space of the surface they were found in.
+    """Landmarks of a face by name, in the space of the surface in which they were found.
 
     Attributes:
         points: float64[3] by name.
-        how: FOUND or MOVED for each of these.
-        notes: a sentence each, of what a person shall know.
+        how: FOUND or MOVED for each point.
+        notes: sentences for the user.
     """
 
     points: dict[str, Doubles] = field(default_factory=dict)
@@ -45,27 +45,27 @@ class Landmarks:
 
     @property
     def missing(self) -> list[str]:
-        """Names of those that have no place, in the order of names.toml."""
+        """Names of landmarks without a position, in the order of names.toml."""
         return [name for name in landmark_words() if name not in self.points]
 
     def moved(self, name: str, point: Doubles) -> None:
-        """A person gives a place to a landmark.
+        """Set the position of a landmark that the user moved.
 
         Args:
-            name: one of names.toml.
-            point: float64[3].
+            name: a name in names.toml.
+            point: float64[3], the position.
         """
         self.points[name] = np.asarray(point, np.float64)
         self.how[name] = MOVED
 
     def require(self, where: str) -> None:
-        """Ends where a landmark is missing that a registration needs.
+        """Refuse a head without all landmarks that a registration needs.
 
         Args:
-            where: what the error calls the head.
+            where: name of the head in error messages.
 
         Raises:
-            LandmarkError: names each of them.
+            LandmarkError: needed landmarks are missing; the message names all of them.
         """
         lost = [landmark_words()[n] for n in self.missing if n in needed_landmarks()]
         if lost:
@@ -78,12 +78,12 @@ class Landmarks:
 
 
 def landmarks_path(head: Path) -> Path:
-    """Where the landmarks of a head's file are kept: beside it."""
+    """The path of the landmark file of a head's file, in the same folder."""
     return head.with_name(f"{head.stem}.landmarks.json")
 
 
 def landmarks_text(landmarks: Landmarks) -> str:
-    """The JSON of landmarks; missing ones are in it with no place."""
+    """Landmarks as JSON; a missing landmark has no position."""
     rows: dict[str, Any] = {}
     for name in landmark_words():
         if name in landmarks.points:
@@ -96,14 +96,14 @@ def landmarks_text(landmarks: Landmarks) -> str:
 
 
 def read_landmarks(path: str | os.PathLike[str]) -> Landmarks:
-    """Landmarks of a file.
+    """Read a landmark file.
 
     Args:
-        path: as `landmarks_text` writes it; what it does not name is missing.
+        path: a JSON file with the text of `landmarks_text`; landmarks that it lacks are missing.
 
     Raises:
-        LandmarkError: it is none, with what is wrong.
-        OSError: it cannot be read.
+        LandmarkError: the file is invalid; the message says why.
+        OSError: the file cannot be read.
     """
     try:
         table = json.loads(read_file(path, _MOST_BYTES))

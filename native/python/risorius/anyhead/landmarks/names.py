@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The named places of a face, and how sentences call them."""
+"""The names of the landmarks of a face, and their names in sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...base import toml
 
 @cache
 def landmark_words() -> Mapping[str, str]:
-    """How sentences call each landmark, by name; those of the left before those of the right."""
+    """The words for each landmark in sentences, by name; each left one precedes its right one."""
     out: dict[str, str] = {}
     for name, row in _table().items():
         out[name] = row["words"]
@@ -23,13 +23,14 @@ def landmark_words() -> Mapping[str, str]:
 
 @cache
 def needed_landmarks() -> frozenset[str]:
-    """Names of those without which a registration cannot begin."""
+    """Names of the landmarks without which a registration cannot begin."""
     return _those_with("needed")
 
 
 @cache
 def vague_landmarks() -> frozenset[str]:
-    """Names of those that slide along the skin: nothing is pulled to them."""
+    """Names of landmarks with an imprecise place on the skin. A registration does not pull vertices
+    to them."""
     return _those_with("vague")
 
 
@@ -39,7 +40,7 @@ def _those_with(key: str) -> frozenset[str]:
 
 
 def other_side(name: str) -> str:
-    """The name of the landmark across the face; its own of one in the middle."""
+    """The name of the landmark on the other side of the face; a middle landmark's own name."""
     swap = {"_L": "_R", "_R": "_L"}
     return name[:-2] + swap[name[-2:]] if name[-2:] in swap else name
 

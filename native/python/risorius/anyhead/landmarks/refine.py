@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Landmarks finer than a whole head's fit: the model laid anew onto each region by itself."""
+"""Refines landmarks: the head model is fitted again to each region of the face alone."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ...author.geometry.skeleton import Doubles
 from ..form.fitting import Pose, Step, Target, fit
 from ..form.heads import HeadForm, head_form
 
-_ALL = 1 << 20
+_ALL = 1 << 20  # above any number of vertices
 
 
 @dataclass(frozen=True)
 class Region:
-    """A part of the face that is fitted by itself.
+    """A part of the face that is fitted alone.
 
     Attributes:
-        begins: how the names of its landmarks begin.
-        sides: whether the left and the right one are regions of their own.
-        width: cm of the form: how far off its middle half of the weight is gone, nearly.
-        prior: how strongly the form's parts are held.
-        least_cosine: between the normals of a pair.
-        expressions: whether these may change: at the mouth they would hide who it belongs to.
+        begins: prefixes of the names of its landmarks.
+        sides: whether the left and the right side are separate regions.
+        width: cm of the form: distance from the region's centre at which the weight is 1/e.
+        prior: strength of the pull of the form's weights towards 0.
+        least_cosine: least cosine between the normals of a pair.
+        expressions: whether expressions may change; at the mouth they would replace its own form.
     """
 
     begins: tuple[str, ...]
@@ -41,16 +41,16 @@ REGIONS = (
     Region(("nose_", "nostril_"), False, 3.5, 0.7, 0.5),
     Region(("ear_",), True, 4.5, 0.7, 0.4),
 )
-_STRAYED = 1.2  # cm of the form: a region that goes farther has found something else
-_SEEN = 0.02  # weights below count as none
+_STRAYED = 1.2  # cm of the form: a region whose landmarks move farther is rejected
+_SEEN = 0.02  # smaller weights are set to 0
 
 
 def refined(target: Target, pose: Pose) -> dict[str, Doubles]:
-    """float64[3] of each landmark, in the surface's space.
+    """float64[3] by landmark name: refined positions in the surface's space.
 
     Args:
         target: the surface.
-        pose: of the form in it.
+        pose: the pose of the model in the surface, from a fit of the whole head.
     """
     form = head_form()
     points = pose.points(form)

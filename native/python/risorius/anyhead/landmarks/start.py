@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A head brought near another by the forms and the landmarks of both."""
+"""Moves the vertices of a head near another head, by the fitted models and landmarks of both."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .find import Found, find_form
 from .marks import MOVED
 from .names import vague_landmarks
 
-_NEIGHBOURS = 12  # vertices of the form that say where a place goes
-_REACH = 2.5  # cm of the form: how far a landmark takes its surroundings along
-_ROWS = 2000  # places that are looked at together
+_NEIGHBOURS = 12  # vertices of the form from which the displacement of a point is interpolated
+_REACH = 2.5  # cm of the form: radius in which a landmark moves the skin
+_ROWS = 2000  # points that are computed together, to limit memory
 
 
 def start_of(
@@ -23,23 +23,23 @@ def start_of(
     of_template: Found | None = None,
     of_target: Found | None = None,
 ) -> Doubles:
-    """float64[V, 3]: the template's vertices near the target, in the target's space.
+    """float64[V, 3]: the template's vertices moved near the target, in the target's space.
 
     Args:
-        template: what is brought there.
-        target: where to.
-        of_template, of_target: what `find_form` found in them; None: it is found here.
+        template: the surface to move.
+        target: the surface of the other head.
+        of_template, of_target: results of `find_form` for both; None: computed here.
     """
     one, other = of_template or find_form(template), of_target or find_form(target)
     return carried(template.points, one, other)
 
 
 def carried(points: Doubles, one: Found, other: Found) -> Doubles:
-    """float64[n, 3]: places on or near a head, at their places on another.
+    """float64[n, 3]: positions on the second head of points on or near the first head.
 
     Args:
-        points: float64[n, 3] in the space of the one.
-        one, other: the heads.
+        points: float64[n, 3], in the space of the first head.
+        one, other: results of `find_form` for the first and the second head.
     """
     form = head_form()
     before = form.shaped(one.pose.parts, one.pose.expressions)
@@ -50,10 +50,10 @@ def carried(points: Doubles, one: Found, other: Found) -> Doubles:
 
 
 def common(one: Found, other: Found) -> list[str]:
-    """Names of the landmarks that both heads have, without vague ones that no person moved.
+    """Names of the landmarks that both heads have, without vague ones that the user did not move.
 
     Args:
-        one, other: the heads.
+        one, other: results of `find_form` for both heads.
     """
     moved = [
         n
@@ -68,12 +68,12 @@ def common(one: Found, other: Found) -> list[str]:
 
 
 def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
-    """float64[n, 3]: ways of points, at places between them.
+    """float64[n, 3]: displacements of points, interpolated at other places.
 
     Args:
-        places: float64[n, 3].
-        points: float64[m, 3].
-        ways: float64[m, 3], of the points.
+        places: float64[n, 3], positions of the results.
+        points: float64[m, 3], positions of the given displacements.
+        ways: float64[m, 3], the displacements.
     """
     out = np.empty_like(places)
     square = (points**2).sum(axis=1)
@@ -90,7 +90,8 @@ def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
 
 
 def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> Doubles:
-    """float64[n, 3]: what is left from each landmark of the one to that of the other, spread."""
+    """float64[n, 3]: smooth correction that moves the landmarks of the first head onto those of the
+    second after the displacement by the models."""
     names = common(one, other)
     if not names:
         return np.zeros_like(inside)
@@ -113,15 +114,15 @@ def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> 
 
 
 def pairs_of(template: Surface, one: Found, other: Found) -> list[tuple[int, Doubles]]:
-    """The template's vertex nearest each landmark, and where it belongs on another head.
+    """The template's vertex nearest to each landmark, and its position on another head.
 
-    What lies between the vertex and the landmark is carried along, so that a coarse template is
-    not pulled by its own edges.
+    The goal is the vertex's own position on the other head and not the landmark. This keeps the
+    distance between vertex and landmark, so that a coarse template is not distorted.
 
     Args:
-        template: the surface of the one.
-        one: what was found in it.
-        other: what was found in the other head.
+        template: the surface of the template.
+        one: result of `find_form` for the template.
+        other: result of `find_form` for the other head.
     """
     names = common(one, other)
     places = np.array([one.landmarks.points[n] for n in names]).reshape(-1, 3)

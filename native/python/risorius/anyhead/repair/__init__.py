@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What transfer breaks, repaired: lids that close on this eye, lips that meet, skin that is cut."""
+"""Repairs transferred expressions: closes lids and lips, takes skin out of eyes and teeth."""
 
 from .repairing import Repaired, repair
 from .report import Faults, Report

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Skin that is kept out of teeth and gums, and skin that is torn."""
+"""Measures skin that cuts into teeth and gums and moves it out; counts stretched polygons."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from ..fittings.fitted import Bodies
 from ..surface import Surface
 from .report import MM
 
-_NEAR = 0.8  # cm from teeth: skin that may come into them
-_DEEP = 0.01  # cm: what is less deep is left alone
-_AGAINST = 0.3  # cosine
-_INSIDE = 0.4  # cm: what seems to be deeper in lies behind
-_STRETCH = 2.5  # times its area, as SkinChecker counts it
-LEAST = 0.5  # mm3 that are left alone
-_AWAY = 1e4  # cm: solids that are there touch nothing
+_NEAR = 0.8  # cm around the box of the teeth: skin in it is checked
+_DEEP = 0.01  # cm: smaller depths are ignored
+_AGAINST = 0.3  # least cosine between the inward normal and the direction to a point inside
+_INSIDE = 0.4  # cm: a deeper point counts as behind the teeth, not inside
+_STRETCH = 2.5  # times its area at rest: a larger polygon is stretched, as in SkinChecker
+LEAST = 0.5  # mm3: a smaller volume is not repaired
+_AWAY = 1e4  # cm: shift of solids so that they touch no skin
 _ROUNDS = 4
-_MOVED = 1e-4  # cm: what moves less rests
-_AROUND = 15.0  # cm: what is further hides nothing
-_WAYS = 3  # of fifteen, along which what is seen is seen
-_SHORT = 0.2  # cm: what hangs on a longer edge is not beside what is seen
-_RIM = 2  # rings of vertices beside what is seen
-_LARGE = 60_000  # vertices of a skin from which on the soft way is not tried
+_MOVED = 1e-4  # cm: smaller motions are ignored
+_AROUND = 15.0  # cm: length of the rays that test visibility
+_WAYS = 3  # of 15 directions from which a visible vertex must be seen
+_SHORT = 0.2  # cm: the visible region does not grow over longer edges
+_RIM = 2  # rings of neighbours that are added to the visible vertices
+_LARGE = 60_000  # vertices: larger skins are only pushed along normals, without SkinChecker
 Mask = npt.NDArray[np.bool_]
 
 
 class Contacts:
-    """The skin of a target against its teeth and gums."""
+    """Contacts of the skin of a target with its teeth and gums."""
 
     def __init__(self, skin: Surface, faces: Sequence[Sequence[int]], bodies: Bodies) -> None:
-        """Begins.
+        """Measure the contacts at rest.
 
         Args:
-            skin: at rest.
+            skin: the skin at rest.
             faces: polygons of the skin.
             bodies: teeth and gums.
         """
@@ -58,17 +58,17 @@ class Contacts:
         of_triangle = np.linalg.norm(skin.face_normals(), axis=1) / 6
         for k in range(3):
             area += np.bincount(skin.triangles[:, k], of_triangle, len(area))
-        self._share = area[self._near]  # cm2 of each vertex
+        self._share = area[self._near]  # cm2: area of each vertex
 
     def stretched(self, displacement: Doubles) -> int:
-        """How many polygons have more than 2.5 times their area.
+        """The number of polygons with more than 2.5 times their area at rest.
 
         Args:
-            displacement: float64[V, 3].
+            displacement: float64[V, 3], displacements of the skin vertices.
         """
         moved = np.abs(displacement).max(axis=1) > _MOVED
         own = np.flatnonzero(moved[self.skin.triangles].any(axis=1))
-        if self._face_of is not None:  # all of a polygon
+        if self._face_of is not None:  # include all triangles of each moved polygon
             polygons = np.zeros(len(self._area), bool)
             polygons[self._face_of[own]] = True
             own = np.flatnonzero(polygons[self._face_of])
@@ -76,11 +76,11 @@ class Contacts:
         return int((areas > _STRETCH * np.maximum(self._area, 1e-12)).sum())
 
     def volume(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """mm3 of skin in teeth and gums, beyond rest: depth times area, as SkinChecker counts it.
+        """Volume in mm3 (depth times area) of skin inside teeth and gums, beyond the depth at rest.
 
         Args:
-            displacement: float64[V, 3].
-            controls: raw controls that are 1.
+            displacement: float64[V, 3], displacements of the skin vertices.
+            controls: names of the raw controls with value 1.
         """
         if not len(self._near):
             return 0.0
@@ -93,23 +93,23 @@ class Contacts:
         return float(beyond @ self._share) * MM**3
 
     def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """mm3 of skin in teeth and gums, beyond rest and beside what skin does to itself, by
-        SkinChecker: slower than volume.
+        """The same volume in mm3, measured by SkinChecker; contacts of the skin with itself do not
+        count. Slower than `volume`.
 
         Args:
-            displacement: float64[V, 3].
-            controls: raw controls that are 1.
+            displacement: float64[V, 3], displacements of the skin vertices.
+            controls: names of the raw controls with value 1.
         """
         points, checker = self.skin.points + displacement, self._made()
         faults = checker.look(points, self.bodies.posed(controls))
         return float(checker.sum(faults, self._allowed(points)).volume)
 
     def pushed(self, displacement: Doubles, controls: tuple[str, ...]) -> Doubles:
-        """float64[V, 3]: an expression with less skin in teeth and gums, pushed out softly.
+        """float64[V, 3]: displacements of an expression with the skin moved out of teeth and gums.
 
         Args:
-            displacement: float64[V, 3].
-            controls: raw controls that are 1.
+            displacement: float64[V, 3], displacements of the skin vertices.
+            controls: names of the raw controls with value 1.
         """
         posed = self.bodies.posed(controls)
         if len(self.skin.points) > _LARGE:
@@ -120,7 +120,8 @@ class Contacts:
         return self._lifted(out, posed) if self.volume(out, controls) > LEAST else out
 
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
-        """Out along the teeth's normals, with what is around, where the soft way found nothing."""
+        """float64[V, 3]: displacements with skin pushed out of teeth along their normals, and a
+        smooth fall-off around it."""
         points = self.skin.points + displacement
         edges = self._edges()
         for _ in range(_ROUNDS):
@@ -152,7 +153,8 @@ class Contacts:
         return self._checker
 
     def _allowed(self, points: Doubles) -> SkinFaults:
-        """What the skin has at rest, and in this pose against itself: lips press on each other."""
+        """The faults that do not count: depths at rest, and contacts of the skin with itself in
+        this pose, because lips press on each other."""
         checker = self._made()
         assert self._rest is not None
         away = [solid + _AWAY for solid in self.bodies.rest]
@@ -161,7 +163,7 @@ class Contacts:
         return SkinFaults(depth, itself.stretch, itself.fold)
 
     def _areas(self, points: Doubles, own: Ints) -> Doubles:
-        """float64[polygons], twice the area of each as a fan; of those of some triangles alone."""
+        """float64[polygons]: twice the area of each polygon, summed over the triangles `own`."""
         a, b, c = (points[self.skin.triangles[own, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         if self._face_of is None:
@@ -172,8 +174,8 @@ class Contacts:
         return np.asarray(np.bincount(self._face_of[own], area, minlength=count))
 
     def _near_teeth(self) -> Ints:
-        """int64[n]: vertices near teeth and gums that are seen when the mouth opens: who looks in
-        from the front sees no inside of a cheek."""
+        """int64[n]: vertices near teeth and gums that are visible from the front. The inside of a
+        cheek is hidden, so its contacts do not matter."""
         if not self.bodies.rest:
             return np.zeros(0, np.int64)
         points = np.concatenate(self.bodies.rest)
@@ -183,8 +185,8 @@ class Contacts:
         return near[self._seen(near)] if len(near) else near
 
     def _seen(self, vertices: Ints) -> Mask:
-        """bool[n]: whether a vertex is seen from somewhere in front of the face, or is beside one
-        that is."""
+        """bool[n]: whether a vertex is visible from at least 3 of 15 directions in front of the
+        face, or within two rings of such a vertex."""
         points, normals = self.skin.points, self.skin.normals()[vertices]
         triangles = np.ascontiguousarray(self.skin.triangles, np.int32)
         tree = ClosestPoints(points, triangles)
@@ -195,7 +197,7 @@ class Contacts:
             begin = points[vertices[faces]] + 0.01 * normals[faces]
             hit, _, _ = tree.first_hit(begin, np.broadcast_to(way, begin.shape), farthest=_AROUND)
             times[vertices[faces]] += hit < 0
-        seen = times >= _WAYS  # a slit between lips lets some through
+        seen = times >= _WAYS  # fewer rays may pass a slit between the lips
         edges = self.skin.edges()
         ends = points[edges[:, 0]] - points[edges[:, 1]]
         edges = edges[np.linalg.norm(ends, axis=1) < _SHORT]
@@ -208,7 +210,8 @@ class Contacts:
         return self._depths(points, posed)[0]
 
     def _depths(self, points: Doubles, posed: list[Doubles]) -> tuple[Doubles, Doubles]:
-        """float64[n], how deep points are in solids, 0: outside; float64[n, 3], the ways out."""
+        """float64[n]: depths of points inside the solids, 0 outside; float64[n, 3]: unit directions
+        to the outside."""
         deepest, out = np.zeros(len(points)), np.zeros((len(points), 3))
         if not len(points):
             return deepest, out
@@ -220,7 +223,7 @@ class Contacts:
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
             arm = points - surface.at(triangle.astype(np.int64), shares)
-            # Beside the border of open gums is not in them.
+            # Excludes points next to the open border of gums, which are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
             deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
@@ -229,7 +232,7 @@ class Contacts:
 
 
 def _spread(push: Doubles, edges: Ints) -> Doubles:
-    """What is pushed, and softly less around it."""
+    """float64[V, 3]: the pushes, with a smooth fall-off to neighbouring vertices."""
     a, b = edges.T
     count = np.maximum(np.bincount(a, minlength=len(push)) + np.bincount(b, minlength=len(push)), 1)
     need, out = np.linalg.norm(push, axis=1), push.copy()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Lips that meet along their line where the mouth is to be closed, and do not cut each other.
+"""Closes the lips in poses that close the mouth, so that they meet and do not cut each other.
 
-Space cannot tell upper from lower lip where they touch: what opens the jaw can. So the lips of a
-mesh of any topology are known by the expressions that it was given.
+Positions do not tell upper from lower lip at a point of contact, but the motion of an opening jaw
+does. This finds the lips of a mesh of any topology by its expressions.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ...base.easing import smooth_step
 from ..surface import Surface
 
-_ROUND = ("mouthLipsPurse", "mouthFunnel", "mouthPucker")  # what moves lips and little else
-_LIP = 0.25  # of the largest such motion
-_STILL, _TAKEN = 0.35, 0.6  # of the jaw's motion: upper and lower lip
-COLUMNS = 40
-_WIDTH_MM = 50.0  # of a human mouth: lengths below are meant on it
-_RIM = 1.2  # mm beyond the nearest place of a column: the rim
-_FADE = 14.0  # mm from the rim along the skin: what goes none of the way
-_BAND = 2.5  # mm from the rim: what goes all of it
-_CORNER = 0.08  # of the width: a column so near to a corner may be joined skin
-_TOUCH = 0.8  # mm: lips that are nearer touch at rest
-_GOAL = 0.05  # mm between lips that are brought together
-_DEEP = 0.1  # mm that lips may press into each other, where they do no more at rest
+_ROUND = ("mouthLipsPurse", "mouthFunnel", "mouthPucker")  # prefixes of controls that move the lips
+_LIP = 0.25  # of the largest motion by these controls: least motion of a lip vertex
+_STILL, _TAKEN = 0.35, 0.6  # of the jaw's motion: largest of the upper lip, least of the lower lip
+COLUMNS = 40  # sections of the mouth from corner to corner
+_WIDTH_MM = 50.0  # width of a human mouth; lengths in mm below are scaled to the actual mouth
+_RIM = 1.2  # mm beyond the nearest vertex of a column that still belong to the rim
+_FADE = 14.0  # mm from the rim along the skin: vertices beyond keep their place
+_BAND = 2.5  # mm from the rim along the skin: vertices up to here move with the rim
+_CORNER = 0.08  # of the width: no columns this close to a corner, because lips may be joined there
+_TOUCH = 0.8  # mm: lips touch at rest if their gap is below half of it
+_GOAL = 0.05  # mm: gap between closed lips
+_DEEP = 0.1  # mm that lips may press into each other, or their depth at rest if larger
 _ROUNDS = 12
-_UPPER_MM, _LEAST_SHARE = 2.0, 0.15  # what the upper lip takes of the way, at least this share
-_FAR_MM = 6.0  # between lips that are brought together, at most
-_OVER = 0.3  # mm that a column goes further than it lacks
-_SOFTER = 2.0  # of the way: how far the skin goes along
-_SMOOTH = 24  # rounds at most in which columns become alike
-_AGAINST = 0.3  # cosine
-_NEAR = 3.0  # mm: further in there is no sign
+_UPPER_MM, _LEAST_SHARE = 2.0, 0.15  # mm that the upper lip moves, and its least share of the gap
+_FAR_MM = 6.0  # mm: wider gaps are not closed
+_OVER = 0.3  # mm that smoothing may move a column beyond its gap
+_SOFTER = 2.0  # of the gap: least length of the fade
+_SMOOTH = 24  # limit of the smoothing rounds over columns
+_AGAINST = 0.3  # least cosine between the inward normal and the direction to a point inside
+_NEAR = 3.0  # mm: a point that is deeper counts as outside
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Upper and lower lip in a pose, by column from the right corner to the left one.
+    """The gap between the lips in a pose, by column from the right mouth corner to the left one.
 
     Attributes:
-        gap: float64[COLUMNS], in the target's unit, below 0 where they are in each other; NaN
-            where no column has lips.
-        way: float64[COLUMNS, 3] of length 1, from the lower to the upper lip.
+        gap: float64[COLUMNS], in the target's unit, negative if the lips intersect; all NaN if no
+            column has lips.
+        way: float64[COLUMNS, 3], unit directions from the lower to the upper lip.
     """
 
     gap: Doubles
@@ -55,7 +55,7 @@ class Meeting:
 
 
 class Lips:
-    """The lips of a target at rest."""
+    """The lips of a target, found at rest, and their gap in poses."""
 
     def __init__(
         self,
@@ -63,13 +63,13 @@ class Lips:
         expressions: Mapping[str, Doubles],
         corners: Doubles | None = None,
     ) -> None:
-        """Begins; `found` says whether there are lips that part.
+        """Find the lips; `found` is False if the face has none that part.
 
         Args:
-            skin: the target at rest.
-            expressions: float64[V, 3] by raw control; jawOpen among them.
-            corners: float64[2, 3], the right and the left corner of the mouth; None: where the
-                lips that touch at rest end.
+            skin: the skin of the target at rest.
+            expressions: float64[V, 3] by raw control, displacements of the skin, with jawOpen.
+            corners: float64[2, 3], the right and the left corner of the mouth; None: the ends of
+                the line in which the lips touch at rest.
         """
         self.skin = skin
         self.found = False
@@ -97,7 +97,7 @@ class Lips:
         self._rims = rims
 
     def _place(self, ends: Doubles, lips: Doubles) -> None:
-        """Columns between two corners of the mouth."""
+        """Divide the mouth between two corners into columns."""
         width = float(np.linalg.norm(ends[1] - ends[0]))
         self.mm = width / _WIDTH_MM
         middle = ends.mean(axis=0)
@@ -108,12 +108,14 @@ class Lips:
         inset = _CORNER * (last - first)
         self._edges = np.linspace(first + inset, last - inset, COLUMNS + 1)
         columns = (self._edges[1:] + self._edges[:-1]) / 2
-        self._places = np.array([first, *columns, last])  # nothing goes beyond the corners
+        self._places = np.array([first, *columns, last])  # corrections are 0 at the corners
 
     def _touching(self) -> Doubles | None:
-        """float64[2, 3]: where the lips that touch at rest end; None where they do not touch."""
-        half, least = COLUMNS // 2, _TOUCH * self.mm / 2  # what funnels is two mouths wide
-        for _ in range(3):  # columns become finer
+        """float64[2, 3]: both ends of the line in which the lips touch at rest; None if they do not
+        touch."""
+        # Halved because the first estimate of the width covers about two mouths.
+        half, least = COLUMNS // 2, _TOUCH * self.mm / 2
+        for _ in range(3):  # each round narrows the columns
             gap = self.meeting(self.skin.points).gap
             touch = np.nan_to_num(gap, nan=np.inf) < least
             if not touch[half - 2 : half + 2].any():
@@ -129,10 +131,10 @@ class Lips:
         return ends
 
     def meeting(self, points: Doubles) -> Meeting:
-        """How the lips lie to each other.
+        """Measure the gap between the lips.
 
         Args:
-            points: float64[V, 3], of the posed target.
+            points: float64[V, 3], vertex positions of the posed target.
         """
         gap, way = np.full(COLUMNS, np.inf), np.zeros((COLUMNS, 3))
         for sign, own, other in ((1, self._upper, self._lower), (-1, self._lower, self._upper)):
@@ -143,14 +145,14 @@ class Lips:
             order = order[(column[order] >= 0) & (apart[order] < gap[column[order]])]
             gap[column[order]], way[column[order]] = apart[order], sign * toward[order]
         known = np.flatnonzero(np.isfinite(gap))
-        if len(known):  # a column between the vertices of a coarse lip
+        if len(known):  # interpolate columns without samples of a coarse lip
             every = np.arange(COLUMNS)
             nearest = known[np.abs(every[:, None] - known).argmin(axis=1)]
             gap, way = np.interp(every, known, gap[known]), way[nearest]
         return Meeting(np.where(np.isfinite(gap), gap, np.nan), way)
 
     def welded(self) -> int:
-        """In how many of the COLUMNS one polygon belongs to both lips."""
+        """The number of columns in which a triangle connects both lips."""
         lips = np.zeros(len(self.skin.points), np.int64)
         lips[np.unique(self._upper)] |= 1
         lips[np.unique(self._lower)] |= 2
@@ -163,40 +165,40 @@ class Lips:
         """The widest gap between the lips, in the target's unit.
 
         Args:
-            points: float64[V, 3], of the posed target.
+            points: float64[V, 3], vertex positions of the posed target.
         """
         return float(np.nan_to_num(self.meeting(points).gap).max(initial=0.0))
 
     def deepest(self, points: Doubles) -> float:
-        """How deep the lips are in each other beyond rest, in the target's unit.
+        """The largest depth of one lip inside the other beyond rest, in the target's unit.
 
         Args:
-            points: float64[V, 3], of the posed target.
+            points: float64[V, 3], vertex positions of the posed target.
         """
         least = np.fmin(np.nan_to_num(self.rest.gap), 0.0)
         return float(np.nan_to_num(least - self.meeting(points).gap).max(initial=0.0))
 
     def too_far(self, points: Doubles) -> bool:
-        """Whether lips are so far apart that bringing them together would tear them: a mouth that
-        is open at rest needs expressions that close that first.
+        """Whether the gap is too wide to close without damage, for example because the mouth is
+        open at rest.
 
         Args:
-            points: float64[V, 3], of the posed target.
+            points: float64[V, 3], vertex positions of the posed target.
         """
         return self.widest(points) > _FAR_MM * self.mm
 
     def closed(self, points: Doubles) -> Doubles:
-        """float64[V, 3]: the posed target with lips that meet; as it is where they are too_far.
+        """float64[V, 3]: the posed target with closed lips; unchanged if they are `too_far` apart.
 
         Args:
-            points: float64[V, 3], of the posed target.
+            points: float64[V, 3], vertex positions of the posed target.
         """
         if self.too_far(points):
             return points
         best, least = points, np.inf
         widest = max(self.widest(points), 0.0) / self.mm
         upper, lower = (self._fade(rim, widest) for rim in self._rims)
-        # Far apart lips meet where the upper one is: it hangs on the skull, the lower on the jaw.
+        # The lower lip closes most of a wide gap, because the upper lip is fixed to the skull.
         share = float(np.clip(_UPPER_MM / max(widest, 1e-9), _LEAST_SHARE, 0.5))
         field = (1 - share) * lower - share * upper
         for _ in range(_ROUNDS + 1):
@@ -217,14 +219,14 @@ class Lips:
         return best
 
     def _wrong(self, meeting: Meeting) -> Doubles:
-        """float64[COLUMNS]: what lips are to come together by, below 0: go apart by."""
+        """float64[COLUMNS]: distance by which the lips have to approach, negative: to part."""
         gap = np.nan_to_num(meeting.gap)
         deepest = np.fmin(np.nan_to_num(self.rest.gap), -_DEEP * self.mm)
         far = np.where(gap > 2 * _GOAL * self.mm, gap - _GOAL * self.mm, 0.0)
         return far + np.minimum(gap - deepest, 0.0)
 
     def _around(self, points: Doubles) -> Doubles:
-        """float64[n]: radians about an upright axis behind the mouth."""
+        """float64[n]: angles in radians about a vertical axis behind the lips."""
         arm = points - self._axis
         return np.arctan2(arm[:, 0], arm[:, 2])
 
@@ -234,7 +236,8 @@ class Lips:
         return np.where((at >= 0) & (at < COLUMNS), at, -1)
 
     def _apart(self, points: Doubles, samples: Doubles, other: Ints) -> tuple[Doubles, Doubles]:
-        """How far samples are from the other lip, below 0: in it; and the ways from it to them."""
+        """float64[n]: signed distances of samples from the other lip, negative inside it;
+        float64[n, 3]: unit directions away from that lip."""
         used, local = np.unique(other, return_inverse=True)
         surface = Surface(points[used], local.reshape(-1, 3))
         tree = ClosestPoints(surface.points, np.ascontiguousarray(surface.triangles, np.int32))
@@ -244,7 +247,7 @@ class Lips:
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest
-        # Beside the border of a sheet is not in it: what is in lies against the normal.
+        # The cosine excludes points beside the border of an open lip surface.
         inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
         inside &= distance < _NEAR * self.mm
         signed = np.where(inside, -distance, distance)
@@ -253,7 +256,7 @@ class Lips:
         return signed, np.where(close[:, None], normal, way)
 
     def _rim(self, own: Ints, other: Ints) -> Ints:
-        """int64[n]: vertices of a lip that lie nearest to the other one in their column."""
+        """int64[n]: vertices of a lip that are nearest to the other lip in their column."""
         points, vertices = self.skin.points, np.unique(own)
         apart, _ = self._apart(points, points[vertices], other)
         apart = np.abs(apart)
@@ -264,14 +267,14 @@ class Lips:
         return vertices[near]
 
     def _fade(self, rim: Ints, widest: float) -> Doubles:
-        """float64[V]: 1 at a rim, 0 where the skin is far from it; widest: mm that it goes."""
+        """float64[V]: weights of a correction, 1 at the rim, 0 far from it. widest: gap in mm."""
         reach = max(_FADE, _SOFTER * widest)
         away = _along(self.skin, rim, reach * self.mm) / self.mm
         return np.asarray(1 - smooth_step((away - _BAND) / (reach - _BAND)))
 
 
 def _labels(expressions: Mapping[str, Doubles], count: int) -> tuple[Ints, Ints]:
-    """int64[n]: vertices of the upper and of the lower lip."""
+    """int64[n] each: vertices of the upper and of the lower lip; empty if they are unknown."""
     none = np.zeros(0, np.int64)
     strength, jaw = np.zeros(count), expressions.get("jawOpen")
     for name, delta in expressions.items():
@@ -288,21 +291,21 @@ def _labels(expressions: Mapping[str, Doubles], count: int) -> tuple[Ints, Ints]
 
 
 def _of(skin: Surface, vertices: Ints) -> Ints:
-    """int64[T, 3]: the triangles of vertices."""
+    """int64[T, 3]: the triangles with all corners among the vertices."""
     own = np.zeros(len(skin.points), bool)
     own[vertices] = True
     return np.asarray(skin.triangles[own[skin.triangles].all(axis=1)], np.int64)
 
 
 def _samples(points: Doubles, triangles: Ints) -> Doubles:
-    """float64[n, 3]: corners, middles of sides and of triangles."""
+    """float64[n, 3]: sample points: corners, middles of sides and centres of the triangles."""
     corners = points[triangles]
     sides = (corners + np.roll(corners, 1, axis=1)) / 2
     return np.concatenate([corners.reshape(-1, 3), sides.reshape(-1, 3), corners.mean(axis=1)])
 
 
 def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:
-    """float64[V]: how far vertices are along edges, at most `farthest`."""
+    """float64[V]: distances along edges from the vertices `begin`, at most `farthest`."""
     out = np.full(len(skin.points), farthest)
     near = np.linalg.norm(skin.points - skin.points[begin].mean(axis=0), axis=1)
     reach = near[begin].max() + farthest
@@ -328,7 +331,7 @@ def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:
 
 
 def _straight(ways: Doubles, weights: Doubles, rounds: int) -> Doubles:
-    """float64[COLUMNS, 3] of length 1: each way as its neighbours go, by what is wrong there."""
+    """float64[COLUMNS, 3]: unit directions, smoothed over neighbouring columns by their weights."""
     out = np.abs(weights)[:, None] * ways
     for _ in range(rounds):
         wide = np.pad(out, ((1, 1), (0, 0)), mode="edge")

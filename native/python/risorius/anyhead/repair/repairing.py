@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions of a target repaired one after the other, and what is wrong before and after."""
+"""Repairs the expressions of a target one by one, and reports faults before and after."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .report import MM, Faults, Report
 Pose = tuple[str, ...]
 Progress = Callable[[float], bool | None]
 _BLINK, _OPEN = "eyeBlink", "jawOpen"
-_CLOSE = ("mouthLipsTogether", "mouthClose")  # what closes the mouth of an open jaw
-_ELSEWHERE = "tongue"  # what moves other meshes
-_WELDED = 2  # columns of the mouth: near its corners lips are one
-_CUT = 0.002  # cm of lids in the eye that are left alone
+_CLOSE = ("mouthLipsTogether", "mouthClose")  # prefixes of controls that close lips of an open jaw
+_ELSEWHERE = "tongue"  # prefix of controls that move other meshes
+_WELDED = 2  # columns of the mouth whose lips may be joined, as they are near its corners
+_CUT = 0.002  # cm: smaller depths of lids in the eye are ignored
 
 
 class Places(Protocol):
-    """Landmarks by name, as far as repair needs them."""
+    """The part of Landmarks that repair uses."""
 
     @property
     def points(self) -> Mapping[str, Doubles]:
@@ -37,13 +37,13 @@ class Places(Protocol):
 
 @dataclass
 class Repaired:
-    """What repair makes.
+    """The result of `repair`.
 
     Attributes:
-        expressions: float64[V, 3] by raw control; also of those that move skin together with
-            others alone, such as what closes the mouth of an open jaw.
-        combinations: float64[V, 3] by the controls that are 1 together, all of the way.
-        report: what was wrong, and what is left.
+        expressions: float64[V, 3] by raw control, displacements of the skin; zeros for a control
+            that moves the skin only in combinations.
+        combinations: float64[V, 3] by controls that are 1 together: their whole displacement.
+        report: faults before and after the repair.
     """
 
     expressions: dict[str, Doubles]
@@ -61,20 +61,21 @@ def repair(
     combinations: Mapping[Pose, Doubles],
     progress: Progress | None = None,
 ) -> Repaired:
-    """Expressions whose lids close on this eye, whose lips meet, without skin in eyes and teeth.
+    """Repair expressions: close the lids and lips, and take skin out of eyes and teeth.
 
     Args:
-        target: the skin at rest, cm, standing.
-        faces: its polygons.
-        parts: eyes, teeth and the like; its notes get those of the report.
-        landmarks: corners of the mouth are used; None: they are sought.
-        registered: how the template lies on the target; not needed by what is repaired here.
-        expressions: float64[V, 3] by raw control.
-        combinations: float64[V, 3] by the controls that are 1 together, all of the way.
-        progress: told the share that is done, 0 to 1; False stops.
+        target: the skin at rest, in cm, y up, the face towards +z.
+        faces: polygons of the skin.
+        parts: eyes, teeth and other meshes; the notes of the report are added to its notes.
+        landmarks: give the corners of the mouth; None: the corners are searched for.
+        registered: unused.
+        expressions: float64[V, 3] by raw control, displacements of the skin.
+        combinations: float64[V, 3] by controls that are 1 together: their whole displacement.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        Stopped: progress said False.
+        Stopped: `progress` returned False.
     """
     del registered
     closing = closing_pose(expressions, combinations)
@@ -102,11 +103,11 @@ def repair(
 
 
 def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
-    """The open jaw with closed lips; empty where the face has no such controls.
+    """The controls of an open jaw with closed lips; empty if the face has no such controls.
 
     Args:
-        expressions: by raw control.
-        combinations: by the controls that are 1 together.
+        expressions: float64[V, 3] by raw control.
+        combinations: float64[V, 3] by controls that are 1 together.
     """
     names = dict.fromkeys([*expressions, *(name for pose in combinations for name in pose)])
     lips = [name for name in names if name.startswith(_CLOSE)]
@@ -116,7 +117,7 @@ def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose,
 def _together(
     pose: Pose, expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]
 ) -> Doubles:
-    """float64[V, 3] of a pose by what its controls do alone and in pairs."""
+    """float64[V, 3]: the displacements of a pose, summed from its controls and their pairs."""
 
     def alone(name: str) -> Doubles:
         return np.asarray(expressions.get(name, 0.0), np.float64)
@@ -133,7 +134,7 @@ def _closes_eye(pose: Pose, side: str) -> bool:
 
 
 class Repairing:
-    """The lids, lips, teeth and skin of one target."""
+    """Repairs poses of one target; see `repair`."""
 
     def __init__(
         self,
@@ -144,11 +145,11 @@ class Repairing:
         expressions: Mapping[str, Doubles],
         closing: Pose,
     ) -> None:
-        """Begins; see repair.
+        """Find the lids, lips and teeth.
 
         Args:
-            target, faces, parts, landmarks, expressions: as there.
-            closing: what closing_pose gives.
+            target, faces, parts, landmarks, expressions: as in `repair`.
+            closing: the result of closing_pose.
         """
         self.report = Report()
         self.target = target
@@ -173,11 +174,11 @@ class Repairing:
         self.contacts = Contacts(target, faces, self.bodies)
 
     def repaired(self, pose: Pose, way: Doubles) -> Doubles:
-        """float64[V, 3] of a pose; its faults go into the report.
+        """float64[V, 3]: the repaired displacements of a pose. Its faults are added to the report.
 
         Args:
-            pose: raw controls that are 1.
-            way: float64[V, 3], what they do together.
+            pose: names of the raw controls with value 1.
+            way: float64[V, 3], the displacements of the pose.
         """
         if not way.any():
             return way
@@ -201,11 +202,11 @@ class Repairing:
         return out
 
     def faults(self, pose: Pose, way: Doubles) -> Faults:
-        """What is wrong with a pose.
+        """Measure the faults of a pose.
 
         Args:
-            pose: raw controls that are 1.
-            way: float64[V, 3], what they do together.
+            pose: names of the raw controls with value 1.
+            way: float64[V, 3], the displacements of the pose.
         """
         gap = cut = 0.0
         for side, lids in self.eyelids.items():

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""What is wrong with expressions by contact, before and after the repair."""
+"""Faults of expressions (gaps, cuts and stretched polygons) before and after the repair."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-MM = 10.0  # of a unit of the target
+MM = 10.0  # mm per unit of the target
 
 
 @dataclass(frozen=True)
 class Faults:
-    """What is wrong with a pose.
+    """Faults of a pose.
 
     Attributes:
-        lid_gap: mm, the widest place at which an eye is seen that is to be closed; 0 elsewhere.
-        cut: mm, how deep the outside of lids lies in an eye.
-        lip_gap: mm, the widest gap between lips that are to meet; 0 elsewhere.
-        lip_cut: mm, how deep such lips are in each other beyond rest.
-        volume: mm3 of skin in teeth and gums, beyond rest.
-        stretched: polygons of more than 2.5 times their area.
+        lid_gap: mm, largest visible height of an eye that the pose closes; 0 in other poses.
+        cut: mm, largest depth of the outside of lids in an eye.
+        lip_gap: mm, widest gap between the lips if the pose closes the mouth; 0 in other poses.
+        lip_cut: mm, largest depth of one lip in the other beyond rest, in the same poses.
+        volume: mm3 of skin inside teeth and gums, beyond rest.
+        stretched: number of polygons with more than 2.5 times their area at rest.
     """
 
     lid_gap: float = 0.0
@@ -31,18 +31,19 @@ class Faults:
 
 @dataclass
 class Report:
-    """Faults of each pose, before and after; poses are written with + between their controls.
+    """Faults of each pose before and after the repair.
 
     Attributes:
-        rows: by pose, of those in which something is or was wrong, and of all that close.
-        notes: a sentence each.
+        rows: by pose (its controls, joined by +), for poses with faults and for all poses that
+            close eyes or mouth.
+        notes: sentences for the user.
     """
 
     rows: dict[str, tuple[Faults, Faults]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     def worst(self) -> Faults:
-        """Of each kind the largest that is left."""
+        """The largest remaining fault of each kind over all poses."""
         after = [row[1] for row in self.rows.values()] or [Faults()]
         return Faults(
             max(f.lid_gap for f in after),

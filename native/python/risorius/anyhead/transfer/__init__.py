@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What a template's skin does in each expression, on the skin of another head."""
+"""Transfers the displacements of a template's skin in each expression to another head's skin."""

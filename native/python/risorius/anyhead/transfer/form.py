@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How a place of one surface is shaped on another of the same triangles: a matrix at each vertex.
+"""The deformation gradient at each vertex between two surfaces with the same triangles.
 
-It is the change of form of Sumner and Popovic ("Deformation Transfer for Triangle Meshes", 2004),
-taken at vertices and evened out over some centimetres: what a lip's edge or a pore does to a
-triangle says nothing of how far a mouth opens.
+The gradients are of Sumner and Popovic ("Deformation Transfer for Triangle Meshes", 2004), but at
+vertices and smoothed over 2 cm: the form of a lip's edge or a pore does not determine how far a
+mouth opens.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ from ...author.geometry.skeleton import Doubles
 from ..surface import Surface
 from .smoothing import Smoothing, areas
 
-EVENED = 2.0  # cm, over which changes of form are evened out
-_UNSURE = 0.3  # how much a place counts that registration carried along with others
-_STEADY = 1e-6  # of a form's size: what a flat place says nothing about stays as it is
+EVENED = 2.0  # cm: smoothing radius of the gradients
+_UNSURE = 0.3  # least weight of a vertex, for vertices that only followed their neighbours
+_STEADY = 1e-6  # weight of the identity, for directions without edges
 
 
 def changes_of_form(before: Surface, after: Doubles, trust: Doubles) -> Doubles:
-    """float64[V, 3, 3]: what makes a small vector at a vertex of `before` that of `after`.
+    """float64[V, 3, 3]: matrices that map small vectors at a vertex from `before` to `after`.
 
     Args:
         before: a surface in cm.
-        after: float64[V, 3], its vertices on another head.
-        trust: float64[V], 0 to 1: how much each vertex of `after` is to count.
+        after: float64[V, 3], positions of its vertices on another head.
+        trust: float64[V], 0 to 1: confidence in the positions `after`; weights below 0.3 count as
+            0.3.
     """
     mixed, own = _sums(before, after)
     share = np.maximum(trust, _UNSURE)[:, None]
@@ -39,8 +40,8 @@ def changes_of_form(before: Surface, after: Doubles, trust: Doubles) -> Doubles:
 
 
 def _sums(before: Surface, after: Doubles) -> tuple[Doubles, Doubles]:
-    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges a -> b about a vertex, and
-    over its normal as long as an edge."""
+    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex (a before, b
+    after) and over its normal, scaled to the length of the edges."""
     count = len(before.points)
     edges = before.edges()
     a = before.points[edges[:, 1]] - before.points[edges[:, 0]]

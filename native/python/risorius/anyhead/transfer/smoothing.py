@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much values of neighbouring vertices have to do with each other on a surface."""
+"""Smoothing of values on a surface by its cotangent Laplacian."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ..._native import SparseCholesky
 from ...author.geometry.skeleton import Doubles
 from ..surface import Surface
 
-_LEAST, _MOST = 1e-3, 10.0  # of a cotangent's half: slivers neither part nor glue their vertices
+_LEAST, _MOST = 1e-3, 10.0  # bounds of half a cotangent, because slivers give extreme values
 
 
 def areas(surface: Surface) -> Doubles:
-    """float64[V]: a third of the triangles about each vertex; more than 0 everywhere.
+    """float64[V]: a third of the area of the triangles at each vertex.
 
     Args:
-        surface: any; a vertex without a triangle gets a trifle of the mean.
+        surface: any surface; every vertex gets at least 1e-4 of the mean area.
     """
     third = np.linalg.norm(surface.face_normals(), axis=1) / 6
     sums = np.bincount(
@@ -29,7 +29,7 @@ class Smoothing:
     """The Laplacian of a surface, by cotangents (Pinkall and Polthier 1993)."""
 
     def __init__(self, surface: Surface) -> None:
-        """Args: surface: its triangles may be slivers or of no size."""
+        """Compute the weights of the edges of `surface`; triangles without area are allowed."""
         self._count = len(surface.points)
         corners = surface.triangles
         first, second, weight = [], [], []
@@ -46,11 +46,11 @@ class Smoothing:
         self._weight = np.concatenate(weight)
 
     def solver(self, held: Doubles, length: float) -> SparseCholesky:
-        """Solves held x + length^2 L x = right.
+        """A solver of held x + length^2 L x = right, where L is the Laplacian.
 
         Args:
-            held: float64[V], above 0: how much of the area of each vertex holds its value.
-            length: how far values are evened out, in the surface's unit.
+            held: float64[V], above 0: weight of each vertex's own value, in units of its area.
+            length: smoothing radius in the surface's unit.
         """
         weight = length**2 * self._weight
         every = np.arange(self._count)

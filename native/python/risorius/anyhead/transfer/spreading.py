@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Values of the template's vertices on another head's own vertices.
+"""Interpolates values at the template's vertices to the vertices of another head.
 
-Each vertex takes over from the place of the template that lies nearest and faces the same way.
-Where none does (the back of a throat, hair, a collar, a hole of a scan) values go on from the
-neighbours, over the head's own triangles, so that nothing tears.
+Each vertex takes the value of the nearest point of the template with a similar normal. Vertices
+without such a point (the back of a throat, hair, a collar, a hole of a scan) get a smooth
+continuation of their neighbours' values over the head's triangles.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 from .smoothing import Smoothing, areas
 
-_FACING = 0.4  # least cosine between normals of places that may be the same
-_FARTHEST = 1.5  # cm
-_NEAR = 0.3  # cm: a place so far off holds its value a third as much
-_UNSURE = 0.5  # of a sure vertex: how much one holds that registration carried along with others
-_EVENED = 0.05  # cm, over which values are evened out
-_ASIDE = 0.3  # cm, over which neighbours are asked whether a value fits theirs
-_OUTLIER = 0.4  # of a pose's longest way: a value so far from its neighbours' holds a quarter
-_ROUNDS = 3  # of asking
-_AT_REST = 1e-7  # of the area: what hangs on no known place rests
+_FACING = 0.4  # least cosine between the normals of a vertex and its point on the template
+_FARTHEST = 1.5  # cm: largest distance of that point
+_NEAR = 0.3  # cm: distance of that point at which the weight of its value is 1/e
+_UNSURE = 0.5  # least trust of a template vertex, for vertices that only followed their neighbours
+_EVENED = 0.05  # cm: smoothing radius of the values
+_ASIDE = 0.3  # cm: smoothing radius of the values with which outliers are compared
+_OUTLIER = 0.4  # of a pose's longest displacement: deviation at which a weight is quartered
+_ROUNDS = 3  # of the search for outliers
+_AT_REST = 1e-7  # of the area: weight of the value 0, for vertices without known neighbours
 
 
 class Spreading:
-    """From vertices of a template that lies on a head to the head's vertices.
+    """Interpolation from the vertices of a registered template to the head's vertices.
 
     Attributes:
-        known: float64[V], 0 to 1: how sure the template's place of each vertex is.
+        known: float64[V], 0 to 1: confidence in the template's point of each head vertex.
     """
 
     def __init__(
@@ -41,15 +41,15 @@ class Spreading:
         parting: Doubles | None = None,
         threads: int = 0,
     ) -> None:
-        """Finds the places and factorises.
+        """Find the template's point of each vertex, and factorise the smoothing system.
 
         Args:
-            target: the head, cm.
-            template: the template's triangles, its points on the head.
-            trust: float64[template vertices], 0 to 1: how sure the place of each is.
-            parting: float64[template vertices, n, 3], ways in which lips and lids part: vertices
-                that a slip of the registration puts across a slit are found by their neighbours.
-            threads: 0: one for each core.
+            target: the head in cm.
+            template: the template with its vertices on the head.
+            trust: float64[template vertices], 0 to 1: confidence in the position of each vertex.
+            parting: float64[template vertices, n, 3], displacements of n poses that part lips and
+                lids; they reveal head vertices that are matched to the wrong side of a slit.
+            threads: number of threads; 0: one for each core.
         """
         self._of, first = _merged(target)
         merged = Surface(target.points[first], self._of[target.triangles])
@@ -72,7 +72,7 @@ class Spreading:
         self._solver = smoothing.solver(self._held + _AT_REST * area, _EVENED)
 
     def _fitting(self, smoothing: Smoothing, area: Doubles, parting: Doubles) -> Doubles:
-        """float64[n], 0 to 1: how well the value of each vertex fits those of its neighbours."""
+        """float64[n], 0 to 1: how close the value of each vertex is to its neighbours' values."""
         longest = np.linalg.norm(parting, axis=2).max(axis=0)
         values = self._values(parting.reshape(len(parting), -1))
         fits = np.ones(len(values))
@@ -85,25 +85,25 @@ class Spreading:
         return fits
 
     def _values(self, values: Doubles) -> Doubles:
-        """float64[n, k] at the places of the vertices, of values of the template's vertices."""
+        """float64[n, k]: values of the template's vertices, interpolated at the head vertices."""
         out = np.zeros((len(self._corners), values.shape[1]))
         for k in range(3):
             out += self._shares[:, k, None] * values[self._corners[:, k]]
         return out
 
     def spread(self, values: Doubles) -> Doubles:
-        """float64[V, k] on the head.
+        """float64[V, k]: the smoothed values at the head's vertices.
 
         Args:
-            values: float64[template vertices, k].
+            values: float64[template vertices, k], any k values per vertex.
         """
         right = self._values(values) * self._held[:, None]
         return np.asarray(self._solver.solve(right, self._threads)[self._of])
 
 
 def _merged(surface: Surface) -> tuple[Ints, Ints]:
-    """int64[V] a number for each vertex, the same for those at one place that face one way, as at
-    seams of textures; and a vertex of each number."""
+    """int64[V]: an index for each vertex, equal for vertices with the same position and normal, as
+    at texture seams; int64[n]: one vertex of each index."""
     size = float(np.ptp(surface.points, axis=0).max()) or 1.0
     normals = surface.normals()
     places = np.round(surface.points / (1e-6 * size)).astype(np.int64)

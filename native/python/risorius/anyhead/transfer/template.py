@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin of a DNA file, and what each control and each corrective does to it."""
+"""Reads the skin of a DNA file and its displacements by each control and each corrective."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ Floats = npt.NDArray[np.float32]
 Progress = Callable[[float], bool | None]
 Pose = tuple[str, ...]  # controls that are 1, in the file's order
 JAW = "FACIAL_C_Jaw"
-_MOVES = 1e-3  # cm: a control that moves no vertex further does nothing to the skin
+_MOVES = 1e-3  # cm: a control whose largest motion is smaller does not move the skin
 
 
 @dataclass(frozen=True)
 class Jaw:
-    """The jaw of a face, as one rigid body.
+    """The jaw of a face as one rigid body.
 
     Attributes:
-        hinge: float64[3].
-        turns: rotation [3, 3] and shift [3] of the hinge, by pose; a pose that leaves the jaw at
-            rest is not listed.
+        hinge: float64[3], the centre of rotation.
+        turns: rotation float64[3, 3] and translation float64[3] of the hinge by pose; poses that do
+            not move the jaw are left out.
     """
 
     hinge: Doubles
@@ -46,16 +46,16 @@ class Jaw:
 
 @dataclass(frozen=True)
 class TemplateFace:
-    """The skin of a face, standing, in cm.
+    """The skin of a face in cm, y up, the face towards +z.
 
     Attributes:
-        name: of the face.
-        surface: at rest.
-        mesh: its index in the file.
-        controls: names of all raw controls, without what stands before their last dot.
-        ways: float32[V, 3] by pose: how far one control, or all controls of a corrective together,
-            move the skin. Poses that leave it at rest are left out.
-        jaw: None: nothing turns one.
+        name: name of the face.
+        surface: the skin at rest.
+        mesh: index of the skin mesh in the file.
+        controls: names of all raw controls without the prefix before the last dot.
+        ways: float32[V, 3] by pose, displacements of the skin by one control, or by all controls
+            of a corrective together. Poses that do not move the skin are left out.
+        jaw: the jaw; None if no control turns it.
     """
 
     name: str
@@ -67,17 +67,18 @@ class TemplateFace:
 
 
 def read_template(dna: Dna, progress: Progress | None = None) -> TemplateFace:
-    """The skin of a face at its finest level.
+    """Read the skin of a face at LOD 0.
 
     Args:
-        dna: with geometry and controls.
-        progress: told the share that is done, 0 to 1; False stops.
+        dna: a face with geometry and controls.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        ArgumentError: no mesh that its controls move.
-        BudgetError: its controls and vertices are far more than the file is worth.
+        ArgumentError: the face has no skin mesh at LOD 0, or no control moves it.
+        BudgetError: vertices times poses need too much memory for the size of the file.
         DnaError: the file cannot be evaluated.
-        Stopped: progress said False.
+        Stopped: `progress` returned False.
     """
     rig = Rig(dna)
     posed = Posed(dna, rig, 0)
@@ -112,11 +113,11 @@ def read_template(dna: Dna, progress: Progress | None = None) -> TemplateFace:
 
 
 def left_over(ways: Mapping[Pose, Doubles | Floats]) -> dict[Pose, Doubles]:
-    """What is left of the way of each corrective's pose beside its controls alone and the smaller
-    correctives among them.
+    """float64[V, 3] by pose: the displacements of each corrective, without the displacements of its
+    single controls and of smaller correctives of the same controls.
 
     Args:
-        ways: [V, 3] by pose, as TemplateFace has them.
+        ways: [V, 3] by pose, whole displacements as in TemplateFace.
     """
     out: dict[Pose, Doubles] = {}
     for pose in sorted((p for p in ways if len(p) > 1), key=len):
@@ -132,7 +133,8 @@ def left_over(ways: Mapping[Pose, Doubles | Floats]) -> dict[Pose, Doubles]:
 
 
 def _poses(dna: Dna) -> list[tuple[int, ...]]:
-    """Raw controls that are 1 in each pose: each alone, then those of each corrective."""
+    """Indices of the raw controls with value 1 in each pose: each control alone, then the controls
+    of each corrective."""
     count = len(dna.raw_control_names)
     sets = [tuple(sorted(parts)) for parts in sk.psd_parts(dna).values()]
     together = dict.fromkeys(s for s in sets if len(s) > 1 and s[-1] < count)
@@ -140,7 +142,7 @@ def _poses(dna: Dna) -> list[tuple[int, ...]]:
 
 
 def _skin(dna: Dna, posed: Posed) -> int:
-    """The mesh of skin with most vertices among those of the finest level."""
+    """The index of the skin mesh of LOD 0 with the most vertices."""
     known = [m for m in posed.mesh_indices if len(dna.meshes[m].positions)]
     skin = [m for m in known if kind_of(dna.mesh_names[m]) == "skin"]
     if not skin:
@@ -166,7 +168,7 @@ def _jaw(
     points: Doubles,
     ways: dict[Pose, Floats],
 ) -> Jaw | None:
-    """Of the jaw's joint; of what opens the mouth where there is none."""
+    """The jaw from the jaw joint; without a moving joint, from the displacements of jawOpen."""
     if JAW in dna.joint_names:
         found = _jaw_of_joint(dna, sets, names, axes)
         if found.turns:

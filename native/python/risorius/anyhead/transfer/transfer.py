@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All expressions of a template on another head: the way through."""
+"""Transfers all expressions of a template to another head."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .spreading import Spreading
 from .template import Floats, Pose, Progress, TemplateFace
 
 _AT_ONCE = 24  # poses that are solved together
-_LEAST = 1e-3  # cm: a vertex that moves less rests
+_LEAST = 1e-3  # cm: smaller motions are set to 0
 _PARTING = ("jawOpen", "eyeBlinkL", "eyeBlinkR", "mouthUpperLipRaiseL", "mouthUpperLipRaiseR",
             "mouthLowerLipDepressL", "mouthLowerLipDepressR")  # fmt: skip
 STRENGTHS = (0.0, 1.5)
@@ -23,9 +23,11 @@ STRENGTHS = (0.0, 1.5)
 
 @dataclass(frozen=True)
 class TransferOptions:
-    """Attributes:
-    strength: 0 to 1.5, what all expressions are multiplied with.
-    threads: 0: one for each core.
+    """Options of the transfer.
+
+    Attributes:
+        strength: factor of all expressions, 0 to 1.5.
+        threads: number of threads; 0: one for each core.
     """
 
     strength: float = 1.0
@@ -34,12 +36,12 @@ class TransferOptions:
 
 @dataclass
 class Transferred:
-    """Expressions of another head.
+    """The expressions of another head.
 
     Attributes:
-        ways: float32[V, 3] by pose: what a control does alone, or what is left over where the
-            controls of a corrective meet. Cm, of the head's own vertices.
-        known: float64[V], 0 to 1: how sure each vertex' place on the template is.
+        ways: float32[V, 3] by pose, displacements of the head's vertices in cm. A corrective has
+            only its addition to the displacements of its controls.
+        known: float64[V], 0 to 1: confidence in the template's point of each vertex.
     """
 
     ways: dict[Pose, Floats]
@@ -54,19 +56,20 @@ def transfer(
     options: TransferOptions | None = None,
     progress: Progress | None = None,
 ) -> Transferred:
-    """Carries all poses of a template to a head that it lies on.
+    """Transfer all poses of a template to a head onto which it was registered.
 
     Args:
         face: the template.
-        target: the head, standing, in cm.
-        points: float64[T, 3], the template's vertices on the head.
-        trusted: bool or float[T], 0 to 1: how sure the place of each is.
-        options: how strong expressions are.
-        progress: told the share that is done, 0 to 1; False stops.
+        target: the head in cm, y up, the face towards +z.
+        points: float64[T, 3], positions of the template's vertices on the head.
+        trusted: bool or float[T], 0 to 1: confidence in the position of each vertex.
+        options: strength and threads; None: the defaults.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        AnyHeadError: no vertex of the head lies near the template, or a strength out of range.
-        Stopped: progress said False.
+        AnyHeadError: no vertex of the head is near the template, or the strength is out of range.
+        Stopped: `progress` returned False.
     """
     o = options or TransferOptions()
     if not STRENGTHS[0] <= o.strength <= STRENGTHS[1]:
@@ -97,7 +100,8 @@ def _tell(progress: Progress | None, share: float) -> None:
 
 
 def _parting(face: TemplateFace, ways: dict[Pose, Doubles]) -> Doubles | None:
-    """float64[T, n, 3]: ways in which lips and lids part; the longest where no name is known."""
+    """float64[T, n, 3]: displacements of poses that part lips and lids; without controls of known
+    names the controls with the largest motion. None if nothing moves."""
     named: list[Pose] = [(name,) for name in _PARTING if (name,) in ways]
     far = {pose: float(np.square(way).sum()) for pose, way in face.ways.items() if len(pose) == 1}
     chosen = named or sorted(far, key=lambda pose: -far[pose])[: len(_PARTING)]

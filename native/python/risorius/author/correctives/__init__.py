@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Correctives: what goes wrong where expressions meet, found and repaired."""
+"""Finds faults of combined expressions, and repairs them by correctives."""
 
 from .adding import add_correctives
 from .search import Corrective, CorrectiveOptions, Found, correct_again, find_correctives

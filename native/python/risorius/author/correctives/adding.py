@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Correctives written into a face of shapes: PSD rows, channels and targets of all its meshes."""
+"""Adds correctives to a face of shapes: PSD rows, channels and targets of all meshes."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from ..work import MM, listed_meshes
 from .poser import Controls, make_checker, skin_and_solids
 
 Row = tuple[Controls, Doubles]
-_NEAR_MM, _FAR_MM = 6.0, 12.0  # lashes go with the skin that is near, nothing with what is far
-_LEAST_MM = 0.01
-_SKIN = 0.1  # of the skin's vertices: what has more is a level of it
+# Vertices of other meshes follow the skin fully up to the first distance and not beyond the second.
+_NEAR_MM, _FAR_MM = 6.0, 12.0
+_LEAST_MM = 0.01  # shorter deltas are left out
+_SKIN = 0.1  # a mesh with more than this fraction of the skin's vertices is a coarser skin
 
 
 def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
-    """The same face with correctives at the end of those that it has.
+    """Append correctives to a face. Returns the new face.
 
-    What a combination that has one already is to get is added to its shapes.
-
-    What lies on the skin (lashes, coarser levels) goes with the skin nearest to it.
+    If a combination already has a corrective, the displacements are added to its shapes. Lashes and
+    coarser levels get the displacements of the nearest skin.
 
     Args:
-        dna: a face of shapes; it stays as it is.
-        skin: the mesh that the correctives are of.
-        correctives: the raw controls of each, and float64[V, 3] what it adds before the joints.
+        dna: a face of shapes; it is not changed.
+        skin: index of the mesh of the correctives.
+        correctives: (raw controls, displacements float64[V, 3] before skinning) of each corrective.
 
     Raises:
-        ArgumentError: a face with inputs behind its correctives, as networks have.
+        ArgumentError: the face has networks or solvers, whose inputs follow the correctives.
     """
     raw, had = len(dna.raw_control_names), dna.psd_count
     others = len(dna.machine_learned_behavior.neural_networks) + len(dna.rbf_behavior.solvers)
@@ -52,7 +52,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
 
 
 def _channels(dna: Dna) -> dict[frozenset[int], int]:
-    """The channel of each corrective that has one, by its controls."""
+    """Controls of a corrective -> its blend shape channel."""
     channels = dna.blend_shape_channels
     of_input = {
         int(c): int(o) for c, o in zip(channels.input_indices, channels.output_indices, strict=True)
@@ -62,13 +62,13 @@ def _channels(dna: Dna) -> dict[frozenset[int], int]:
 
 
 def _whole_levels(dna: Dna) -> list[int]:
-    """The levels that have all channels."""
+    """The levels that use all blend shape channels."""
     lods, rows = dna.blend_shape_channels.lods, len(dna.blend_shape_channels.input_indices)
     return [lod for lod in range(min(len(lods), max(1, dna.lod_count))) if int(lods[lod]) == rows]
 
 
 def _with_channels(dna: Dna, combinations: Sequence[Controls]) -> Dna:
-    """The face with a corrective and a channel for each combination, without targets."""
+    """The face with a corrective and a channel for each combination, but without targets."""
     out = copy.copy(dna)
     raw, had, count = len(dna.raw_control_names), dna.psd_count, len(combinations)
     names = [name.rpartition(".")[2] for name in dna.raw_control_names]
@@ -80,7 +80,8 @@ def _with_channels(dna: Dna, combinations: Sequence[Controls]) -> Dna:
         *dna.blend_shape_channel_names,
         *("_x_".join(names[c] for c in controls) for controls in combinations),
     ]
-    # Rows of a level are the first so many: correctives come last, at levels that have all others.
+    # A level uses the first rows of the channels. The new rows come last, so only levels that use
+    # all other channels can use them.
     whole, channels = _whole_levels(dna), out.blend_shape_channels
     lods = [int(n) + count * (lod in whole) for lod, n in enumerate(channels.lods)]
     new = range(first_channel, first_channel + count)
@@ -117,14 +118,14 @@ def _add_targets(
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
     for m in sorted(meshes):
         mesh = copy.copy(made[m])
-        # Joints may do all of what skin and lashes do, so that they have no shape yet.
+        # Skin and lashes may have no shapes yet, if joints do all of their motion.
         shaped = mesh.blend_shape_targets or m in skins or "lash" in dna.mesh_names[m].lower()
         if m in solids or not shaped:
             continue
         corners, shares = np.zeros((0, 3), np.int64), np.zeros((0, 3))
         if m != skin:
             points = np.asarray(mesh.positions, np.float64)
-            # Another level of the skin looks the same way; lashes have two sides.
+            # A coarser skin has the same normals as the skin, but lashes have two sides.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
             found, shares, distance = checker.nearest(points, normals)
@@ -156,7 +157,7 @@ def _add_targets(
 
 
 def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarget:
-    """A target with a shape added to it."""
+    """The target plus a shape float64[V, 3]. Args: mm  length of the unit in mm."""
     sums = np.array(shape)
     np.add.at(sums, np.asarray(target.vertex_indices, np.int64), target.deltas)
     moved = np.flatnonzero(np.linalg.norm(sums, axis=1) * mm > _LEAST_MM)
@@ -166,7 +167,7 @@ def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarg
 
 
 def face_lists(mesh: Mesh) -> list[list[int]]:
-    """The vertices of each polygon."""
+    """The vertex indices of each polygon."""
     layouts = np.asarray(mesh.layout_positions, np.int64)
     corners = layouts[np.asarray(mesh.face_layouts, np.int64)]
     ends = np.asarray(mesh.face_offsets, np.int64)[1:-1]
@@ -174,5 +175,11 @@ def face_lists(mesh: Mesh) -> list[list[int]]:
 
 
 def _carried(shape: Doubles, corners: Ints, shares: Doubles) -> Doubles:
-    """float64[n, 3]: what the skin does under other points."""
+    """float64[n, 3]: displacements of the skin at other points.
+
+    Args:
+        shape: displacements of the skin, float64[V, 3].
+        corners: int64[n, 3], the skin's triangle at each point.
+        shares: float64[n, 3], weights of the corners.
+    """
     return np.asarray((shape[corners] * shares[..., None]).sum(axis=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where combinations of raw controls bring a skin, and what it is to stay out of."""
+"""Poses a skin by combinations of raw controls, and finds the solids that it must not intersect."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..geometry.skeleton import Doubles
 from ..work import MM, listed_meshes
 
 Controls = tuple[int, ...]
-SOLIDS = ("teeth", "eye")  # meshes that a skin is kept out of, by parts of their names
+SOLIDS = ("teeth", "eye")  # parts of the names of meshes that the skin must not intersect
 _NO_SOLIDS = ("lash", "shell", "cornea", "edge", "cartilage", "saliva", "hair_", "brows_", "beard_")
 
 
 class Poser:
-    """Where raw controls bring the skin and what it must not go into."""
+    """Poses the skin and the solids by raw controls."""
 
     def __init__(self, dna: Dna, skin: int, solids: Sequence[int]) -> None:
         self.dna = dna
@@ -40,18 +40,18 @@ class Poser:
         return [mesh.positions for mesh in self._meshes]
 
     def motions(self, on: Controls) -> Doubles | None:
-        """float64[joints, 3, 4], or None where no joint moves."""
+        """float64[joints, 3, 4]: motions of the joints, or None if no joint moves."""
         deltas = self._deltas[self._active(on)].sum(axis=0)
         if not deltas.any():
             return None
         return (sk.world_matrices(self.dna, deltas) @ self._rest)[:, :3]
 
     def pose(self, on: Controls, *, corrected: bool = True) -> list[Doubles]:
-        """float64[V, 3] of the skin and of each solid.
+        """The posed vertices float64[V, 3] of the skin and of each solid.
 
         Args:
-            on: controls that are 1.
-            corrected: with what was added to it.
+            on: controls at 1.
+            corrected: whether to add the correctives in `added`.
         """
         motions, columns, out = self.motions(on), self._active(on), []
         for number, mesh in enumerate(self._meshes):
@@ -66,11 +66,11 @@ class Poser:
         return out
 
     def before_joints(self, on: Controls, displacement: Doubles) -> Doubles:
-        """A displacement of the posed skin as one before the joints.
+        """Convert displacements of the posed skin to displacements before skinning.
 
         Args:
-            on: controls that are 1.
-            displacement: float64[V, 3].
+            on: controls at 1.
+            displacement: float64[V, 3], displacements of the posed skin.
         """
         motions = self.motions(on)
         if motions is None:
@@ -92,15 +92,15 @@ class _Posed:
 
 
 def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
-    """A checker of one mesh against others.
+    """A checker of faults of a skin.
 
     Args:
-        dna: has them.
-        skin: the mesh that is kept out.
-        solids: of which.
+        dna: the face.
+        skin: index of the skin's mesh.
+        solids: indices of the meshes that the skin must not intersect.
 
     Raises:
-        DnaError: a vertex that is not there, or no finite number.
+        DnaError: a vertex index is out of range, or a number is not finite.
     """
     mesh = dna.meshes[skin]
     layouts = np.asarray(mesh.layout_positions, np.int64)
@@ -121,15 +121,15 @@ def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
 def skin_and_solids(
     dna: Dna, solids: Sequence[str] = SOLIDS, lod: int = 0
 ) -> tuple[int, list[int]]:
-    """The mesh with most vertices of a level, and what it must not go into.
+    """Index of the skin, the mesh with the most vertices of a level, and indices of its solids.
 
     Args:
-        dna: has them.
-        solids: parts of the names of meshes that it must not go into.
+        dna: the face.
+        solids: parts of the names of meshes that the skin must not intersect.
         lod: the level.
 
     Raises:
-        ArgumentError: a face without meshes.
+        ArgumentError: the level has no meshes.
     """
     meshes = listed_meshes(dna, lod)
     if not meshes:
@@ -144,7 +144,7 @@ def skin_and_solids(
 
 
 def worst(all_of: Iterable[SkinFaults]) -> SkinFaults:
-    """Of each entry the worse: what combinations may have, for their parts have it."""
+    """The worst value of each entry. Combinations may have the faults of their parts."""
     return reduce(
         lambda a, b: SkinFaults(
             np.maximum(a.depth, b.depth),

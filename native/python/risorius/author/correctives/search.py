@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Correctives that are found by themselves: where expressions together go wrong, what repairs it.
+"""Searches for faults of combined expressions, and makes correctives that repair them.
 
-What goes wrong is what none of the expressions does alone: skin inside of teeth, eyes or itself,
-faces of more than 2.5 times their area, faces that lie on one another. What repairs it undoes, near
-the fault alone, what does little there (native/author/correct.h).
+A fault is a state that none of the expressions has alone: skin inside teeth, eyes or itself, faces
+with more than 2.5 times their area, or folded faces. A repair fades out, near the fault only, parts
+of the pose that contribute little there (native/author/correct.h).
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from .poser import SOLIDS, Controls, Poser, make_checker, skin_and_solids, worst
 
 T = TypeVar("T")
 _THREADS = 2
-_BLOCK = 64  # combinations between two reports of progress
-_ENOUGH = 3000  # vertices of a skin that shows what goes wrong
-_MOVED_MM = 0.1  # what less moves is at rest
-_SHARED = 4  # vertices that two expressions both move, at least, to be looked at together
-# Sums of faults that count alike, and what is left alone.
+_BLOCK = 64  # number of combinations between two reports of progress
+_ENOUGH = 3000  # smallest number of vertices of a skin that shows faults
+_MOVED_MM = 0.1  # vertices that move less count as resting
+_SHARED = 4  # a pair is checked if both expressions move at least this many common vertices
+# Sums of volume and of faces that count as equally bad, and the largest severity that is ignored.
 _VOLUME, _FACES, _LEAST = 100.0, 5.0, 0.1
 KINDS = ("volume", "stretched", "folded")
-_ALIKE = np.array([_VOLUME, _FACES, _FACES])  # of each kind
-_PACES = np.geomspace(4.0, 0.1, 40)  # how fast weights of kinds change, from round to round
+_ALIKE = np.array([_VOLUME, _FACES, _FACES])  # equally bad sums, by kind
+_PACES = np.geomspace(4.0, 0.1, 40)  # step sizes of the weights of kinds, one for each round
 
 
 @dataclass(frozen=True)
 class CorrectiveOptions:
-    """Which correctives are made."""
+    """Options of the search for correctives."""
 
-    most: int = 500
-    solids: tuple[str, ...] = SOLIDS  # parts of the names of meshes that the skin is kept out of
-    triples: int = 200  # combinations of three that are looked at
-    # More pairs that are mended in the finished face of joints; None: a share of most.
+    most: int = 500  # largest number of correctives
+    solids: tuple[str, ...] = SOLIDS  # parts of the names of meshes that the skin must not enter
+    triples: int = 200  # number of combinations of three that are checked
+    # Number of further pairs that are repaired in the finished face of joints; None: 3/8 of `most`.
     again: int | None = None
-    together: tuple[tuple[str, ...], ...] = ()  # larger ones, by names of controls
-    apart: tuple[tuple[str, str], ...] = ()  # opposites: never at the same time
+    together: tuple[tuple[str, ...], ...] = ()  # larger combinations, by names of controls
+    apart: tuple[tuple[str, str], ...] = ()  # pairs of opposites, which are not combined
 
     @property
     def once_more(self) -> int:
@@ -58,29 +58,29 @@ class CorrectiveOptions:
 
 @dataclass
 class Corrective:
-    """A combination, and what is added to the skin where all its controls are 1."""
+    """A combination, and the displacements of the skin with all its controls at 1."""
 
     controls: Controls
-    displacement: Doubles  # [V, 3] of the posed skin, in the file's unit
-    shape: Doubles  # [V, 3] the same before the joints
-    before: FaultSums
-    after: FaultSums
+    displacement: Doubles  # [V, 3] displacements of the posed skin, in the file's unit
+    shape: Doubles  # [V, 3] displacements before skinning
+    before: FaultSums  # faults without the corrective
+    after: FaultSums  # faults with the corrective
 
 
 @dataclass
 class Found:
-    """All correctives, and what is wrong in all combinations that were looked at."""
+    """All correctives, and the faults of the checked combinations."""
 
-    skin: int  # the mesh
+    skin: int  # index of the mesh
     correctives: list[Corrective] = field(default_factory=list)
-    looked_at: int = 0
-    faulty: int = 0
-    before: dict[str, float] = field(default_factory=dict)  # sums over pairs, by kind
-    after: dict[str, float] = field(default_factory=dict)
+    looked_at: int = 0  # number of checked pairs
+    faulty: int = 0  # number of pairs with faults
+    before: dict[str, float] = field(default_factory=dict)  # kind -> sum over pairs
+    after: dict[str, float] = field(default_factory=dict)  # the same with correctives
 
 
 class Search:
-    """Looks at combinations, and repairs those that are worst."""
+    """Checks combinations for faults, and repairs the worst ones."""
 
     def __init__(
         self,
@@ -89,11 +89,14 @@ class Search:
         progress: Progress | None,
         sculpted: Collection[frozenset[int]] | None = None,
     ) -> None:
-        """Args:
-        dna: the face.
-        options: which.
-        progress: told the share that is done.
-        sculpted: combinations that look as somebody wanted them, None: all that have a corrective.
+        """Prepare a face, and check its single controls.
+
+        Args:
+            dna: the face.
+            options: options of the search.
+            progress: gets the finished fraction; returns False to stop.
+            sculpted: combinations with hand-made correctives, which are not changed; None: all
+                combinations with correctives.
         """
         self.options, self.progress = options, progress
         given = psd_parts(dna).values() if sculpted is None else sculpted
@@ -119,7 +122,7 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """What single controls and, where there are more than two, their pairs have."""
+        """The faults that a combination may have: those of its controls, and of pairs of them."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)
@@ -129,7 +132,7 @@ class Search:
         return worst(self._faults[part] for part in parts)
 
     def pairs(self) -> list[Controls]:
-        """All that move some vertices together, are no opposites and not sculpted."""
+        """Pairs of controls that move common vertices, and are neither opposites nor sculpted."""
         apart = {frozenset(pair) for pair in self.options.apart}
         return [
             (a, b)
@@ -140,11 +143,11 @@ class Search:
         ]
 
     def sums(self, combinations: Sequence[Controls], share: tuple[float, float]) -> list[FaultSums]:
-        """Of each what none of its parts has.
+        """The faults of each combination that none of its parts has.
 
         Args:
-            combinations: which.
-            share: of the whole work, where this begins and ends.
+            combinations: the combinations.
+            share: begin and end of this step as fractions of the whole work.
         """
 
         def look(on: Controls) -> FaultSums:
@@ -153,11 +156,11 @@ class Search:
         return self._all(look, combinations, share)
 
     def repair(self, combinations: Sequence[Controls], share: tuple[float, float]) -> None:
-        """Correctives of combinations, where some repair them; those before them are at work.
+        """Make correctives for combinations. Poses include the correctives of earlier calls.
 
         Args:
-            combinations: which.
-            share: of the whole work, where this begins and ends.
+            combinations: the combinations.
+            share: begin and end of this step as fractions of the whole work.
         """
 
         def mend(on: Controls) -> Corrective:
@@ -186,7 +189,7 @@ class Search:
 
 
 def _level(dna: Dna) -> int:
-    """The coarsest level whose skin has shapes and is fine enough to be looked at."""
+    """The coarsest level whose skin has shapes and at least _ENOUGH vertices."""
 
     def fine(lod: int) -> bool:
         skin = dna.meshes[skin_and_solids(dna, (), lod)[0]]
@@ -196,23 +199,23 @@ def _level(dna: Dna) -> int:
 
 
 def severity(sums: FaultSums) -> float:
-    """How bad it looks, one number."""
+    """A single number for the visible badness of faults."""
     return sums.volume / _VOLUME + (sums.stretched + sums.folded) / _FACES
 
 
 def find_correctives(
     dna: Dna, options: CorrectiveOptions | None = None, progress: Progress | None = None
 ) -> Found:
-    """Correctives of the pairs that are worst, of triples of these, and of what the options name.
+    """Find correctives for the worst pairs, for triples of them, and for combinations in options.
 
     Args:
-        dna: a face of shapes; it stays as it is.
-        options: which.
-        progress: told the share that is done, 0 to 1; False stops.
+        dna: a face of shapes; it is not changed.
+        options: options of the search.
+        progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        ArgumentError: no mesh, or a control that is not there.
-        DnaError: a value that is not finite, or progress said False.
+        ArgumentError: the face has no mesh, or a named control does not exist.
+        DnaError: a value is not finite, or progress returned False.
     """
     o = options or CorrectiveOptions()
     search = Search(dna, o, progress)
@@ -229,7 +232,7 @@ def find_correctives(
     triples = triples_of(search, sums, o.triples)
     rest = max(0, o.most - len(search.found))
     wrong = dict(zip(triples, search.sums(triples, (0.7, 0.8)), strict=True))
-    # Pairs undo no more than they have to, so that their sum may fall short by little.
+    # Pairs are repaired only as much as necessary, so triples may still have small faults.
     search.repair(_worst_of(wrong, rest, 0.0), (0.8, 0.9))
     for on in sorted(together, key=len):
         search.repair([on], (0.9, 1.0))
@@ -240,20 +243,20 @@ def find_correctives(
 def correct_again(
     rig: Dna, source: Dna, options: CorrectiveOptions, progress: Progress | None = None
 ) -> Dna:
-    """A finished face whose pairs have been looked at and mended once more, by shapes.
+    """Check and repair the pairs of a finished rig once more by shapes. Returns the new face.
 
-    What joints and shapes leave of each expression is small, but not where lips and lids lie on
-    one another; and turns do not add up as the shapes did that were looked at first. A pair that
-    has a corrective gets more of it, others one of their own.
+    A rig's small errors matter where lips or lids touch. And turns of joints do not add up like the
+    shapes that were checked first. Existing correctives of pairs are extended; other pairs get new
+    ones.
 
     Args:
-        rig: of joints and shapes; it stays as it is.
-        source: the face without the correctives that were found: those it has stay as they are.
-        options: which; beside pairs that have a corrective, once_more others at most.
-        progress: told the share that is done, 0 to 1; False stops.
+        rig: the rig of joints and shapes; it is not changed.
+        source: the face without found correctives; its own correctives are not changed.
+        options: options of the search. At most once_more pairs get new correctives.
+        progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        DnaError: a value that is not finite, or progress said False.
+        DnaError: a value is not finite, or progress returned False.
     """
     search = Search(rig, options, progress, psd_parts(source).values())
     pairs = search.pairs()
@@ -275,24 +278,24 @@ def _named(search: Search, names: Sequence[str]) -> Controls:
 
 
 def values_of(sums: Sequence[FaultSums]) -> Doubles:
-    """float64[n, 3]: how much of each of KINDS is wrong."""
+    """float64[n, 3]: the sums of faults by KINDS."""
     return np.array([[getattr(s, kind) for kind in KINDS] for s in sums], np.float64)
 
 
 def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
-    """The combinations to repair, the worst first, so that each kind of fault falls alike.
+    """Choose the combinations to repair, so that all kinds of faults decrease similarly.
 
-    By one measure of all kinds one of them would be left behind: a pair with much volume is not
-    the one with many folds. The least of the shares that they have of the three totals is to be
-    as large as can be; weights of kinds are found for that (Arora, Hazan and Kale, "The
-    Multiplicative Weights Update Method", 2012), beginning with those of the severity.
+    A single measure would neglect a kind of fault, because pairs with much volume are not those
+    with many folds. For each kind, the chosen combinations hold a fraction of the total. The
+    smallest of the three fractions is maximised by weights of the kinds (Arora, Hazan and Kale,
+    "The Multiplicative Weights Update Method", 2012), which start with the weights of severity().
 
     Args:
-        sums: what is wrong in each.
-        most: at most so many.
+        sums: combination -> its faults.
+        most: largest number of combinations.
 
     Returns:
-        Combinations that are worse than what is left alone.
+        Combinations with a severity above _LEAST.
     """
     bad = _worst_of(sums, len(sums))
     if len(bad) <= most or most == 0:
@@ -318,12 +321,12 @@ def _worst_of(sums: dict[Controls, FaultSums], most: int, least: float = _LEAST)
 
 
 def triples_of(search: Search, pairs: dict[Controls, FaultSums], most: int) -> list[Controls]:
-    """Three controls that meet, of which two pairs at least are repaired: the worst of these.
+    """The worst triples of controls that move common vertices and contain two repaired pairs.
 
     Args:
-        search: has found correctives of pairs.
-        pairs: what is wrong in each pair that meets.
-        most: at most so many.
+        search: the search; it has correctives of pairs.
+        pairs: pair -> its faults.
+        most: largest number of triples.
     """
     near: dict[int, set[int]] = {}
     for a, b in search.found:

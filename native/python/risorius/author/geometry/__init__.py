@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Meshes, and what joints do to them, apart from how a rig is made."""
+"""Meshes and their motion by joints; independent of how a rig is made."""

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How far single inputs move vertices, where a table of all inputs, joints and vertices would be
-far larger than the face: each input by itself, and only what it moves."""
+"""Computes the displacements of vertices by single inputs, without a large table.
+
+A table of all inputs, joints and vertices would be far larger than the face. So one input after the
+other is computed, and only for the vertices that it moves.
+"""
 
 from __future__ import annotations
 
@@ -13,30 +16,31 @@ from ... import Dna, Mesh
 from ...base.budget import Budget
 from .skeleton import STILL, Doubles, Ints, joint_levels, skin_entries, world_matrices
 
-_HELD = 1 << 14  # matrices at once
-_OF_A_JOINT = 256  # steps, some nanoseconds each
+_HELD = 1 << 14  # number of matrices that are computed at once
+# Work per item, in steps of the budget.
+_OF_A_JOINT = 256
 _OF_A_LEVEL = 4096
 _OF_A_WEIGHT = 32
 
 
 class Motion(NamedTuple):
-    """What an input at 1 does to joints."""
+    """The joints' motions with one input at 1."""
 
-    column: int
-    joints: Ints  # [n] that move
-    apart: Doubles  # [n, 3, 4]: where each brings what is fixed to it, less the identity
+    column: int  # index of the input
+    joints: Ints  # [n] indices of the moving joints
+    apart: Doubles  # [n, 3, 4], motion of each joint minus the identity
 
 
 def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Motion]:
-    """The motion of each of some inputs; without joints where it moves none.
+    """Yields the motion of each given input. Inputs that move no joint have no joints.
 
     Args:
         dna: the face.
-        columns: inputs.
-        budget: of the face.
+        columns: indices of the inputs.
+        budget: the work that the face's size allows.
 
     Raises:
-        BudgetError: the inputs move more than the face's size lets expect.
+        BudgetError: the inputs need more work than the budget.
     """
     count, levels = len(dna.joint_names), len(joint_levels(dna))
     inputs, outputs, values = _entries(dna, columns)
@@ -67,8 +71,8 @@ def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Mot
 
 
 def _entries(dna: Dna, columns: Sequence[int]) -> tuple[Ints, Ints, Doubles]:
-    """Input, output and value of each number of the joint groups that is not 0."""
-    known = np.zeros(1 << 16, bool)  # of the format's 16 bits
+    """Input, output and value of each nonzero number of the joint groups."""
+    known = np.zeros(1 << 16, bool)  # one for each index, because the format has 16 bits
     known[np.asarray(columns, np.int64)] = True
     parts = []
     for group in dna.joint_groups:
@@ -85,12 +89,14 @@ def _entries(dna: Dna, columns: Sequence[int]) -> tuple[Ints, Ints, Doubles]:
 
 
 class Mover:
-    """A mesh that inputs move, by its blend shapes and then by its skin."""
+    """Moves a mesh by an input: first by blend shapes, then by skinning."""
 
     def __init__(self, dna: Dna, mesh: Mesh) -> None:
-        """Args:
-        dna: has the channels of blend shapes.
-        mesh: one of its own.
+        """Prepare a mesh.
+
+        Args:
+            dna: the face with the blend shape channels.
+            mesh: one of its meshes.
         """
         self._positions = np.asarray(mesh.positions, np.float64)
         self._vertex, self._joint, self._weight = skin_entries(mesh)
@@ -104,11 +110,12 @@ class Mover:
             if int(channel) in of_channel:
                 self._channels.setdefault(int(source), []).append(int(channel))
         self._of_channel = of_channel
-        self._shift = np.zeros_like(self._positions)  # by blend shapes; 0 between calls
-        self._place = np.full(len(dna.joint_names), -1)  # of joints among those that move; -1 too
+        self._shift = np.zeros_like(self._positions)  # blend shape displacements; 0 between calls
+        # Joint -> its row in a Motion, or -1; all -1 between calls.
+        self._place = np.full(len(dna.joint_names), -1)
 
     def sums(self, amounts: Doubles) -> Doubles:
-        """float64[V]: of each vertex the sum of its joints' amounts by their weights.
+        """float64[V]: for each vertex, the sum of its weights times its joints' amounts.
 
         Args:
             amounts: float64[joints].
@@ -118,14 +125,14 @@ class Mover:
         return sums.astype(np.float64)
 
     def moved(self, motion: Motion, budget: Budget) -> tuple[Ints, Doubles]:
-        """The vertices that an input may move, and float64[n, 3], how far it does.
+        """The vertices that an input may move, and their displacements float64[n, 3].
 
         Args:
-            motion: of the input.
-            budget: of the face.
+            motion: the joints' motions with the input at 1.
+            budget: the work that the face's size allows.
 
         Raises:
-            BudgetError: the inputs move more than the face's size lets expect.
+            BudgetError: the inputs need more work than the budget.
         """
         if not len(motion.joints) and motion.column not in self._channels:
             return np.zeros(0, np.int64), np.zeros((0, 3))
@@ -139,7 +146,7 @@ class Mover:
         apart = motion.apart[self._place[self._joint[entries]]]
         shifts = np.einsum("nij,nj->ni", apart[..., :3], points) + apart[..., 3]
         shifts *= self._weight[entries, None]
-        first = np.flatnonzero(np.diff(vertex, prepend=-1))  # entries lie by vertex
+        first = np.flatnonzero(np.diff(vertex, prepend=-1))  # entries are sorted by vertex
         vertices = np.union1d(vertex[first], shaped)
         out = self._shift[vertices]
         if len(first):
@@ -149,7 +156,7 @@ class Mover:
         return vertices, out
 
     def _shape(self, column: int, budget: Budget) -> Ints:
-        """Adds what an input's blend shapes do to the shifts. Returns: their vertices."""
+        """Add an input's blend shapes to the displacements. Returns the vertices of the shapes."""
         found = [np.zeros(0, np.int64)]
         for channel in self._channels.get(column, ()):
             for number in self._of_channel[channel]:

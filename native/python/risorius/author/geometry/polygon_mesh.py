@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A Mesh of a DNA file from polygons that name their corners' positions and texture coordinates."""
+"""Makes a Mesh of a DNA file from polygons with positions and texture coordinates."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def polygon_mesh(
     uvs: Floats,
     uv_faces: Sequence[Sequence[int]],
 ) -> Mesh:
-    """A mesh without a skin and without shapes; each pair of position and place is one layout.
+    """A mesh without weights and shapes. Each pair of vertex and texture coordinate is a layout.
 
     Args:
         positions: float64[V, 3].
         normals: float64[V, 3].
-        faces: vertex indices by corner.
-        uvs: float64[T, 2].
-        uv_faces: the same corners in uvs.
+        faces: vertex indices of each polygon.
+        uvs: float64[T, 2], texture coordinates.
+        uv_faces: indices into `uvs` of each polygon's corners.
     """
     corners = [
         pair
@@ -49,11 +49,11 @@ def polygon_mesh(
 
 
 def vertex_normals(positions: Floats, faces: Sequence[Sequence[int]]) -> Floats:
-    """Unit normals [V, 3], area-weighted means of the faces around; z where there is none.
+    """Unit normals [V, 3]: area-weighted means of the adjacent faces; +z for a vertex without area.
 
     Args:
         positions: float64[V, 3].
-        faces: vertex indices by corner, counter-clockwise seen from outside.
+        faces: vertex indices of each polygon, counter-clockwise seen from outside.
     """
     normals = np.zeros_like(positions)
     for size in {len(face) for face in faces}:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rigid motions of points: the one that fits best, about a pivot, a share of one."""
+"""Rigid motions of points: least squares fit, change of pivot, and partial rotations."""
 
 from __future__ import annotations
 
@@ -25,31 +25,36 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
 
 
 def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
-    """The same rigid motion as a rotation about pivot and a shift of it.
+    """Express a rigid motion as a rotation about a pivot and a shift of the pivot.
 
     Args:
         pivot: [3].
         rotation: [3, 3].
-        translation: [3], of the motion as a rotation about the origin.
+        translation: [3], the translation after a rotation about the origin.
     """
     return rotation, translation - pivot + rotation @ pivot
 
 
 def rigid_way(points: Floats, pivot: Floats, rotation: Floats, shift: Floats) -> Floats:
-    """float64[n, 3]: how far a rotation about a pivot and a shift of it take points.
+    """float64[n, 3]: displacements of points by a rotation about a pivot and a shift.
 
     Args:
         points: float64[n, 3].
         pivot: [3].
         rotation: [3, 3].
-        shift: [3], of the pivot.
+        shift: [3], shift of the pivot.
     """
     way: Floats = pivot + shift + (points - pivot) @ rotation.T - points
     return way
 
 
 def part_rotation(rotation: Floats, share: float) -> Floats:
-    """The rotation by a share of the angle (Rodrigues)."""
+    """The rotation about the same axis by a fraction of the angle (Rodrigues).
+
+    Args:
+        rotation: [3, 3].
+        share: the fraction.
+    """
     angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
     axis = np.array(
         [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes with fewer vertices, for coarser levels of detail: corners of the fine one, none moved."""
+"""Simplifies meshes for coarser levels of detail. Kept vertices are not moved."""
 
 from __future__ import annotations
 
@@ -12,23 +12,25 @@ import numpy.typing as npt
 from ... import Mesh, _native
 from .skeleton import Doubles, Ints
 
-_UV = 0.5  # of the texture's width counts as much as of the mesh' size
-_MOTION = 2.0  # of the mesh' size, moved otherwise than the neighbours, counts as much as one of it
-_COMPONENTS = 6  # of the motion that are looked at
+_UV = 0.5  # weight of texture coordinates relative to positions in units of the mesh' size
+_MOTION = 2.0  # weight of displacements by expressions relative to positions
+_COMPONENTS = 6  # number of principal components of the displacements
 _TRIES = 4
-_STUCK = 1.5  # times the vertices that were asked for: seams are given up
-# Pieces of a mesh (eyes, teeth, lashes) stay whole: each keeps so many vertices. Pieces that are
-# smaller than a share of the mesh all go at once when less would be left of them.
+_STUCK = 1.5  # factor of the vertex budget above which seams of the texture are welded
+# Pieces of a mesh (eyes, teeth, lashes) keep at least _LEAST_OF_PIECE vertices. Pieces smaller than
+# _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
-_CARD, _MANY = 16, 60  # vertices of a card of hair at most, and how many make hair
-_THINNED = 0.6  # the power of its share: a head goes bald sooner than it goes flat
+_CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
+# Exponent of the fraction of kept hair cards. It is below 1, because missing cards are more visible
+# than a coarser skin.
+_THINNED = 0.6
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.uint32]
 
 
 def fan_triangles(mesh: Mesh) -> Ints:
-    """int64[n, 3]: the polygons as fans of triangles, in layouts."""
+    """int64[n, 3]: the polygons as fans of triangles; the numbers are layout indices."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.face_layouts, np.int64)
     fans = np.maximum(np.diff(offsets) - 2, 0)
@@ -38,11 +40,11 @@ def fan_triangles(mesh: Mesh) -> Ints:
 
 
 def attributes_of(mesh: Mesh, displacements: Doubles) -> Floats:
-    """float32[layouts, n]: texture coordinates, and the main components of the motion.
+    """float32[layouts, n]: texture coordinates and principal components of the displacements.
 
     Args:
-        mesh: stays as it is.
-        displacements: float64[E, V, 3], what expressions add to its vertices.
+        mesh: the mesh.
+        displacements: float64[E, V, 3], displacements of its vertices by the expressions.
     """
     size = _size(mesh)
     places = np.asarray(mesh.layout_positions, np.int64)
@@ -55,7 +57,7 @@ def attributes_of(mesh: Mesh, displacements: Doubles) -> Floats:
     moved = displacements.transpose(1, 0, 2).reshape(len(mesh.positions), -1) / size
     spread, axes = np.linalg.eigh(moved.T @ moved)
     main = axes[:, np.argsort(-spread, kind="stable")[:_COMPONENTS]]
-    # An axis has no direction of its own: the larger half of it points up, on every machine.
+    # The sign of an eigenvector is arbitrary. Its largest entry is made positive on every machine.
     main = main * np.where(main[np.abs(main).argmax(axis=0), range(main.shape[1])] < 0, -1, 1)
     return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]]).astype(np.float32)
 
@@ -65,11 +67,10 @@ def _size(mesh: Mesh) -> float:
 
 
 def pieces_of(mesh: Mesh) -> Ints:
-    """int64[V]: the number of the piece that a vertex belongs to; seams of the texture cut
-    nothing.
+    """int64[V]: number of the connected piece of each vertex; texture seams do not separate.
 
     Args:
-        mesh: stays as it is.
+        mesh: the mesh.
     """
     count = len(mesh.positions)
     _, own = np.unique(np.asarray(mesh.positions), axis=0, return_inverse=True)
@@ -79,12 +80,12 @@ def pieces_of(mesh: Mesh) -> Ints:
 
 
 def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
-    """int64[count]: the least vertex of the piece that each vertex belongs to.
+    """int64[count]: the smallest vertex index of each vertex' connected piece.
 
     Args:
-        count: of the vertices.
-        corners: int64, the vertices of all polygons, one polygon after the other.
-        sizes: int64[polygons], how many of them each has.
+        count: number of vertices.
+        corners: int64, vertex indices of all polygons, concatenated.
+        sizes: int64[polygons], number of corners of each polygon.
     """
     label = np.arange(count)
     begins = np.cumsum(sizes) - sizes
@@ -100,16 +101,17 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
 
 
 def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
-    """int64[n, 3]: triangles of a mesh' layouts with about so many vertices, some of those it has.
+    """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
-    What the texture and the expressions do is kept beside the form. Borders and seams stay where
-    they are; where there are so many seams that nothing can be taken away, each vertex keeps one
-    place of the texture. Pieces are kept whole: each has some vertices left, or small ones all go.
+    The simplification keeps texture coordinates and displacements by expressions beside the form.
+    Borders and seams stay in place. If seams prevent the reduction, they are welded, and each
+    vertex keeps one texture coordinate. Each connected piece keeps some vertices, or all small
+    pieces are removed.
 
     Args:
-        mesh: stays as it is.
-        attributes: float32[layouts, n] of it, see attributes_of.
-        vertices: at most, where it can be.
+        mesh: the mesh; it is not changed.
+        attributes: float32[layouts, n], see attributes_of().
+        vertices: wanted largest number of vertices; seams and borders may require more.
     """
     triangles = fan_triangles(mesh).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)
@@ -130,7 +132,13 @@ def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
 
 
 def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
-    """Vertices of each piece, of which `held` are those that it has; 0: it is left out."""
+    """The number of vertices that each piece keeps; 0 removes the piece.
+
+    Args:
+        mesh: the mesh.
+        held: vertex indices of each piece.
+        vertices: wanted number of vertices of all pieces.
+    """
     if len(held) == 1:
         return [vertices]
     positions, size = np.asarray(mesh.positions, np.float64), _size(mesh)
@@ -145,7 +153,7 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
     out = np.maximum(np.minimum(counts, _LEAST_OF_PIECE), np.round(share * counts))
     if share * counts[small].sum() < _GONE * small.sum():
         out[small] = 0
-    # Of hair fewer cards stay, whole and evenly, which thins it.
+    # Hair keeps an even selection of whole cards.
     among = min(len(cards), round(share**_THINNED * len(cards)))
     out[cards] = 0
     stay = cards[np.arange(among) * len(cards) // max(1, among)]
@@ -154,12 +162,12 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
 
 
 def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: int) -> Ints:
-    """int64[n, 3]: one piece with fewer triangles."""
+    """int64[n, 3]: simplify one piece as a whole. Welds texture seams if they block progress."""
     used, own = np.unique(triangles, return_inverse=True)
     triangles = own.reshape(-1, 3).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)[used]
     points = np.asarray(mesh.positions, np.float64)[places]
-    # An attribute counts beside the size of what is simplified, which is the piece alone.
+    # Attributes are relative to the mesh' size, but the simplifier measures the piece's size.
     share = float(np.ptp(points, axis=0).max()) / _size(mesh)
     attributes = attributes[used] / np.float32(max(share, 1e-6))
     points = points.astype(np.float32)
@@ -175,8 +183,8 @@ def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: i
 def _fewer(
     points: Floats, attributes: Floats, triangles: Indices, places: Ints, vertices: int
 ) -> Indices:
-    """Triangles with at most so many vertices, where it can be."""
-    # A closed surface has twice as many triangles as vertices; what is open has fewer.
+    """Triangles with at most `vertices` vertices, if the simplifier reaches that."""
+    # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
         found, _ = _native.simplify(points, attributes, triangles, count)
@@ -188,14 +196,14 @@ def _fewer(
 
 
 def simplified(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
-    """The mesh with these triangles of its layouts alone, without skin and shapes.
+    """A mesh that consists of given triangles of a fine mesh, without shapes.
 
     Args:
-        mesh: stays as it is.
-        triangles: int64[n, 3], of fewer_triangles, for it or for one of the same topology.
+        mesh: the fine mesh.
+        triangles: int64[n, 3], layouts from fewer_triangles() of a mesh with the same topology.
 
     Returns:
-        The new mesh of triangles, and which vertices of the fine one its own are.
+        The new mesh, and the index in the fine mesh of each vertex.
     """
     layouts, corners = np.unique(triangles, return_inverse=True)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What joints and shapes of a Dna do to its vertices, for each input of its behavior at 1.
+"""Computes motions of joints and vertices of a Dna with a single input at 1.
 
-A column is an input of joint groups and blend shape channels: a raw control or a corrective. All in
-double precision and apart from the evaluator, whose pose is one of all controls together.
+A column is an input of joint groups and blend shape channels: a raw control or a corrective. The
+functions use double precision. They do not use the evaluator, which computes all controls together.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from ... import Dna, Mesh
 from ...rigs.rotation import Convention
 
 FARTHEST = 1e9
-"""From the origin, in a face's unit: 10,000 km. Squares of what lies farther leave the numbers."""
+"""Largest coordinate in a face's unit: 10,000 km. Squares of larger ones could overflow."""
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-STILL = 1e-9  # of a joint's motion: less is rounding
+STILL = 1e-9  # smaller deviations of a joint's motion from the identity are rounding errors
 
 
 def rotation_matrices(convention: Convention, angles: Doubles) -> Doubles:
-    """float64[..., 3, 3] of Euler angles: what turns a column vector.
+    """float64[..., 3, 3]: rotation matrices for column vectors, from Euler angles.
 
     Args:
         convention: order, signs and unit of the angles.
@@ -42,11 +42,11 @@ def rotation_matrices(convention: Convention, angles: Doubles) -> Doubles:
 
 
 def euler_angles(convention: Convention, matrices: Doubles) -> Doubles:
-    """float64[n, 3], in the convention's unit, of float64[n, 3, 3]; small turns get small angles.
+    """float64[n, 3]: Euler angles in the convention's unit. Small rotations give small angles.
 
     Args:
         convention: order, signs and unit of the angles.
-        matrices: rotations of column vectors.
+        matrices: float64[n, 3, 3], rotations of column vectors.
     """
     i, j, k = convention.order
     parity = 1 if j == (i + 1) % 3 else -1
@@ -59,7 +59,7 @@ def euler_angles(convention: Convention, matrices: Doubles) -> Doubles:
 
 
 def rotation_vectors(matrices: Doubles) -> Doubles:
-    """float64[..., 3] of rotations [..., 3, 3]: axes, each as long as its angle in radians."""
+    """float64[..., 3]: rotation vectors (axis times angle in radians) of matrices [..., 3, 3]."""
     m = matrices
     axis = np.stack(
         [
@@ -76,7 +76,7 @@ def rotation_vectors(matrices: Doubles) -> Doubles:
 
 
 def matrices_of_vectors(vectors: Doubles) -> Doubles:
-    """float64[..., 3, 3] of rotation vectors float64[..., 3] (Rodrigues)."""
+    """float64[..., 3, 3]: rotation matrices of rotation vectors float64[..., 3] (Rodrigues)."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
@@ -86,15 +86,15 @@ def matrices_of_vectors(vectors: Doubles) -> Doubles:
 
 
 def column_count(dna: Dna) -> int:
-    """How many inputs joint groups and blend shape channels have."""
+    """The number of inputs of joint groups and blend shape channels."""
     lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
     most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
-    # What the file states as the width of its matrix is no measure: nothing holds it to anything.
+    # The file's own column count is not used, because no reader checks it against the groups.
     return max(most, len(dna.raw_control_names))
 
 
 def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
-    """The raw controls of each corrective, by its input."""
+    """Index of a corrective's input -> the raw controls of the corrective."""
     out: dict[int, set[int]] = {}
     rows, columns = np.asarray(dna.psds.rows), np.asarray(dna.psds.columns)
     for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
@@ -103,10 +103,10 @@ def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
 
 
 def joint_levels(dna: Dna) -> list[Ints]:
-    """Joint indices by their depth in the tree: roots first, each level hangs on the one before."""
+    """Joint indices by depth in the hierarchy, roots first."""
     at = np.asarray(dna.joint_parents, np.int64)
     depth = (at != np.arange(len(at))).astype(np.int64)
-    for _ in range(len(at).bit_length()):  # a step to the parent, then two at once, then four
+    for _ in range(len(at).bit_length()):  # pointer jumping: 1 step up, then 2, then 4
         depth += depth[at]
         at = at[at]
     order = np.argsort(depth, kind="stable")
@@ -119,11 +119,11 @@ def parent_order(dna: Dna) -> list[int]:
 
 
 def column_deltas(dna: Dna, columns: int) -> Doubles:
-    """float64[columns, joints, 9]: what each input at 1 adds to the joints' attributes.
+    """float64[columns, joints, 9]: values that each input at 1 adds to the joints' attributes.
 
     Args:
         dna: the face.
-        columns: how many inputs, see column_count.
+        columns: number of inputs, see column_count().
     """
     out = np.zeros((columns, len(dna.joint_names) * 9))
     for group in dna.joint_groups:
@@ -134,11 +134,11 @@ def column_deltas(dna: Dna, columns: int) -> Doubles:
 
 
 def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
-    """float64[..., joints, 4, 4] of the joints.
+    """float64[..., joints, 4, 4]: world matrices of the joints.
 
     Args:
-        dna: the neutral pose and the tree.
-        deltas: float64[..., joints, 9], tx ty tz rx ry rz sx sy sz beside the neutral pose.
+        dna: the face with its neutral pose and hierarchy.
+        deltas: float64[..., joints, 9], tx ty tz rx ry rz sx sy sz added to the neutral pose.
     """
     convention = Convention.of(dna)
     local = np.zeros((*deltas.shape[:-1], 4, 4))
@@ -155,12 +155,12 @@ def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
 
 
 def column_motions(dna: Dna, columns: int, value: float = 1.0) -> Doubles:
-    """float64[columns, joints, 3, 4]: where an input brings what is fixed to a joint.
+    """float64[columns, joints, 3, 4]: motion of each joint from the neutral pose by each input.
 
     Args:
         dna: the face.
-        columns: how many inputs.
-        value: of the input, all others are 0.
+        columns: number of inputs.
+        value: value of the input; all others are 0.
     """
     deltas = value * column_deltas(dna, columns)
     rest = world_matrices(dna, np.zeros_like(deltas[0]))
@@ -169,11 +169,12 @@ def column_motions(dna: Dna, columns: int, value: float = 1.0) -> Doubles:
 
 
 def skin_entries(mesh: Mesh) -> tuple[Ints, Ints, Doubles]:
-    """Vertex, joint and weight of each entry of a mesh' skin, by vertex; weights of a vertex have
-    sum 1.
+    """Vertex, joint and weight of each skin weight, sorted by vertex.
+
+    The weights of a vertex are scaled to the sum 1.
 
     Args:
-        mesh: has the weights.
+        mesh: the mesh.
     """
     count, offsets = len(mesh.positions), np.asarray(mesh.skin_offsets, np.int64)
     vertex = np.repeat(np.arange(len(offsets) - 1 if len(offsets) else 0), np.diff(offsets))
@@ -187,11 +188,11 @@ def skin_entries(mesh: Mesh) -> tuple[Ints, Ints, Doubles]:
 
 
 def dense_weights(mesh: Mesh, joints: int) -> Doubles:
-    """float64[V, joints] of a mesh' skin weights, rows with sum 1.
+    """float64[V, joints]: skin weights as a dense matrix; rows have the sum 1.
 
     Args:
-        mesh: has the weights.
-        joints: how many joints there are.
+        mesh: the mesh.
+        joints: number of joints.
     """
     vertex, joint, weight = skin_entries(mesh)
     out = np.zeros((len(mesh.positions), joints))
@@ -200,12 +201,12 @@ def dense_weights(mesh: Mesh, joints: int) -> Doubles:
 
 
 def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
-    """float64[V, 3] by input: what blend shapes add to a mesh before it is skinned.
+    """Input -> float64[V, 3], the displacements by its blend shapes before skinning.
 
     Args:
-        dna: has the channels.
-        mesh: has the targets.
-        columns: how many inputs.
+        dna: the face with the blend shape channels.
+        mesh: the mesh with the targets.
+        columns: number of inputs.
     """
     drives: dict[int, list[int]] = {}
     channels = dna.blend_shape_channels
@@ -221,30 +222,32 @@ def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
 
 
 def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
-    """float64[V, 3]: where joints bring vertices (linear blend skinning).
+    """float64[V, 3]: vertices after linear blend skinning.
 
     Args:
         positions: float64[V, 3].
         weights: float64[V, joints].
-        motions: float64[joints, 3, 4], as column_motions gives them.
+        motions: float64[joints, 3, 4], see column_motions().
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
 
 
 class Influences:
-    """Skin weights as a few joints of each vertex, where there are many joints."""
+    """Sparse skin weights: the few joints of each vertex, for faces with many joints."""
 
     def __init__(self, weights: Doubles) -> None:
-        """Args:
-        weights: float64[V, joints].
+        """Convert dense weights.
+
+        Args:
+            weights: float64[V, joints].
         """
         most = int((weights > 0).sum(axis=1).max(initial=1))
         self.joints = np.argsort(-weights, axis=1, kind="stable")[:, :most]  # int64[V, most]
         self.weights = np.take_along_axis(weights, self.joints, axis=1)
 
     def bring(self, positions: Doubles, motions: Doubles) -> Doubles:
-        """float64[V, 3]: where joints bring vertices, as skinned.
+        """float64[V, 3]: vertices after linear blend skinning, as skinned().
 
         Args:
             positions: float64[V, 3].
@@ -259,35 +262,38 @@ class Influences:
 
 
 class Skin:
-    """Vertices on joints of which few move at once: only those are looked at."""
+    """Vertices with skin weights, for poses in which few joints move: others cost nothing."""
 
     def __init__(self, positions: Doubles, weights: Doubles) -> None:
-        """Args:
-        positions: float64[V, 3].
-        weights: float64[V, joints], of sum 1 for each vertex.
+        """Prepare vertices.
+
+        Args:
+            positions: float64[V, 3].
+            weights: float64[V, joints]; the sum of each row is 1.
         """
         self._axes = np.ascontiguousarray(positions.T)
         self._of_joints = np.ascontiguousarray(weights.T)
 
     def moved(self, motions: Doubles) -> Doubles:
-        """float64[V, 3]: how far joints bring the vertices (linear blend skinning).
+        """float64[V, 3]: displacements of the vertices by linear blend skinning.
 
         Args:
-            motions: float64[joints, 3, 4], as column_motions gives them.
+            motions: float64[joints, 3, 4], see column_motions().
         """
         apart = motions - np.eye(3, 4)
         moving = np.flatnonzero(np.abs(apart).max(axis=(1, 2)) > STILL)
-        # A row of all vertices for each number: sums of rows are quicker than a small matrix each.
+        # Each of the 12 numbers of a motion is a row of all vertices, because sums of long rows are
+        # faster than a small matrix product for each vertex.
         rows = (apart[moving].reshape(-1, 12).T @ self._of_joints[moving]).reshape(3, 4, -1)
         x, y, z = self._axes
         return np.asarray((rows[:, 0] * x + rows[:, 1] * y + rows[:, 2] * z + rows[:, 3]).T)
 
 
 def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
-    """float64[V, 3]: which positions the joints bring to the wanted ones.
+    """float64[V, 3]: positions before skinning that skinning moves to the wanted positions.
 
     Args:
-        wanted: float64[V, 3].
+        wanted: float64[V, 3], positions after skinning.
         weights: float64[V, joints].
         motions: float64[joints, 3, 4].
     """
@@ -297,7 +303,7 @@ def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
 
 
 def mesh_edges(mesh: Mesh) -> npt.NDArray[np.uint32]:
-    """uint32[n, 2]: the edges of the polygons, each once."""
+    """uint32[n, 2]: vertex indices of the polygons' edges; each edge occurs once."""
     corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     offsets = np.asarray(mesh.face_offsets, np.int64)
     following = np.arange(1, len(corners) + 1)

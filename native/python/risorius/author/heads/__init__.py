@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Heads as files have them: several meshes, any unit, any direction; made one face that stands."""
+"""Joins a head of several meshes in any unit and direction into one upright face."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where a face looks, where its left and its top are, from the names of its shapes and from places.
+"""Finds the left, top and front of a face from the names of its shapes and the vertices they move.
 
-Names say where left is: what is called left moves vertices there. Brows over mouth and a jaw that
-opens say where the top is. What moves lies before the rest of a head, bulges in its middle, and
-lips pucker forwards: that says where the front is.
+Left: shapes named left move vertices on the left. Top: brows are above the mouth, and a jaw opens
+downwards. Front: moved vertices are in front of the rest of the head, the face bulges in its
+middle, and lips pucker forwards.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from ..input.obj import ObjMesh
 from .parts import AXES, Wishes
 
 _FORWARD = ("mouthFunnel", "mouthLipsPurse", "jawFwd", "tongueOut", "mouthCheekBlow")
-_SURE = 0.1  # votes that are smaller say nothing
-_ALONG = 0.8  # of a direction's length: what lies less along its axis is turned against it
-_POINTS = 600  # that are looked at for symmetry
+_SURE = 0.1  # smaller votes do not decide
+_ALONG = 0.8  # smallest cosine between a direction and its axis; below, the face counts as turned
+_POINTS = 600  # number of vertices that are compared for symmetry
 _Y, _Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 @dataclass
 class Direction:
-    """How a head stands in its file.
+    """The orientation of a head in its file.
 
     Attributes:
-        left, up, front: float64[3], one of the six axes each. Left is where the named left is.
-        named: how many pairs of names say where left is.
-        sure_up, sure_front: whether places say so; else it is what formats agree on.
-        inside_out: whether polygons show their backs, as in a file that was mirrored.
-        turned: degrees by which the named sides are turned against the axes, 0 for little.
+        left, up, front: float64[3], each along an axis. `left` is the side named left.
+        named: number of pairs of shape names that agree on `left`.
+        sure_up, sure_front: whether vertices decided it; otherwise it is the usual axis of formats.
+        inside_out: whether polygons face inwards, for example in a mirrored file.
+        turned: degrees between the named sides and the axis; 0 for small angles.
     """
 
     left: Doubles
@@ -49,23 +49,23 @@ class Direction:
 
     @property
     def agrees(self) -> bool:
-        """Whether left is where a face that looks so has its left."""
+        """Whether `left` is the left side of a face with these `up` and `front`."""
         return bool(np.dot(np.cross(self.up, self.front), self.left) > 0)
 
 
 def axis_of(word: str) -> Doubles:
-    """float64[3] of one of AXES."""
+    """float64[3]: the direction of a word of AXES."""
     out = np.zeros(3)
     out["xyz".index(word[1])] = 1.0 if word[0] == "+" else -1.0
     return out
 
 
 def word_of(axis: Doubles, said: Sequence[str] = ("+x", "+y", "+z")) -> str:
-    """One of AXES, or as others call it.
+    """The word for a direction, one of AXES or with other names of the axes.
 
     Args:
-        axis: float64[3], along one of the axes.
-        said: what the three axes are called, each with its sign.
+        axis: float64[3], along an axis.
+        said: names of x, y and z, each with a sign.
     """
     at = int(np.abs(axis).argmax())
     name, flip = said[at], axis[at] < 0
@@ -78,13 +78,13 @@ def find_direction(
     controls: Mapping[str, Sequence[str]],
     wishes: Wishes,
 ) -> Direction:
-    """How a head stands.
+    """Find the orientation of a head.
 
     Args:
-        mesh: of the face.
-        shapes: float64[V, 3] by name.
-        controls: raw controls without prefix by name.
-        wishes: what is said and not guessed.
+        mesh: the mesh of the face.
+        shapes: name -> displacements float64[V, 3].
+        controls: name -> raw controls without prefix.
+        wishes: the user's settings; other directions are guessed.
     """
     look = _Look(mesh, shapes, controls)
     left, named, turned = look.named_left()
@@ -105,7 +105,7 @@ def find_direction(
 
 
 class _Look:
-    """What shapes move, and where."""
+    """The weighted middle and mean displacement of each shape."""
 
     def __init__(
         self,
@@ -126,7 +126,11 @@ class _Look:
             self.rows.append((name, list(controls.get(name, ())), center, mean, total))
 
     def named_left(self) -> tuple[Doubles | None, int, float]:
-        """The axis from what is called right to what is called left; pairs; degrees off it."""
+        """The axis from shapes named right to shapes named left.
+
+        Returns: the axis or None, the number of agreeing pairs, and the angle to the axis in
+            degrees (0 for small angles).
+        """
         sides: dict[str, dict[str, Doubles]] = {}
         for name, controls, center, _, _ in self.rows:
             key, side = _sided(name, controls)
@@ -146,7 +150,11 @@ class _Look:
         return (axis, agreed, turned) if 3 * agreed > 2 * len(apart) else (None, 0, 0.0)
 
     def up(self, taken: Sequence[Doubles]) -> tuple[Doubles, bool]:
-        """The axis from mouth to brows, across to those that are taken."""
+        """The axis from the mouth to the brows, and whether it is sure.
+
+        Args:
+            taken: axes to which the result must be perpendicular.
+        """
         high, low, vote = [], [], np.zeros(3)
         for _, controls, center, mean, _ in self.rows:
             region = region_of(controls[0]) if controls else "other"
@@ -170,10 +178,10 @@ class _Look:
         return (_Y if free[1] else _Z), False
 
     def front(self, left: Doubles | None, up: Doubles) -> tuple[Doubles, bool]:
-        """The axis that the face looks along."""
+        """The axis along which the face looks, and whether it is sure."""
         if left is not None and abs(np.dot(left, up)) < 0.5:
             across = [left]
-        else:  # the one across which the mesh is alike on both sides
+        else:  # the axis across which the mesh is most symmetric
             free = [a for a in np.eye(3) if abs(np.dot(a, up)) < 0.5]
             across = sorted(free, key=self._unlike)[:1]
         axis = np.abs(np.cross(up, across[0]))
@@ -184,7 +192,7 @@ class _Look:
         return (np.asarray(np.cross(left, up)) if left is not None else guess), False
 
     def _forward(self, axis: Doubles, across: Doubles) -> float:
-        """Whether the face looks along an axis (above 0) or against it."""
+        """A vote: positive if the face looks along an axis, negative if against it."""
         depth = self.points @ axis
         if not self.rows:
             return 0.0
@@ -192,7 +200,7 @@ class _Look:
         totals = np.array([row[4] for row in self.rows])
         centers = np.array([row[2] for row in self.rows])
         middle = float((depth.max() + depth.min()) / 2)
-        # Each shape counts alike: a jaw that opens wide is not the whole face.
+        # Each shape has the same weight, because otherwise a wide jaw would outweigh the face.
         vote = 2.0 * float(np.clip((centers @ axis - middle).mean() / extent, -0.5, 0.5))
         for _, controls, _, mean, _ in self.rows:
             along = float(mean @ axis) / max(float(np.linalg.norm(mean)), 1e-300)
@@ -207,7 +215,7 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Indices of the vertices near those that shapes move: the face, no back of the head."""
+        """Indices of the vertices near the shapes' middles, so without the back of the head."""
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle
@@ -215,7 +223,7 @@ class _Look:
         return np.flatnonzero(np.linalg.norm(away, axis=1) < reach)
 
     def _unlike(self, axis: Doubles) -> float:
-        """How far the mesh is from its mirror image across an axis."""
+        """The mean distance of the mesh from its mirror image across an axis."""
         step = max(1, len(self.points) // _POINTS)
         points = self.points[::step] - (self.points.min(axis=0) + self.points.max(axis=0)) / 2
         other = points * (1 - 2 * np.abs(axis))
@@ -223,7 +231,7 @@ class _Look:
         return float(np.sqrt(apart.min(axis=1)).mean())
 
     def volume(self) -> float:
-        """Below 0 where the polygons' backs are outside."""
+        """Six times the volume of the mesh; negative if polygons face inwards."""
         middle, total = self.points.mean(axis=0), 0.0
         for size in {len(face) for face in self.mesh.faces}:
             table = np.array([face for face in self.mesh.faces if len(face) == size])
@@ -235,7 +243,7 @@ class _Look:
 
 
 def _sided(name: str, controls: Sequence[str]) -> tuple[str, str]:
-    """What a shape is called without its side, and its side: L, R or ""."""
+    """A key of a shape without its side, and the side: L, R or ""."""
     sides = {side_of(control) for control in controls}
     if len(sides) == 1 and sides <= {"L", "R"}:
         return "|".join(control[:-1] for control in controls), sides.pop()
@@ -246,7 +254,7 @@ def _sided(name: str, controls: Sequence[str]) -> tuple[str, str]:
 
 
 def check_axes(wishes: Wishes) -> str:
-    """What is wrong with the axes that were said, "" for nothing."""
+    """An error message if the user's axes are invalid, or ""."""
     said = {name: getattr(wishes, name) for name in ("left", "up", "front")}
     for name, word in said.items():
         if word and word not in AXES:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts of a mesh that no polygon joins, and which of them are balls."""
+"""Finds connected pieces of a mesh ("islands"), and pieces that are spheres."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..input.obj import ObjMesh
 from .parts import HeadPart, Material, first_vertices, taken_apart
 
 _INNER = re.compile(r"eye|iris|sclera|cornea|mouth|teeth|tooth|tongue|gum", re.IGNORECASE)
-_ROUND = 0.12  # of the radius: how far the vertices of a ball may lie off in the mean
+_ROUND = 0.12  # largest standard deviation of a sphere's vertices from the radius, in radii
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere: the vertices that lie on it, float64[3] and its radius."""
+    """A sphere: indices of its vertices, its middle float64[3] and its radius."""
 
     vertices: Ints
     middle: Doubles
@@ -29,7 +29,7 @@ class Ball:
 
 
 def islands_of(mesh: ObjMesh) -> Ints:
-    """int64[V]: the number of the island of each vertex, from 0 in the order of vertices."""
+    """int64[V]: number of the island of each vertex, from 0."""
     sizes = np.array([len(face) for face in mesh.faces], np.int64)
     none = np.zeros(0, np.int64)
     corners = np.concatenate([none, *(np.asarray(face, np.int64) for face in mesh.faces)])
@@ -38,12 +38,14 @@ def islands_of(mesh: ObjMesh) -> Ints:
 
 
 def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[HeadPart]:
-    """A mesh, or its islands by the material that most of their polygons have. An island is cut
-    only along what is called eye, mouth and the like.
+    """Divide a mesh by materials; each island gets the material of most of its polygons.
+
+    Polygons whose material is named like an eye or a part of the mouth are always cut off, even
+    inside an island.
 
     Args:
         part: the mesh.
-        of_face: int64[polygons], which of the materials each has.
+        of_face: int64[polygons], index of each polygon's material.
         looks: the materials.
     """
     used = np.unique(of_face)
@@ -57,7 +59,7 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
     np.add.at(counts, (islands, of_face), 1)
     best = counts.argmax(axis=1)[islands]
     inner = np.array([_INNER.search(look.name) is not None for look in looks])
-    best = np.where(inner[of_face], of_face, best)  # lids and lips hide where these are cut off
+    best = np.where(inner[of_face], of_face, best)  # lids and lips hide these cuts
     out: list[HeadPart] = []
     for place in np.unique(best).tolist():
         name = f"{part.source}_{looks[place].name}" if out else part.name
@@ -69,7 +71,7 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
 
 
 def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
-    """A sentence where materials with pictures are left out."""
+    """Add a note to the part's material if materials with pictures are left out."""
     names = [looks[place].name for place in sorted(lost) if looks[place].pictures]
     if names and part.material is not None:
         part.material.notes.append(
@@ -79,12 +81,12 @@ def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
 
 
 def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
-    """The sphere that vertices lie on, or more than a third of one; None where they do not.
+    """Fit a sphere to vertices. Returns None if they are no sphere or less than a third of one.
 
     Args:
         points: float64[V, 3].
-        vertices: which of them.
-        off: how far they may lie off, of the radius.
+        vertices: indices of the vertices.
+        off: largest standard deviation from the radius, in radii.
     """
     own = points[vertices]
     if len(own) < 12:

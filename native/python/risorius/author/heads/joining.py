@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A head of several meshes as one set of shapes: turned, sized, sorted, with eyes and a jaw."""
+"""Joins the meshes of a head into one set of shapes: turned, scaled, sorted, with eyes and jaw."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from .sizes import UNITS, check_unit, face_height, find_unit, in_words
 from .sorting import FACE, JAW, Places, choose_face, hung, is_coarse, is_other_head, moves, said_of
 from .turning import Eye, Turn, eye_turn, jaw_turn, take_eyes
 
-_OFF = 0.1  # of the width: a face that is further from x = 0 is moved there
-_TOLD = 0.1  # of an eye's radius: what its shapes do beside turning it
+_OFF = 0.1  # in widths of the face; a face farther from x = 0 is moved there
+_TOLD = 0.1  # in radii of an eye; larger displacements beside the rotation give a note
 _CALLED = ((re.compile(r"lash|eyeline", re.IGNORECASE), "eyelashes"),
            (re.compile(r"brow", re.IGNORECASE), "eyebrows"))  # fmt: skip
-_VOWELS = ("aa", "oh", "E")  # expressions that open the mouth, the widest first
+_VOWELS = ("aa", "oh", "E")  # visemes that open the mouth, the widest first
 
 
 @dataclass
 class FacePart:
-    """A mesh of the face that is made: its vertices in the joined mesh, and what it hangs on.
+    """A mesh of the new face as a range of the joined mesh.
 
     Attributes:
-        name: without level and ending.
-        start, stop: of its vertices.
-        faces: start and stop of its polygons.
-        joint: name of the joint that it hangs on.
-        material, source, polygons: as HeadPart has them.
+        name: name without the suffix _lod0_mesh.
+        start, stop: range of its vertices.
+        faces: range of its polygons.
+        joint: name of the joint that the mesh follows.
+        material, source, polygons: as in HeadPart.
     """
 
     name: str
@@ -50,15 +50,16 @@ class FacePart:
 
 @dataclass
 class Joined:
-    """A head in one piece.
+    """A joined head. x points to the left, y up, z to the front.
 
     Attributes:
-        mesh, shapes: all vertices and what each shape adds, y up, z the front, x left.
-        parts: the face first.
+        mesh: all meshes of the head.
+        shapes: name -> displacements float64[V, 3] of all vertices.
+        parts: the meshes as ranges of `mesh`; the face is the first.
         turns: joints of eyes and jaw.
-        left: -1 where what is called left is at -x.
+        left: -1 if shapes named left move vertices at -x, otherwise 1.
         unit: "cm" or "m".
-        notes: what was guessed and what becomes of each mesh, a sentence each.
+        notes: sentences on guesses and on the use of each mesh.
     """
 
     mesh: ObjMesh
@@ -80,19 +81,19 @@ def join(
     *,
     stands: bool = False,
 ) -> Joined:
-    """All meshes of a head, as one face.
+    """Join all meshes of a head.
 
     Args:
-        where: what errors call the file.
-        parts: in one space; they stay as they are.
-        unit: of the format, "cm" or "m", which the result has.
-        wishes: what is said and not guessed.
-        edited: what a person says of names, see matching.assign.
-        axes: what sentences call x, y and z, each with its sign.
-        stands: whether the parts stand in the unit already, and none of it is to be guessed.
+        where: name of the file in error messages.
+        parts: the meshes in a common space.
+        unit: unit of the format and of the result, "cm" or "m".
+        wishes: the user's settings; others are guessed.
+        edited: the user's meanings of names, see matching.assign().
+        axes: names of x, y and z in notes, each with a sign.
+        stands: whether the meshes are already upright and in the unit, so that nothing is guessed.
 
     Raises:
-        ShapeFileError: no face, two heads, or wishes that cannot be.
+        ShapeFileError: there is no face, there are two heads, or a setting is invalid.
     """
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
@@ -119,7 +120,7 @@ class _Joining:
     ) -> None:
         self.unit, self.wishes, self.edited, self.axes = unit, wishes, edited, axes
         self.notes: list[str] = []
-        self.away: dict[str, str] = {}  # meshes that are left out, or parts of them: why
+        self.away: dict[str, str] = {}  # left-out mesh, or mesh with left-out parts -> reason
         others, twins = [], []
         for part in parts:
             if part is face:
@@ -127,7 +128,7 @@ class _Joining:
             if not part.mesh.faces:
                 self.notes.append(f"{part.name} is left out: it has no polygons")
             elif part.source == face.source and moves(part):
-                twins.append(part)  # another material of the same mesh
+                twins.append(part)  # a part of the face's mesh with another material
             elif moves(part) and is_other_head(face, part):
                 self.notes.append(f"{part.name} is left out: it is another head")
             elif is_coarse(part) and moves(part):
@@ -142,12 +143,12 @@ class _Joining:
         return assign([name for name in names if "+" not in name], self.edited)
 
     def turn_and_size(self) -> None:
-        """All parts so that they stand, at a face's size."""
+        """Turn all parts upright, and scale them to the size of a face."""
         self._turn()
         self._size()
 
     def take_standing(self) -> None:
-        """The parts as they are, which stand."""
+        """Keep the parts unchanged, because they are upright and have the right size."""
         self.left = 1
         points, shapes = self.face.mesh.positions, self.face.shapes
         self.height = face_height(points, shapes, self.became.controls)
@@ -183,7 +184,7 @@ class _Joining:
         return self._joined(hanging, turns)
 
     def _turn(self) -> None:
-        """All parts so that x is left, y is up and z is the front."""
+        """Turn all parts so that x points to the left, y up and z to the front."""
         face = self.face
         found = find_direction(face.mesh, face.shapes, self.became.controls, self.wishes)
         left = found.left
@@ -193,7 +194,7 @@ class _Joining:
             left, self.left = -left, -1
         turn = np.stack([left, found.up, found.front])
         self.notes.extend(self._about(found, mirrored=mirrored))
-        # A file that shows polygons' backs shows their fronts once it is mirrored.
+        # Mirroring turns polygons inside out. If they already were, mirroring corrects them.
         order = -1 if mirrored and not found.inside_out else 1
         self.face = _moved(face, turn, order=order)
         self.others = [_moved(part, turn, order=order) for part in self.others]
@@ -219,7 +220,7 @@ class _Joining:
         return out
 
     def _size(self) -> None:
-        """All parts in the unit of the result, at a face's size."""
+        """Scale all parts to the result's unit, and centre the face if it is far from x = 0."""
         wishes = self.wishes
         height = face_height(self.face.mesh.positions, self.face.shapes, self.became.controls)
         unit = wishes.unit or self.unit
@@ -246,7 +247,7 @@ class _Joining:
     def _sort(
         self, part: HeadPart, places: Places, moving: list[HeadPart], still: list[HeadPart]
     ) -> None:
-        """Whether a mesh moves with the face, stands still with it, or is left out."""
+        """Add a mesh to the moving or to the still meshes, or to the left-out meshes."""
         shapes = in_face_names(self.face, part)
         size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
         part.shapes = {n: d for n, d in shapes.items() if np.abs(d).max(initial=0) > 1e-6 * size}
@@ -260,7 +261,7 @@ class _Joining:
             still.append(part)
 
     def _opening(self) -> Doubles | None:
-        """What opens the mouth: the jaw's own shape, or a wide vowel."""
+        """Displacements of the shape that opens the mouth: jawOpen or a wide vowel; or None."""
         named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
         meant = {expression: name for name, expression in self.became.expressions.items()}
         named += [meant[vowel] for vowel in _VOWELS if vowel in meant]
@@ -268,7 +269,7 @@ class _Joining:
         return next((delta for delta in found if delta.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
-        """The middle of what a blink moves, by side."""
+        """Side -> the weighted middle float64[3] of the vertices that a blink moves."""
         out = {}
         for name, controls in self.became.controls.items():
             delta = self.face.shapes.get(name)
@@ -297,7 +298,7 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Parts as they are, and a joint for those of the jaw; on the head where there is none."""
+        """Add a joint for the parts of the jaw. If jawOpen turns no jaw, they follow the head."""
         turn = None
         if opening is not None:
             points, whole = self.face.mesh.positions, list(self.became.expressions)
@@ -310,7 +311,7 @@ class _Joining:
 
     def _joined(self, hanging: Sequence[tuple[HeadPart, str]], turns: list[Turn]) -> Joined:
         own = self.face.source
-        ordered = sorted(  # the face first, what is of its mesh next
+        ordered = sorted(  # the face first, then the other parts of the face's mesh
             hanging,
             key=lambda row: (row[1] != FACE, row[0].source != own, -len(row[0].mesh.positions)),
         )
@@ -332,12 +333,12 @@ class _Joining:
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
 
     def _in_order(self, names: Mapping[str, None]) -> list[str]:
-        """The face's own names first, in the file's order."""
+        """The names with those of the face's shapes first, in the file's order."""
         return list(dict.fromkeys([*self.face.shapes, *names]))
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """A mesh behind others; one without texture coordinates gets one place for all."""
+    """Append a mesh. Without texture coordinates, all corners get the same one."""
     base = sum(map(len, uvs))
     own, uv_faces = mesh.uvs, mesh.uv_faces
     if not len(own) or not all(uv_faces):
@@ -348,7 +349,14 @@ def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
 
 
 def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: int = 1) -> HeadPart:
-    """A part turned, then shifted; order: -1 to turn its polygons round."""
+    """A copy of a part, transformed.
+
+    Args:
+        part: the part.
+        turn: float64[3, 3], rotation and scale.
+        shift: float64[3], shift after the rotation, or None.
+        order: -1 reverses the polygons.
+    """
     mesh = part.mesh
     points = mesh.positions @ turn.T + (0.0 if shift is None else shift)
     faces = [face[::order] for face in mesh.faces]
@@ -359,8 +367,14 @@ def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: i
 
 
 def _label(name: str, taken: set[str]) -> str:
-    """A mesh name in letters that every reader takes, each once; lashes and brows by the words that
-    readers know."""
+    """A unique mesh name of letters, digits and _.
+
+    Lashes and brows get the names that readers of DNA files know.
+
+    Args:
+        name: name in the file.
+        taken: used names in lower case; the result is added.
+    """
     name = next((word for found, word in _CALLED if found.search(name)), name)
     plain = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_") or "part"
     number, out = 1, plain

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes that a head is made of, their materials, and what a person says of the whole."""
+"""The meshes of a head, their materials, and the user's settings for the head."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 @dataclass
 class Material:
-    """What of a material a face takes along.
+    """The parts of a material that a face keeps.
 
     Attributes:
-        name: of it.
-        color: red, green, blue and opacity, 0 to 1 as files of pictures have them; None: none said.
-        pictures: role (color, normal, roughness, or orm for roughness in the green of a picture)
-            -> the picture as its file has it.
-        notes: what is left out of it, a sentence each.
+        name: name of the material.
+        color: red, green, blue and opacity, 0 to 1, sRGB as in image files; None: unknown.
+        pictures: role -> bytes of the image file. Roles are color, normal, roughness, and orm
+            (roughness in the green channel).
+        notes: sentences on parts that are left out.
     """
 
     name: str = ""
@@ -35,10 +35,10 @@ class Material:
 
 
 def as_stored(linear: Sequence[float]) -> tuple[float, float, float, float]:
-    """A colour as pictures have it, of one that is proportional to light.
+    """Convert a linear colour to sRGB. The opacity is not changed.
 
     Args:
-        linear: red, green, blue and opacity.
+        linear: red, green, blue and opacity, 0 to 1.
     """
     light = np.clip(np.array(linear, np.float64), 0.0, 1.0)
     coded = np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
@@ -50,12 +50,12 @@ class HeadPart:
     """A mesh of a head, or a part of one.
 
     Attributes:
-        name: of its object.
-        mesh: all parts in one space.
-        shapes: float64[V, 3] by name, what each adds.
-        material: None: none.
-        source: the object's name, also where this is a part of it.
-        polygons: which of its polygons, in the object's own numbers; None: all.
+        name: name of the part; at first the name of the object.
+        mesh: the mesh; all parts share one space.
+        shapes: name -> displacements float64[V, 3].
+        material: the material, or None.
+        source: name of the object to which the part belongs.
+        polygons: indices of the part's polygons in the object; None: all.
     """
 
     name: str
@@ -67,22 +67,24 @@ class HeadPart:
 
     @property
     def center(self) -> Doubles:
-        """float64[3]: of its box."""
+        """float64[3]: the middle of the bounding box."""
         points = self.mesh.positions
         return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2)
 
 
 @dataclass
 class Wishes:
-    """What a person says of a head, "" or 0 where it is to be guessed.
+    """The user's settings for a head; "" or 0 means that the value is guessed.
 
     Attributes:
-        mesh: name of the one that is the face.
-        rather: name of the one that it is where there are several heads.
-        left, up, front: one of AXES each.
-        unit: of the numbers, see sizes.UNITS.
-        scale: what all numbers are multiplied with, on top of the unit.
-        height_mm: from the chin to the top.
+        mesh: name of the face's mesh.
+        rather: name of the face's mesh if the file has several heads.
+        left: direction of the character's left, one of AXES.
+        up: direction of the top, one of AXES.
+        front: direction in which the face looks, one of AXES.
+        unit: unit of the coordinates, see sizes.UNITS.
+        scale: factor of the coordinates in addition to the unit.
+        height_mm: height of the face from the chin to the top, mm.
     """
 
     mesh: str = ""
@@ -96,7 +98,7 @@ class Wishes:
 
 
 def meaning(name: str) -> tuple[str, ...]:
-    """What two names of one meaning have alike: raw controls, or an expression; else the name."""
+    """A key that is equal for names with the same meaning: raw controls, expression, or name."""
     controls = guess(name)
     if controls:
         return tuple(sorted(controls))
@@ -105,10 +107,10 @@ def meaning(name: str) -> tuple[str, ...]:
 
 
 def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
-    """The shapes of another mesh, by the face's names where it has one of the same meaning.
+    """The shapes of a mesh, renamed to the face's shapes with the same meaning.
 
     Args:
-        face: has the names.
+        face: the mesh of the face.
         part: the other mesh.
     """
     own = {meaning(name): name for name in reversed(face.shapes)}
@@ -120,17 +122,17 @@ def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
 
 
 def first_vertices(part: HeadPart) -> Ints:
-    """int64[polygons]: a vertex of each."""
+    """int64[polygons]: the first vertex of each polygon."""
     return np.array([face[0] for face in part.mesh.faces], np.int64)
 
 
 def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[HeadPart]:
-    """A part divided, in the order of the labels; a vertex that two have becomes two.
+    """Divide a part by labels of polygons. Vertices on a cut are duplicated.
 
     Args:
-        part: is left as it is.
-        names: of the new parts, by label.
-        of_face: int64[polygons], the label of each.
+        part: the part; it is not changed.
+        names: label -> name of the new part.
+        of_face: int64[polygons], label of each polygon; -1 leaves the polygon out.
     """
     out = []
     numbers = part.polygons if part.polygons is not None else np.arange(len(of_face))

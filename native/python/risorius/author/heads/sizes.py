@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How high a face is, and which unit makes it as high as faces are."""
+"""Measures the height of a face, and guesses its unit from the usual height of faces."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ import numpy as np
 from ...controls.regions import region_of
 from ..geometry.skeleton import Doubles
 
-# In millimetres.
+# Unit -> its length in mm.
 UNITS = {
     "m": 1000.0, "cm": 10.0, "mm": 1.0, "inch": 25.4, "dm": 100.0, "foot": 304.8, "km": 1e6,
     "0.1 mm": 0.1, "0.01 mm": 0.01, "10 m": 1e4,
 }  # fmt: skip
-SAID = ("m", "cm", "mm", "inch", "dm", "foot")  # those that a person may say
-_LEAST, _MOST, _USUAL = 180.0, 300.0, 230.0  # mm, of a face from the chin to the top
-_ODD = (120.0, 450.0)  # mm, what is taken for what the file says, with a sentence
-_MOVED = 0.3  # of the largest motion of a shape: what moves less is no chin
+SAID = ("m", "cm", "mm", "inch", "dm", "foot")  # units that the user may choose
+_LEAST, _MOST, _USUAL = 180.0, 300.0, 230.0  # mm, heights of faces from the chin to the top
+_ODD = (120.0, 450.0)  # mm, unusual heights that keep the file's unit, with a note
+_MOVED = 0.3  # vertices that move less than this fraction of a shape's maximum do not show the chin
 
 
 def face_height(
     points: Doubles, shapes: Mapping[str, Doubles], controls: Mapping[str, Sequence[str]]
 ) -> float:
-    """From the chin, the lowest place that jaw and mouth move, to the top of the mesh.
+    """The height from the chin to the top of the mesh. A neck or a body does not count.
 
-    A neck or a body below does not count.
+    The chin is the lowest place that shapes of jaw and mouth move.
 
     Args:
         points: float64[V, 3], y is up.
-        shapes: float64[V, 3] by name.
-        controls: raw controls without prefix by name; where none is of the jaw or the mouth, all
+        shapes: name -> displacements float64[V, 3].
+        controls: name -> raw controls without prefix. If no shape belongs to jaw or mouth, all
             shapes count.
     """
     heights = points[:, 1]
@@ -49,12 +49,12 @@ def face_height(
 
 
 def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
-    """The unit of a face's numbers, and a sentence where something is odd, "" for none.
+    """The unit of a face's coordinates, and a note on an unusual height, or "".
 
     Args:
-        height: of the face, in the file's numbers.
-        unit: what the format says.
-        sure: whether a person says so.
+        height: height of the face in the file's numbers.
+        unit: unit that the format or the user states.
+        sure: whether the user states it; then it is kept.
     """
     as_said = height * UNITS[unit]
     usual = f"a face is {_LEAST / 10:.0f} to {_MOST / 10:.0f} cm high"
@@ -68,7 +68,7 @@ def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
             f"the face is {in_words(as_said)} high in {unit}, {usual}, and in no unit that is "
             f"known is it so: {_MENDS}"
         )
-    # inch and foot only where no power of ten fits
+    # inch and foot are chosen only if no metric unit fits
     best = min(fits, key=lambda u: (u in ("inch", "foot"), abs(np.log(height * UNITS[u] / _USUAL))))
     return best, (
         f"the face would be {in_words(as_said)} high in {unit}, and {usual}: taken as {best}, "
@@ -80,7 +80,7 @@ _MENDS = "height_mm, scale or unit (in Blender: Height) says otherwise"
 
 
 def in_words(mm: float) -> str:
-    """A length as people say it: 24.1 cm, 2.4 m."""
+    """A length as text with a suitable unit, for example 24.1 cm or 2.4 m."""
     for least, unit in ((1000.0, "m"), (10.0, "cm")):
         if mm >= least:
             return f"{mm / UNITS[unit]:.3g} {unit}"
@@ -88,5 +88,5 @@ def in_words(mm: float) -> str:
 
 
 def check_unit(unit: str) -> str:
-    """What is wrong with a unit that was said, "" for nothing."""
+    """An error message if the user's unit is unknown, or ""."""
     return "" if unit in SAID else f"unit: one of {', '.join(SAID)} was expected, found {unit!r}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each mesh of a head is: the face, what moves with it, what hangs on head or jaw, or none."""
+"""Sorts the meshes of a head: the face, meshes that follow the head or the jaw, other heads."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ _TONGUE = re.compile(r"tongue", re.IGNORECASE)
 _LOWER = re.compile(r"low|bottom|down|mandib|(?:^|[_\W])[dl](?:[_\W]|$)", re.IGNORECASE)
 _UPPER = re.compile(r"upp?|top|maxill|(?:^|[_\W])u(?:[_\W]|$)", re.IGNORECASE)
 _COARSE = re.compile(r"lod_?[1-9]", re.IGNORECASE)
-_AROUND, _LARGEST = 0.75, 3.0  # of the face's height: how far off, how large what hangs on it is
-_ALIKE = 3  # names of one meaning, in a mesh of its own place: another head
+_AROUND, _LARGEST = 0.75, 3.0  # largest distance and size of a mesh of the head, in face heights
+_ALIKE = 3  # smallest number of common expressions of another head
 
 
 def moves(part: HeadPart) -> bool:
-    """Whether a shape of it moves a vertex."""
+    """Whether a shape of the part moves a vertex."""
     size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
     return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
 
 
 def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
-    """The mesh with most vertices in shapes, or that of a name.
+    """Choose the mesh of the face: the named one, or the one with the most shape vertices.
 
     Args:
-        where: what errors call the file.
+        where: name of the file in error messages.
         parts: all meshes.
-        wanted: its name, or "".
-        rather: its name where there are several heads.
+        wanted: name of the face's mesh, or "".
+        rather: name of the face's mesh if the file has several heads, or "".
 
     Raises:
-        ShapeFileError: none that moves, none of that name, or two heads.
+        ShapeFileError: no mesh moves, none has the name, or the file has several heads.
     """
     able = [part for part in parts if moves(part)]
     named = [part for part in able if part.source == wanted] if wanted else able
@@ -67,11 +67,11 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
 
 
 def is_other_head(face: HeadPart, part: HeadPart) -> bool:
-    """Whether a mesh with shapes is a head of its own, beside the face.
+    """Whether a mesh with shapes is another head beside the face.
 
     Args:
-        face: the mesh that is the face.
-        part: the other one.
+        face: the mesh of the face.
+        part: the other mesh.
     """
     alike = len(set(in_face_names(face, part)) & set(face.shapes))
     own, other = (np.ptp(p.mesh.positions, axis=0) for p in (face, part))
@@ -80,21 +80,21 @@ def is_other_head(face: HeadPart, part: HeadPart) -> bool:
 
 
 def is_coarse(part: HeadPart) -> bool:
-    """Whether its name says that it is a coarser level of another mesh."""
+    """Whether the part's name denotes a coarser level of detail, such as LOD1."""
     return _COARSE.search(part.name) is not None
 
 
 class Places:
-    """Where a face's head and mouth are; y is up, z is the front, x is left, numbers are in mm."""
+    """Places of a face's head and mouth; x points left, y up, z to the front."""
 
     def __init__(self, face: HeadPart, height: float, mm: float, jaw_open: Doubles | None) -> None:
-        """Begins.
+        """Measure a face.
 
         Args:
-            face: turned as above, in any unit.
-            height: of the face.
-            mm: of a unit.
-            jaw_open: float64[V, 3], what opens the mouth.
+            face: the face's mesh in the axes above, in any unit.
+            height: height of the face in that unit.
+            mm: length of the unit in mm.
+            jaw_open: float64[V, 3], displacements of the shape that opens the mouth, or None.
         """
         self.height, self.mm, self.jaw_open = height, mm, jaw_open
         points = face.mesh.positions
@@ -107,7 +107,7 @@ class Places:
             self.mouth = float(np.quantile(far[:, 1], 0.95))
 
     def away(self, part: HeadPart) -> str:
-        """Why a mesh hangs on no head, "" where it does."""
+        """The reason why a mesh does not belong to the head, or ""."""
         extent = np.ptp(part.mesh.positions, axis=0)
         if extent.max() > _LARGEST * self.height:
             return f"it is {in_words(extent.max() * self.mm)} large"
@@ -118,7 +118,7 @@ class Places:
         return f"it lies {in_words(off.max() * self.mm)} from the face"
 
     def in_mouth(self, part: HeadPart) -> bool:
-        """Whether a mesh lies where teeth and tongue do."""
+        """Whether a mesh is at the place of teeth and tongue."""
         low, high = part.mesh.positions.min(axis=0), part.mesh.positions.max(axis=0)
         width = self.high[0] - self.low[0]
         reach = 0.15 * self.height
@@ -132,11 +132,13 @@ class Places:
 
 
 def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
-    """A mesh without shapes, or its islands, and the joint that each hangs on.
+    """The joint that a mesh without shapes follows. The mesh may be divided into upper and lower.
 
     Args:
         part: the mesh.
-        places: of the face.
+        places: places of the face.
+
+    Returns: (mesh or a part of it, name of its joint) pairs.
     """
     if places.jaw_open is None or not (_MOUTH.search(part.name) or places.in_mouth(part)):
         return [(part, HEAD)]
@@ -160,12 +162,12 @@ def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
 
 
 def said_of(part: HeadPart, joint: str, shapes: Mapping[str, Doubles]) -> str:
-    """What becomes of a mesh, a sentence.
+    """A sentence on how a mesh moves.
 
     Args:
-        part: of it.
-        joint: what it hangs on; FACE: it moves with the face.
-        shapes: by the face's names, of those that move it.
+        part: the mesh.
+        joint: joint that the mesh follows, or FACE if it moves by shapes.
+        shapes: the shapes that move it.
     """
     if joint == FACE:
         return f"{part.name} moves with the face: {counted(len(shapes), 'shape')} of it"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of materials as files beside a DNA file, and the metadata that says whose they are."""
+"""Writes the pictures of materials beside a DNA file, with metadata that assigns them to meshes."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ...files.png import png
 from .parts import Material
 
 _KINDS = ((b"\x89PNG\r\n\x1a\n", ".png"), (b"\xff\xd8\xff", ".jpg"), (b"BM", ".bmp"))
-_LARGE = 8192  # pixels of a side
+_LARGE = 8192  # pixels per side above which a note is added
 _WHITE = 0.999
 _LOD = re.compile(r"_lod\d+_")
 
 
 @dataclass
 class Textures:
-    """What is written beside a DNA file.
+    """Texture files beside a DNA file.
 
     Attributes:
-        files: their bytes, by path.
-        names: file name by material and role.
-        notes: what is left out, a sentence each, and where the files are.
+        files: path -> bytes.
+        names: (id() of a Material, role) -> file name.
+        notes: sentences on left-out parts and on the folder of the files.
     """
 
     files: dict[Path, bytes] = field(default_factory=dict)
@@ -37,16 +37,16 @@ class Textures:
 
 
 def texture_folder(dna: Path) -> Path:
-    """Where readers look for the textures of a DNA file."""
+    """The folder in which readers search for the textures of a DNA file."""
     return dna.with_name(f"{dna.stem}_textures")
 
 
 def textures_of(materials: Mapping[str, Material], folder: Path) -> Textures:
-    """The pictures of a face's materials; a colour without a picture becomes a small one.
+    """The texture files of a face's materials. A colour without a picture becomes a small picture.
 
     Args:
-        materials: by the names of the meshes of LOD 0.
-        folder: for them.
+        materials: name of a mesh of LOD 0 -> its material.
+        folder: folder of the files.
     """
     out, written = Textures(), dict[tuple[bool, bytes], str]()
     for material in {id(m): m for m in materials.values()}.values():
@@ -64,7 +64,7 @@ def textures_of(materials: Mapping[str, Material], folder: Path) -> Textures:
                     "expected"
                 )
                 continue
-            key = (role == "orm", data)  # whose file says by its name that it is packed
+            key = (role == "orm", data)  # file names of orm textures say that channels are packed
             if key not in written:
                 written[key] = _free(f"{_plain(material.name)}_{role}", kind, out.files)
                 out.files[folder / written[key]] = data
@@ -82,19 +82,19 @@ def textures_of(materials: Mapping[str, Material], folder: Path) -> Textures:
 def metadata_of(
     meshes: Iterable[str], materials: Mapping[str, Material], textures: Textures
 ) -> dict[str, str]:
-    """What a DNA file says of its textures.
+    """The metadata of a DNA file that assigns textures to meshes.
 
     Args:
-        meshes: names of those of all levels.
-        materials: by the names of the meshes of LOD 0.
-        textures: of textures_of.
+        meshes: names of the meshes of all levels.
+        materials: name of a mesh of LOD 0 -> its material.
+        textures: result of textures_of().
     """
     out = {}
     for name in meshes:
         material = materials.get(_LOD.sub("_lod0_", name))
         for (number, role), file in textures.names.items():
             if number == id(material):
-                use = "roughness" if role == "orm" else role  # the file's name says which colour
+                use = "roughness" if role == "orm" else role  # the file name tells the channel
                 out[f"texture:{name}:{use}"] = file
     return out
 
@@ -121,14 +121,14 @@ def _free(stem: str, kind: str, taken: Iterable[Path]) -> str:
 
 
 def _kind_of(data: bytes) -> str:
-    """The ending of a picture's file, "" for none that Blender reads."""
+    """The file ending for a picture's format; "" for formats that Blender does not read."""
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         return ".webp"
     return next((kind for start, kind in _KINDS if data.startswith(start)), "")
 
 
 def _size_of(data: bytes) -> tuple[int, int]:
-    """Width and height of a PNG or JPEG; zeros of others."""
+    """Width and height of a PNG or JPEG in pixels; (0, 0) for other formats."""
     if data.startswith(_KINDS[0][0]) and len(data) >= 24:
         width, height = struct.unpack(">II", data[16:24])
         return width, height

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints that a head has before any are sought: its eyes and its jaw, and what turns them."""
+"""Makes the joints of eyes and jaw from a head's meshes and shapes."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from ..geometry.skeleton import Doubles, Ints
 from .islands import Ball, ball_of, islands_of
 from .parts import HeadPart, first_vertices, taken_apart
 
-# What the look controls turn an eye by, in degrees about x (down is above 0) and y (left is).
+# Look control -> rotation of an eye in degrees about x (positive: down) and y (positive: left).
 LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
           "eyeLookRight": (0, -30)}  # fmt: skip
 _EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
 _BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
-_NAMED_ROUND = 0.18  # of the radius, of what is called an eye: corneas bulge
-_SIZES = (0.02, 0.16)  # radius, of the face's height
-_INSIDE = 1.1  # of the radius: what lies within turns with the eye
+_NAMED_ROUND = 0.18  # as islands.ball_of's `off`, for meshes named eye, because corneas bulge
+_SIZES = (0.02, 0.16)  # smallest and largest radius of an eye, in heights of the face
+_INSIDE = 1.1  # in radii: islands within this distance turn with the eye
 _NONE = np.zeros(0, np.int64)
-_FRONT, _SQUASH = 0.6, 0.25  # of the radius
-_LEAST_ANGLE = 0.03  # radians: what turns an eye less is none
-_NO_TURN = 0.4  # of a shape's motion: what leaves more of it when an eye turns is no turn
-_HELD, _CHIN = 0.7, 0.4  # of the jaw's motion, of its lowest: what is rigid there
-_FOLLOWS = 0.05  # of the jaw's motion
+_FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
+_LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
+_NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
+# Vertices that move more than _HELD of jawOpen's maximum are rigid; the lowest _CHIN are the chin.
+_HELD, _CHIN = 0.7, 0.4
+_FOLLOWS = 0.05  # smallest motion of the chin by a shape, relative to jawOpen
 
 
 @dataclass
 class Turn:
-    """A joint under the head and its motions.
+    """A joint below the head and its motions.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         position: float64[3].
-        motions: rotation [3, 3] and shift [3] of the position by raw control, without prefix.
+        motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Turn:
 
 @dataclass
 class Eye:
-    """An eye: its side, L or R, its ball, and the parts that turn with it."""
+    """An eye: its side (L or R), its sphere, and the parts that turn with it."""
 
     side: str
     ball: Ball
@@ -62,12 +63,12 @@ class Eye:
 def take_eyes(
     parts: Sequence[HeadPart], height: float, lids: Mapping[str, Doubles]
 ) -> tuple[list[HeadPart], list[Eye]]:
-    """Two round meshes, or two balls in one or two meshes, as eyes; and what is left of the parts.
+    """Find the eyes: two spheres in one or two meshes. Returns the other parts, and the eyes.
 
     Args:
-        parts: turned and centred, x is left.
-        height: of the face.
-        lids: float64[3] by side, L and R: the middle of what a blink moves.
+        parts: parts of the head, upright and centred; x points to the left.
+        height: height of the face.
+        lids: L or R -> float64[3], the middle of the vertices that a blink moves.
     """
     labels = [islands_of(part.mesh) for part in parts]
     found = [
@@ -87,7 +88,7 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a part that are as round and as large as eyes."""
+    """The islands of a part that have the form and the size of eyes."""
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
@@ -105,12 +106,12 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
 
 
 def _looks_out(points: Doubles, ball: Ball) -> bool:
-    """Whether a ball has its front, as no socket has that is drawn as the white of an eye."""
+    """Whether a sphere has vertices at its front. A socket drawn as an eye's white has none."""
     return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
 
 
 def _is_squashed(part: HeadPart, ball: Ball) -> bool:
-    """Whether a shape changes most of a ball's form, as lids do that are joined to a drawn eye."""
+    """Whether a shape deforms most of a sphere, for example lids that are part of a drawn eye."""
     before = part.mesh.positions[ball.vertices]
     for delta in part.shapes.values():
         own = delta[ball.vertices]
@@ -126,7 +127,7 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The largest two balls that may be the left and the right eye, and the part of each."""
+    """The largest pair of spheres that may be left and right eye, with their parts' indices."""
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
         for j, right in found:
@@ -136,7 +137,7 @@ def _pair(
             other = right.middle * [-1, 1, 1]
             named = all(_EYE.search(parts[k].name) for k in (i, j))
             off = np.linalg.norm(left.middle - other)
-            loose = 2.5 if named else 0.7  # an asymmetric head has eyes of its own places
+            loose = 2.5 if named else 0.7  # larger for named eyes, because heads may be asymmetric
             if off > loose * radius or abs(left.radius - right.radius) > 0.4 * radius:
                 continue
             if left.middle[0] - right.middle[0] < 2 * radius or not (
@@ -156,8 +157,14 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """What is left of a part when its islands in the eyes' balls are theirs; own: a vertex of each
-    ball, where it is of this part."""
+    """Give the islands of a part inside the eyes' spheres to the eyes. Returns the rest.
+
+    Args:
+        part: the part.
+        islands: int64[V], island of each vertex.
+        eyes: both eyes.
+        own: for each eye, a vertex of its sphere if the sphere belongs to this part.
+    """
     if _BESIDE.search(part.name):
         return [part]
     count = int(islands.max()) + 1
@@ -170,7 +177,7 @@ def _divided(
         np.maximum.at(furthest, islands, away)
         reach = _INSIDE * eye.ball.radius
         if _EYE.search(part.name):
-            reach *= 1.2  # a cornea that bulges
+            reach *= 1.2  # because corneas bulge
         of_island[(furthest < reach) & with_polygons] = number
         of_island[islands[own[number]]] = number
     if (of_island == 2).all():
@@ -185,12 +192,15 @@ def _divided(
 
 
 def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dict[str, float]]:
-    """The joint of an eye: shapes that turn the ball say by how much, else look controls have usual
-    angles. And by name how far what these shapes do beside that would move it.
+    """The joint of an eye with the rotations of the look controls.
+
+    A shape that turns the eye gives its rotation. Other look controls get usual angles.
 
     Args:
-        eye: its parts keep the shapes that do not turn them, such as a pupil's.
-        controls: raw controls without prefix by shape.
+        eye: the eye. Its parts keep only the shapes that do not turn it, such as a pupil's.
+        controls: shape -> raw controls without prefix.
+
+    Returns: the joint, and name of a turning shape -> its largest displacement beside the rotation.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}
@@ -208,7 +218,7 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         every = controls.get(name, ())
         own = [control for control in every if control.endswith(eye.side) or len(every) == 1]
         arm = points - eye.ball.middle
-        # Shapes turn an eye about a point of their own, such as a joint of the body's rig.
+        # A shape may turn the eye about another point, such as a joint of the body's rig.
         rotation, shift = about(eye.ball.middle, rotation, moved)
         rest = _longest(delta - (arm @ rotation.T + shift - arm))
         if angle > _LEAST_ANGLE and own and rest < _NO_TURN * _longest(delta):
@@ -224,10 +234,10 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
 
 
 def look_turn(look: str) -> Doubles:
-    """float64[3, 3]: what a look control turns an eye by.
+    """float64[3, 3]: the usual rotation of an eye by a look control.
 
     Args:
-        look: one of LOOKS, the control's name without its side.
+        look: key of LOOKS, the control's name without its side.
     """
     x, y = np.radians(LOOKS[look])
     return np.asarray(sk.matrices_of_vectors(np.array([[x, y, 0.0]]))[0])
@@ -244,15 +254,16 @@ def jaw_turn(
     opening: Doubles,
     whole: Sequence[str],
 ) -> Turn | None:
-    """The jaw's joint: its hinge, and what each shape does to the chin; None where jawOpen turns
-    nothing.
+    """The jaw's joint at its hinge, with the rigid motion of the chin in each shape.
+
+    Returns None if the mouth opens without a rotation.
 
     Args:
-        points: float64[V, 3], of the face.
-        shapes: float64[V, 3] by name.
-        controls: raw controls without prefix by shape.
-        opening: float64[V, 3], what opens the mouth.
-        whole: names of shapes that move all of a mouth, as visemes do.
+        points: float64[V, 3], vertices of the face.
+        shapes: name -> displacements float64[V, 3].
+        controls: shape -> raw controls without prefix.
+        opening: float64[V, 3], displacements of the shape that opens the mouth.
+        whole: names of shapes that move the whole mouth, such as visemes.
     """
     length = np.linalg.norm(opening, axis=1)
     held = np.flatnonzero(length > _HELD * length.max())

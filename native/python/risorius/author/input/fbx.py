@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Binary FBX: the mesh with the most blend shapes, and what each of these adds to it.
+"""Reads meshes and blend shapes of binary FBX files.
 
-Objects, connections and properties are those of Autodesk's FBX SDK (FbxMesh, FbxBlendShape,
-FbxBlendShapeChannel, FbxNode's order of pivots); axes and unit are those of GlobalSettings.
+Objects, connections and properties follow Autodesk's FBX SDK (FbxMesh, FbxBlendShape,
+FbxBlendShapeChannel, FbxNode's order of pivots). Axes and unit come from GlobalSettings.
 """
 
 from __future__ import annotations
@@ -24,42 +24,43 @@ from .welding import welded
 
 SUFFIX = ".fbx"
 _SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
-_ORDERS = ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")  # about which axis first
+_ORDERS = ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")  # RotationOrder -> axes, the first one first
 _CENTIMETRE = 0.01
-_DEEPEST = 64  # nodes above a mesh
+_DEEPEST = 64  # largest number of nodes above a mesh
 
 
 def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
-    """A mesh in metres, y up, and float64[V, 3] of each of its blend shapes by name.
+    """Read a mesh and its blend shapes, in metres with y up.
 
-    Of a channel with several targets that are reached one after the other, the last is taken. The
-    mesh stands where its node puts it, or its skin as it was bound. Vertices that a file has
-    several times, as exporters for games write them along seams of the texture, are one.
+    If a channel has several successive targets (in-betweens), the last one is used. The mesh has
+    the place of its node, or of its skin in the bind pose. Vertices that exporters duplicate along
+    seams of the texture are welded.
 
     Args:
-        path: of the file.
-        mesh: its node's name, where a file has several with blend shapes; "": the one with most
-            of them.
+        path: the file.
+        mesh: name of the mesh' node; "": the mesh with the most vertices in blend shapes.
+
+    Returns: the mesh, and name of a blend shape -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: no mesh with blend shapes.
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more numbers than a file of this size may hold.
+        ShapeFileError: the file has no mesh with blend shapes.
+        AnimationFileError: the file is damaged; the message names the place.
+        BudgetError: the file contains more numbers than its size allows.
     """
     scene = open_scene(path)
     return mesh_of(scene, _choose(scene, path, mesh))
 
 
 def open_scene(path: Path, skipped: frozenset[str] = _SKIPPED) -> Scene:
-    """A binary FBX whose meshes are read.
+    """Open a binary FBX file.
 
     Args:
-        path: of the file.
+        path: the file.
         skipped: kinds of objects that are not read.
 
     Raises:
-        ShapeFileError: another kind of file.
-        AnimationFileError: the file is damaged; with the place in it.
+        ShapeFileError: the file is no binary FBX.
+        AnimationFileError: the file is damaged; the message names the place.
     """
     data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
@@ -69,7 +70,7 @@ def open_scene(path: Path, skipped: frozenset[str] = _SKIPPED) -> Scene:
 
 
 def meshes_of(scene: Scene) -> list[tuple[int, str]]:
-    """The number of each mesh, and the name of its node."""
+    """The object number of each mesh, and the name of its node."""
     out = []
     for number, node in scene.of_kind("Geometry").items():
         if _class_of(node) == "Mesh":
@@ -79,14 +80,14 @@ def meshes_of(scene: Scene) -> list[tuple[int, str]]:
 
 
 def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
-    """A mesh and its blend shapes, as read_fbx gives them; one without shapes too.
+    """A mesh and its blend shapes, if any, in the form of read_fbx().
 
     Args:
-        scene: of the file.
-        number: of the mesh, as meshes_of gives it.
+        scene: the open file.
+        number: object number of the mesh, from meshes_of().
 
     Raises:
-        AnimationFileError: it is damaged; with the place in it.
+        AnimationFileError: the mesh is damaged; the message names the place.
     """
     geometry = scene.objects[number]
     turn = _axes(scene) @ _to_world(scene, number)
@@ -99,7 +100,7 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
     }
     ends = np.cumsum([len(face) for face in faces])[:-1]
     uv_faces = [part.tolist() for part in np.split(uv_corners, ends)]
-    if np.linalg.det(turn[:3, :3]) < 0:  # a mirror shows the backs of polygons
+    if np.linalg.det(turn[:3, :3]) < 0:  # mirroring turns polygons inside out
         faces, uv_faces = ([row[::-1] for row in rows] for rows in (faces, uv_faces))
     found = ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces)
     found, moved = welded(found, list(shapes.values()))
@@ -107,7 +108,7 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
 
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:
-    """The mesh of that name, or the one with most vertices in blend shapes."""
+    """Object number of the mesh with a name; with "", of the mesh with the most shape vertices."""
     found = []
     for number, node in scene.of_kind("Geometry").items():
         if _class_of(node) != "Mesh":
@@ -124,7 +125,7 @@ def _class_of(node: Node) -> str:
 
 
 def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int, Node]]:
-    """Objects of a kind that hang on another, in the file's order."""
+    """Yields the child objects of a kind and class, in the file's order."""
     below = scene.children.get(parent, [])
     scene.budget.work(len(below), "connections")
     for number in below:
@@ -134,7 +135,7 @@ def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int
 
 
 def _shapes(scene: Scene, mesh: int) -> list[tuple[str, Node]]:
-    """Name and full target of each channel of a mesh; each name once."""
+    """Unique name and full target of each blend shape channel of a mesh."""
     out: dict[str, Node] = {}
     for blend, _ in _below(scene, mesh, "Deformer", "BlendShape"):
         for channel, node in _below(scene, blend, "Deformer", "BlendShapeChannel"):
@@ -170,7 +171,10 @@ def _fail(scene: Scene, node: Node, what: str) -> ShapeFileError:
 
 
 def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], Ints]:
-    """Vertices of each polygon, and of all corners in a row; the last of a polygon is ~index."""
+    """The vertices of each polygon, and of all corners concatenated.
+
+    In the file, the last corner of a polygon is stored as ~index.
+    """
     order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
     last = order < 0
     corners = np.where(last, ~order, order)
@@ -181,7 +185,7 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
 
 
 def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, Ints]:
-    """The first texture coordinates, and their index at each corner; zeros for none."""
+    """The first layer of texture coordinates, and the index of each corner; zeros if missing."""
     layer = node.first("LayerElementUV")
     if layer is None:
         return np.zeros((1, 2)), np.zeros(count, np.int64)
@@ -219,7 +223,7 @@ def _delta(scene: Scene, shape: Node, points: Doubles) -> Doubles:
 
 
 def _axes(scene: Scene) -> Doubles:
-    """float64[4, 4] from the scene's axes and unit to metres, y up."""
+    """float64[4, 4]: matrix from the scene's axes and unit to metres with y up."""
     rows = {name: values[-1] for name, values in properties(scene.settings).items()}
 
     def axis(name: str, default: int) -> Doubles:
@@ -242,7 +246,7 @@ def _axes(scene: Scene) -> Doubles:
 
 
 def _model_of(scene: Scene, number: int) -> int:
-    """The node that an object hangs on; 0 for none."""
+    """Object number of an object's parent node; 0 if there is none."""
     for parent, way in scene.parents.get(number, []):
         node = scene.objects.get(parent)
         if node is not None and node.name == "Model" and not way:
@@ -251,7 +255,7 @@ def _model_of(scene: Scene, number: int) -> int:
 
 
 def _to_world(scene: Scene, mesh: int) -> Doubles:
-    """float64[4, 4] of a mesh' node and of all above it, or of its skin, column vectors."""
+    """float64[4, 4]: matrix from a mesh to the world, by its nodes or its skin; column vectors."""
     at = _model_of(scene, mesh)
     out = _geometric(scene, scene.objects[at]) if at else np.eye(4)
     joint = _top_joint(scene, mesh)
@@ -262,7 +266,7 @@ def _to_world(scene: Scene, mesh: int) -> Doubles:
 
 
 def _chain(scene: Scene, node: int) -> list[int]:
-    """A node and all above it, the root last."""
+    """A node and its ancestors, the root last."""
     out: list[int] = []
     while node and len(out) < _DEEPEST:
         out.append(node)
@@ -271,7 +275,7 @@ def _chain(scene: Scene, node: int) -> list[int]:
 
 
 def _product(scene: Scene, chain: Sequence[int]) -> Doubles:
-    """float64[4, 4] from the first of these nodes to the world."""
+    """float64[4, 4]: matrix from the first node of a chain to the world."""
     out = np.eye(4)
     for node in chain:
         out = _local(scene, scene.objects[node]) @ out
@@ -279,9 +283,13 @@ def _product(scene: Scene, chain: Sequence[int]) -> Doubles:
 
 
 def _top_joint(scene: Scene, mesh: int) -> tuple[list[int], Doubles] | None:
-    """The joint of a mesh' skin that is nearest to the root, with all above it, and float64[4, 4]
-    where that joint had the mesh when it was bound; None: no skin says it. The mesh' own node and
-    other joints may stand anywhere."""
+    """The joint of a mesh' skin nearest to the root, for the mesh' place in the bind pose.
+
+    This joint is used because the mesh' node and other joints may be posed.
+
+    Returns: the joint with its ancestors, and the matrix float64[4, 4] from the mesh to the joint
+        in the bind pose; None if no skin states it.
+    """
     found: tuple[list[int], Node] | None = None
     for skin, _ in _below(scene, mesh, "Deformer", "Skin"):
         for cluster, node in _below(scene, skin, "Deformer", "Cluster"):
@@ -304,7 +312,7 @@ def _is_model(scene: Scene, number: int) -> bool:
 
 
 def _geometric(scene: Scene, node: Node) -> Doubles:
-    """What moves a node's mesh and not the nodes below it."""
+    """The geometric transform of a node, which moves its mesh but not its children."""
     read = _Transforms(scene, node)
     return (
         read.shift("GeometricTranslation")
@@ -314,7 +322,7 @@ def _geometric(scene: Scene, node: Node) -> Doubles:
 
 
 def _local(scene: Scene, node: Node) -> Doubles:
-    """T Roff Rp Rpre R Rpost^-1 Rp^-1 Soff Sp S Sp^-1, as the SDK's manual says."""
+    """A node's local matrix T Roff Rp Rpre R Rpost^-1 Rp^-1 Soff Sp S Sp^-1 of the SDK's manual."""
     read = _Transforms(scene, node)
     pivot, scaled = read.shift("RotationPivot"), read.shift("ScalingPivot")
     turned = read.turn("PreRotation") @ read.turn("Lcl Rotation", read.order())
@@ -326,14 +334,14 @@ def _local(scene: Scene, node: Node) -> Doubles:
 
 
 def _back(shift: Doubles) -> Doubles:
-    """The inverse of a shift. LAPACK's, of many threads, takes milliseconds on a busy machine."""
+    """The inverse of a translation matrix, without LAPACK, whose threads take milliseconds."""
     out = shift.copy()
     out[:3, 3] *= -1
     return out
 
 
 class _Transforms:
-    """The matrices that the properties of a node say."""
+    """Matrices from the properties of a node."""
 
     def __init__(self, scene: Scene, node: Node) -> None:
         self._scene, self._node = scene, node
@@ -348,7 +356,7 @@ class _Transforms:
         return out
 
     def order(self) -> str:
-        """About which axis a rotation turns first."""
+        """The order of a rotation's axes, the first one first."""
         number = self._rows.get("RotationOrder", [0])[-1]
         if not isinstance(number, int) or not 0 <= number < len(_ORDERS):
             raise _fail(
@@ -365,7 +373,7 @@ class _Transforms:
         return np.diag([*self._three(name, 1.0), 1.0])
 
     def turn(self, name: str, order: str = "XYZ") -> Doubles:
-        """A rotation in degrees about fixed axes, the first of the order first."""
+        """The matrix of a rotation about fixed axes, from angles in degrees."""
         angles = np.radians(self._three(name, 0.0))
         out = np.eye(4)
         for letter in order:

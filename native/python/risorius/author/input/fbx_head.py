@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All meshes of a binary FBX, each where its node stands, and their materials."""
+"""Reads all meshes of a binary FBX at the places of their nodes, and their materials."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _ROLES = ((re.compile(r"normal|bump", re.IGNORECASE), "normal"),
 
 
 def read_fbx_head(path: Path) -> list[HeadPart]:
-    """The meshes of an FBX, in metres, y up.
+    """Read the meshes of an FBX, in metres with y up.
 
     Args:
-        path: of the file.
+        path: the file.
 
     Raises:
-        ShapeFileError: no mesh, or another kind of file.
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more numbers than a file of this size may hold.
+        ShapeFileError: the file contains no mesh or is no binary FBX.
+        AnimationFileError: the file is damaged; the message names the place.
+        BudgetError: the file contains more numbers than its size allows.
     """
     scene = fbx.open_scene(path, _SKIPPED)
     out: list[HeadPart] = []
@@ -52,7 +52,7 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
 def _by_materials(
     scene: Scene, path: Path, number: int, part: HeadPart, known: dict[int, Material]
 ) -> list[HeadPart]:
-    """A mesh, or its islands by the material that most of their polygons have."""
+    """The parts of a mesh, divided by materials; see islands.divided()."""
     owner = next((p for p, way in scene.parents.get(number, []) if not way), 0)
     listed = [i for i in scene.children.get(owner, []) if _is(scene, i, "Material")]
     for identity in listed:
@@ -68,7 +68,7 @@ def _is(scene: Scene, number: int, kind: str) -> bool:
 
 
 def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
-    """int64[faces]: which of a node's materials each polygon has; zeros where nothing says so."""
+    """int64[faces]: index of each polygon's material among those of the node; 0 if not stated."""
     layer = mesh.first("LayerElementMaterial")
     found = layer.array("Materials") if layer is not None else np.zeros(0)
     if materials < 1:
@@ -79,7 +79,7 @@ def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
 
 
 def _material(scene: Scene, path: Path, number: int) -> Material:
-    """What of a material a face takes along."""
+    """The parts of a material that a face keeps."""
     node = scene.objects[number]
     out = Material(object_name(node) or f"material{number}")
     values = properties(node).get("DiffuseColor", [])
@@ -96,7 +96,7 @@ def _material(scene: Scene, path: Path, number: int) -> Material:
 
 
 def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Material) -> None:
-    """The picture of a role: in the file, or beside it; else a sentence."""
+    """Add the picture of a role, embedded or beside the file, to a material; otherwise a note."""
     for video in scene.children.get(texture, []):
         content = scene.objects[video].first("Content") if _is(scene, video, "Video") else None
         data = b"".join(v for v in (content.values if content else []) if isinstance(v, bytes))

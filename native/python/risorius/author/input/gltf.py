@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""glTF and GLB: the mesh with the most morph targets, and what each of these adds to it."""
+"""Reads meshes and morph targets of glTF and GLB files."""
 
 from __future__ import annotations
 
@@ -20,27 +20,29 @@ from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
 from .welding import welded
 
-SUFFIXES = (".glb", ".gltf", ".vrm")  # VRM is a GLB with a body's bones by name
+SUFFIXES = (".glb", ".gltf", ".vrm")  # VRM is a GLB with named bones of a body
 _TRIANGLES = 4
-_DEEPEST = 1024  # nodes above a mesh
-_CORNER_BYTES = 48  # of a triangle's corner in arrays and lists
+_DEEPEST = 1024  # largest number of nodes above a mesh
+_CORNER_BYTES = 48  # memory of a triangle's corner in arrays and lists
 _FURTHEST_UV = 1e6
 
 
 def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
-    """A mesh of triangles in metres, y up, and float64[V, 3] of each of its morph targets by name.
+    """Read a mesh of triangles and its morph targets, in metres with y up.
 
-    It stands where its node puts it, or its skin as it was bound. Vertices that a glTF has several
-    times, for seams of the texture or of the normals, are one.
+    The mesh has the place of its node, or of its skin in the bind pose. Vertices that a glTF
+    duplicates along seams of the texture or of the normals are welded.
 
     Args:
-        path: of the file.
-        mesh: its name, where a file has several with morph targets; "": the one with most of them.
+        path: the file.
+        mesh: name of the mesh; "": the mesh with the most vertices in morph targets.
+
+    Returns: the mesh, and name of a morph target -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: no mesh with morph targets, or one of a kind that is not read.
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more numbers than a file of this size may hold.
+        ShapeFileError: the file has no mesh with morph targets, or an unsupported kind of mesh.
+        AnimationFileError: the file is damaged; the message names the place.
+        BudgetError: the file contains more numbers than its size allows.
     """
     document = open_document(path)
     mesh_number = _choose(document, path, mesh)
@@ -51,14 +53,14 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
 
 
 def open_document(path: Path) -> Document:
-    """A glTF whose meshes are read.
+    """Open a glTF or GLB file.
 
     Args:
-        path: of the file.
+        path: the file.
 
     Raises:
-        ShapeFileError: another kind of file.
-        AnimationFileError: the file is damaged; with the place in it.
+        ShapeFileError: the file is no glTF.
+        AnimationFileError: the file is damaged; the message names the place.
     """
     data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a glTF", (signatures.GLB.code,))
@@ -72,7 +74,7 @@ def open_document(path: Path) -> Document:
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
-    """The mesh of that name, or the one with most vertices in morph targets."""
+    """Index of the mesh with a name; with "", of the mesh with the most morph target vertices."""
     rows = document.json.get("meshes")
     found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):
@@ -83,12 +85,12 @@ def _choose(document: Document, path: Path, wanted: str) -> int:
 
 
 def name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
-    """A mesh' name, or that of its node or of the nearest above: packers drop names of meshes.
+    """The name of a mesh, or of the nearest named node above it, because packers drop mesh names.
 
     Args:
-        document: of open_document.
+        document: the open file.
         row: the mesh' table of the JSON.
-        number: of the mesh.
+        number: index of the mesh.
     """
     world = _World(document)
     node = world.of_mesh(number)
@@ -98,15 +100,15 @@ def name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
 
 
 def primitives(document: Document, row: object, number: int) -> list[dict[str, Any]]:
-    """Of a mesh.
+    """The primitives of a mesh.
 
     Args:
-        document: of open_document.
+        document: the open file.
         row: the mesh' table of the JSON.
-        number: of the mesh, for errors.
+        number: index of the mesh, for error messages.
 
     Raises:
-        AnimationFileError: it has none.
+        AnimationFileError: the mesh has no list of primitives.
     """
     found = row.get("primitives") if isinstance(row, dict) else None
     if not isinstance(found, list) or not all(isinstance(p, dict) for p in found):
@@ -127,19 +129,19 @@ def _vertices(document: Document, primitive: Mapping[str, Any]) -> int:
 
 
 def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
-    """A mesh and its morph targets, as read_gltf gives them; one without targets or triangles too.
+    """A mesh and its morph targets in the form of read_gltf(); both may be empty.
 
     Args:
-        document: of open_document.
-        number: of the mesh.
+        document: the open file.
+        number: index of the mesh.
 
     Raises:
-        AnimationFileError: it is damaged; with the place in it.
+        AnimationFileError: the mesh is damaged; the message names the place.
     """
     row = document.json["meshes"][number]
     place = f"meshes[{number}]"
     parts: list[_Part] = []
-    begins: dict[str, int] = {}  # of vertices that several primitives may share
+    begins: dict[str, int] = {}  # attributes -> first vertex; primitives may share vertices
     triangles = []
     total = 0
     for i, primitive in enumerate(primitives(document, row, number)):
@@ -156,12 +158,13 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
         raise document.fail(place, "as many morph targets in all primitives were expected")
     names = _names(row, counts.pop())
     corners = np.concatenate(triangles)
-    corners = corners[(np.diff(np.sort(corners, axis=1), axis=1) > 0).all(axis=1)]  # none is a line
+    # Leave out triangles with a repeated vertex.
+    corners = corners[(np.diff(np.sort(corners, axis=1), axis=1) > 0).all(axis=1)]
     used, order = np.unique(corners, return_inverse=True)
     corners = order.reshape(-1, 3)
     turn = _node_matrix(document, number)
     size = turn[:3, :3]
-    if np.linalg.det(size) < 0:  # a mirror shows the backs of polygons
+    if np.linalg.det(size) < 0:  # mirroring turns polygons inside out
         corners = corners[:, ::-1]
     points = np.concatenate([part.positions for part in parts])[used]
     uvs = np.concatenate([part.uvs for part in parts])[used]
@@ -175,7 +178,7 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
 
 
 class _Part:
-    """The vertices of a primitive, which others may share."""
+    """The vertices of a primitive; other primitives may share them."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
         attributes = primitive.get("attributes")
@@ -191,7 +194,11 @@ class _Part:
         ]
 
     def triangles(self, document: Document, primitive: Mapping[str, Any], place: str) -> Ints:
-        """int64[n, 3] of a primitive that has these vertices. Raises: AnimationFileError."""
+        """int64[n, 3]: the triangles of a primitive with these vertices.
+
+        Raises:
+            AnimationFileError: the primitive is damaged or has no triangles.
+        """
         if document.whole(primitive, "mode", place, _TRIANGLES) != _TRIANGLES:
             raise document.fail(f"{place}.mode", "triangles were expected")
         count, at = len(self.positions), f"{place}.indices"
@@ -219,7 +226,7 @@ class _Part:
 
 
 class _Packed:
-    """The attributes of a primitive, whether Draco packed them or not."""
+    """Reads the attributes of a primitive, with or without Draco compression."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
         self._document, self._place = document, place
@@ -232,9 +239,10 @@ class _Packed:
             self._numbers = numbers if isinstance(numbers, dict) else {}
 
     def rows(self, given: Mapping[str, Any], name: str, kind: str) -> Doubles:
-        """float64[V, n] of an attribute.
+        """float64[V, n]: the values of an attribute.
 
-        Raises: AnimationFileError: it is not there, of another kind, or of another length.
+        Raises:
+            AnimationFileError: the attribute is missing or has another type or length.
         """
         at = f"{self._place}.attributes.{name}"
         if self.mesh is None or name not in self._numbers:
@@ -271,7 +279,7 @@ def _uvs(
     given: Mapping[str, Any],
     count: int,
 ) -> Doubles:
-    """float64[V, 2] as the colour's texture takes them, v up; zeros for none."""
+    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none."""
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")
     change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
@@ -295,11 +303,11 @@ def _uvs(
             f"texture coordinates up to {_FURTHEST_UV:g} were expected, found "
             f"{np.abs(found).max():g}",
         )
-    return np.stack([found[:, 0], 1 - found[:, 1]], axis=1)  # v points down there
+    return np.stack([found[:, 0], 1 - found[:, 1]], axis=1)  # v points down in glTF
 
 
 def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The table of the colour's texture of a primitive's material; an empty one for none."""
+    """The table of the colour texture of a primitive's material; empty if there is none."""
     if "material" not in primitive:
         return {}
     material = document.item("materials", primitive["material"], "primitives.material")
@@ -309,7 +317,7 @@ def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, A
 
 
 def _names(row: Mapping[str, Any], count: int) -> list[str]:
-    """What exporters call the targets; each name once."""
+    """Unique names of the morph targets, from extras.targetNames or numbered."""
     extras = row.get("extras")
     given = extras.get("targetNames") if isinstance(extras, dict) else None
     rows = given if isinstance(given, list) and len(given) == count else [None] * count
@@ -323,8 +331,11 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
 
 
 def _node_matrix(document: Document, mesh: int) -> Doubles:
-    """float64[4, 4] from a mesh' numbers to the world: by the first node that has it, or as its
-    skin was bound; no change for a mesh that no node has."""
+    """float64[4, 4]: matrix from a mesh to the world.
+
+    The matrix is that of the first node with the mesh, or of the skin's bind pose. It is the
+    identity if no node has the mesh.
+    """
     world = _World(document)
     found = world.of_mesh(mesh)
     if found < 0:
@@ -335,20 +346,20 @@ def _node_matrix(document: Document, mesh: int) -> Doubles:
 
 
 def world_matrix(document: Document, node: int) -> Doubles:
-    """float64[4, 4] from a node to the world; no change for a number below 0.
+    """float64[4, 4]: matrix from a node to the world; the identity for a negative index.
 
     Args:
-        document: of open_document.
-        node: its number.
+        document: the open file.
+        node: index of the node.
 
     Raises:
-        AnimationFileError: it hangs on itself, or a node's place is no numbers.
+        AnimationFileError: the node is its own ancestor, or a transform is invalid.
     """
     return _World(document).matrix(node) if node >= 0 else np.eye(4)
 
 
 class _World:
-    """Where nodes are."""
+    """The hierarchy of the nodes and their world matrices."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -365,11 +376,11 @@ class _World:
                     self._parents[child] = number
 
     def of_mesh(self, mesh: int) -> int:
-        """The first node that has a mesh; -1 for none."""
+        """Index of the first node with a mesh; -1 if there is none."""
         return next((n for n, row in enumerate(self.rows) if row.get("mesh") == mesh), -1)
 
     def above(self, node: int) -> list[int]:
-        """A node and all above it, the root last. Raises: AnimationFileError: a circle."""
+        """A node and its ancestors, the root last. Raises AnimationFileError for a cycle."""
         out = [node]
         while out[-1] in self._parents:
             out.append(self._parents[out[-1]])
@@ -379,7 +390,7 @@ class _World:
         return out
 
     def matrix(self, node: int) -> Doubles:
-        """float64[4, 4] from a node to the world."""
+        """float64[4, 4]: matrix from a node to the world."""
         out = np.eye(4)
         for number in self.above(node):
             out = self._document.transform(self.rows[number], f"nodes[{number}]") @ out
@@ -387,8 +398,11 @@ class _World:
 
 
 def _bound(document: Document, world: _World, index: object, place: str) -> Doubles:
-    """float64[4, 4] from a skinned mesh to the world as it was bound, where the joint that is
-    nearest to the root stands; the mesh' own node says nothing, and other joints may be posed."""
+    """float64[4, 4]: matrix from a skinned mesh in its bind pose to the world.
+
+    The joint nearest to the root determines the matrix, because other joints may be posed. glTF
+    ignores the node of a skinned mesh.
+    """
     skin = document.item("skins", index, place)
     joints, at = skin.get("joints"), f"skins[{index}]"
     if not isinstance(joints, list) or not joints:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All meshes of a glTF, each where its node stands, divided by materials; and these materials."""
+"""Reads all meshes of a glTF at the places of their nodes, divided by materials, and materials."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ _KINDS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 
 
 def read_gltf_head(path: Path) -> list[HeadPart]:
-    """The meshes of a glTF, in metres, y up.
+    """Read the meshes of a glTF, in metres with y up.
 
     Args:
-        path: of the file.
+        path: the file.
 
     Raises:
-        ShapeFileError: no mesh, or one of a kind that is not read.
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more numbers than a file of this size may hold.
+        ShapeFileError: the file contains no mesh or an unsupported kind of mesh.
+        AnimationFileError: the file is damaged; the message names the place.
+        BudgetError: the file contains more numbers than its size allows.
     """
     document = gltf.open_document(path)
     rows = document.json.get("meshes")
@@ -63,14 +63,14 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
-    """The name of each node that has a mesh, and float64[4, 4] what it does beside the first."""
+    """Name of each node with a mesh, and the matrix float64[4, 4] from the first node to it."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
     found = [n for n, x in enumerate(rows) if isinstance(x, dict) and x.get("mesh") == number]
     skinned = [n for n in found if "skin" in rows[n]]
     free = [n for n in found if "skin" not in rows[n]]
-    if not found or skinned:  # what is skinned stands where its joints are, however often
+    if not found or skinned:  # skinned meshes follow their joints instead of their nodes
         return [(own, np.eye(4))]
     first = gltf.world_matrix(document, free[0])
     out = [(own, np.eye(4))]
@@ -96,12 +96,12 @@ def _placed(part: HeadPart, turn: Doubles) -> HeadPart:
 def _parts(
     document: Document, number: int, source: str, materials: dict[int, Material]
 ) -> list[HeadPart]:
-    """A mesh, or what of it has a material of its own and stands alone."""
+    """The parts of a mesh, divided by materials; see islands.divided()."""
     row = document.json["meshes"][number]
     groups: dict[int, list[dict[str, Any]]] = {}
     for primitive in gltf.primitives(document, row, number):
         kind = primitive.get("material")
-        if primitive.get("mode", 4) == 4:  # points and lines are no skin
+        if primitive.get("mode", 4) == 4:  # triangles; points and lines are left out
             groups.setdefault(kind if isinstance(kind, int) else -1, []).append(primitive)
     if not groups:
         return []
@@ -121,7 +121,7 @@ def _parts(
 
 
 def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> Document:
-    """The same file with some primitives of a mesh alone."""
+    """A copy of the document in which a mesh has only some primitives."""
     out = copy.copy(document)
     meshes = list(document.json["meshes"])
     meshes[number] = {**meshes[number], "primitives": primitives}
@@ -130,7 +130,7 @@ def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> 
 
 
 def _material(document: Document, number: int, known: dict[int, Material]) -> Material | None:
-    """What of a material a face takes along; None: there is none."""
+    """The parts of a material that a face keeps; None for a negative number."""
     if number < 0:
         return None
     if number not in known:
@@ -154,7 +154,7 @@ def _all_numbers(values: list[Any]) -> bool:
 
 
 def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Material) -> None:
-    """The picture of a role, or a sentence why it is left out."""
+    """Add the picture of a role to a material, or a note if it cannot be read."""
     texture = document.item("textures", use.get("index"), f"{out.name}.{role}")
     extra = texture.get("extensions")
     extensions = extra if isinstance(extra, dict) else {}
@@ -185,7 +185,7 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
         except (binascii.Error, ValueError) as error:
             raise document.fail(place, f"base64 was expected: {error}") from error
     file = unquote(uri)
-    # As for buffers: files in the glTF's own folder or below it, and no others on the disk.
+    # Only files in the glTF's folder or below are read, as for buffers.
     if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
         raise document.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
     try:
@@ -195,4 +195,4 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
 
 
 class _PictureError(RisoriusError):
-    """A picture in a file of its own that cannot be read: a face can do without."""
+    """A separate picture file cannot be read. The face is made without the picture."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The expressions that a face brings with it: a library of its own, as files."""
+"""Writes the expressions of a face's own shapes as a library of files beside its DNA file."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .matching import PREFIX, Assignment
 
 
 def library_folder(dna: Path) -> Path:
-    """Where the library of a face lies: beside its DNA file, anna_expressions for anna.dna."""
+    """The folder of a face's library: anna_expressions beside anna.dna."""
     return dna.with_name(dna.stem + "_expressions")
 
 
 def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
-    """A file for each expression that a shape became, in the form that expressions.load reads.
+    """Path -> bytes of a file for each expression of the shapes; expressions.load() reads them.
 
     Args:
-        became: of matching.assign.
-        folder: of the library.
+        became: result of matching.assign().
+        folder: folder of the library.
     """
     out: dict[Path, bytes] = {}
     for shape, name in became.expressions.items():
@@ -32,18 +32,18 @@ def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
 
 
 def about_library(became: Assignment, folder: Path) -> list[str]:
-    """A sentence that says where the expressions are, none where there are none.
+    """A sentence on the folder of the expressions; an empty list if there are none.
 
     Args:
-        became: of matching.assign.
-        folder: of the library.
+        became: result of matching.assign().
+        folder: folder of the library.
     """
     count = counted(len(became.expressions), "expression")
     return [f"{folder}: {count} of the face itself"] if became.expressions else []
 
 
 def _expression(name: str, controls: Sequence[str]) -> Expression:
-    """An expression that is one shape; what it is called and where it belongs is as in our own."""
+    """An expression that sets a shape's controls; its label and group are those of our library."""
     own = expressions.load().get(name)
     weights: Mapping[str, float] = {PREFIX + control: 1.0 for control in controls}
     if own is None:

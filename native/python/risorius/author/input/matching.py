@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which raw control or expression a shape of any naming is, guessed from its name."""
+"""Guesses from a shape's name which raw controls or which expression it is."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from ...controls import arkit, vocabulary
 from . import said as sayings
 
 PREFIX = vocabulary.PREFIX
-WORDS, PERSON = "words", "person"  # beside the names of vocabularies: who knew a name
+WORDS, PERSON = "words", "person"  # values of Assignment.by beside names of vocabularies
 _SIDES = {"l": "L", "left": "L", "lf": "L", "lt": "L", "r": "R", "right": "R", "rt": "R"}
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """What each shape of a face becomes.
+    """The controls and expressions of a face's shapes.
 
     Attributes:
-        controls: names of raw controls, without prefix, by shape. What nothing knows, or what
-            another shape has taken, is a control of the shape's own name; a shape without a
-            control is left out.
-        expressions: name of an expression by shape: visemes and shapes of the whole face, which
-            have a control of their own that nothing but the expression moves.
-        known: how many names are known, by the vocabulary that knows them; "" of words and of
-            what a person said.
-        notes: what is odd about the names, a sentence each.
-        by: who knew the name of each shape: a vocabulary, WORDS, PERSON, or "" where nobody did.
+        controls: shape -> raw controls without prefix. A shape with an unknown name, or whose
+            controls belong to another shape, gets a new control with the shape's name. A shape
+            without controls is left out.
+        expressions: shape -> name of an expression, for visemes and shapes of the whole face. Such
+            a shape has its own control, which only the expression moves.
+        known: vocabulary -> number of names that it knows; "" for words and the user's meanings.
+        notes: sentences on unusual names.
+        by: shape -> the source of its meaning: a vocabulary, WORDS, PERSON (the user), or "".
     """
 
     controls: dict[str, list[str]]
@@ -44,8 +43,11 @@ class Assignment:
 
 @dataclass(frozen=True)
 class _Guess:
-    """Raw controls without prefix and an expression that a name stands for, and how surely: 0 said
-    by a person, 1 of ARKit's or the head's vocabulary, 2 of another, 3 a word, 4 nothing."""
+    """The meaning of a name: raw controls without prefix, an expression, and the source's rank.
+
+    Ranks: 0 the user, 1 ARKit or the head's main vocabulary, 2 another vocabulary, 3 a word,
+    4 unknown.
+    """
 
     controls: tuple[str, ...] = ()
     expression: str = ""
@@ -54,23 +56,23 @@ class _Guess:
 
     @property
     def by(self) -> str:
-        """See Assignment."""
+        """The source of the meaning, see Assignment.by."""
         return {0: PERSON, 3: WORDS}.get(self.rank, self.vocabulary)
 
     @property
     def is_left_out(self) -> bool:
-        """Whether a person said that it is nothing."""
+        """Whether the user chose to leave the shape out."""
         return self.rank == 0 and not self.controls and not self.expression
 
 
 @cache
 def _table() -> dict[str, list[str]]:
-    """Plain word -> raw controls without prefix; a "*" in them stands for the side."""
+    """Plain word -> raw controls without prefix; "*" in a control is replaced by the side."""
     text = resources.files(__package__).joinpath("matching.toml").read_text(encoding="utf-8")
     out: dict[str, list[str]] = {}
     for rows in toml.parse(text).values():
         out |= rows
-    for unit, weights in arkit.mapping().items():  # their parts: Left_MouthSmile
+    for unit, weights in arkit.mapping().items():  # for other orders, such as Left_MouthSmile
         out.setdefault(_plain(unit), [name.removeprefix(PREFIX) for name in weights])
     return out
 
@@ -90,22 +92,22 @@ def _parts(name: str) -> tuple[str, str]:
 
 
 def guess(name: str) -> list[str]:
-    """The raw controls that an expression's name stands for, without prefix; [] if none is known.
+    """The raw controls, without prefix, that a name means; [] for an unknown name.
 
-    Several mean that the expression is the sum of theirs: both sides of a brow.
+    Several controls mean that the expression is their sum, for example both sides of a brow.
     """
     return list(_guess(name, None).controls)
 
 
 def _guess(name: str, order: Sequence[str] | None) -> _Guess:
-    """Args: order  of vocabularies, see vocabulary.find."""
+    """The meaning of a name. Args: order  names of vocabularies, see vocabulary.find()."""
     said = vocabulary.find(name, order)
     words = tuple(_by_words(vocabulary.parts_of(name)[-1]))
     if said is None:
         return _Guess(words, "", 3) if words else _Guess()
     meant = tuple(control.removeprefix(PREFIX) for control in said.controls)
     is_theirs = said.vocabulary in (vocabulary.ARKIT, *(order or ())[:1])
-    if words and not is_theirs:  # mouthOpen is the jaw's where others are not of that vocabulary
+    if words and not is_theirs:  # for example, mouthOpen means jawOpen outside its vocabulary
         return _Guess(words, said.expression if words == meant else "", 3)
     rank = 1 if is_theirs else 2
     return _Guess(() if said.is_whole else meant, said.expression, rank, said.vocabulary)
@@ -126,17 +128,17 @@ def _by_words(name: str) -> list[str]:
 
 
 def assign(names: Iterable[str], edited: Mapping[str, sayings.Said]) -> Assignment:
-    """The raw controls of each shape; each control belongs to one shape alone.
+    """Assign raw controls to shapes. Each control belongs to one shape only.
 
-    What a person said comes first, then names of a vocabulary, then words (mouthOpen for jawOpen);
-    of these what is one control before sums.
+    The user's meanings come first, then names of a vocabulary, then words (mouthOpen for jawOpen).
+    Within these, shapes with a single control come before sums.
 
     Args:
-        names: of the shapes.
-        edited: what a person says of some of them, as `said` has it.
+        names: names of the shapes.
+        edited: shape -> the user's meaning, in the form of the module said.
 
     Raises:
-        GivenError: a person said what is no control and no expression.
+        GivenError: a meaning of the user is invalid.
     """
     names = list(names)
     order = vocabulary.leading(names)
@@ -180,7 +182,7 @@ def _twice(name: str, holder: str, controls: Sequence[str], own: str) -> str:
 
 
 def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
-    """A sentence where no name is known, or none but visemes and the like."""
+    """A note if no name is known, or if only names of expressions and visemes are known."""
     if not names:
         return []
     ranks = [guesses[name].rank for name in names]
@@ -200,19 +202,21 @@ def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
 
 
 def own_control(name: str) -> str:
-    """The control that a shape is where it is one of its own and no other has its name."""
+    """The name of a shape's own control, if no other control has the name."""
     return _own(name, "", ())
 
 
 def _own(name: str, expression: str, taken: Container[str]) -> str:
-    """A control's name in letters that every reader of DNA files takes."""
+    """An unused control name of ASCII letters, digits and _, made from a shape's name."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return _numbered(plain if plain.strip("_") else expression or "shape", taken)
 
 
 def _free(expression: str, name: str, taken: Mapping[str, str]) -> str:
-    """The expression's name, or the shape's where another shape is that expression already. Names
-    that differ in case alone are one file on many systems."""
+    """The expression's name, or a name from the shape if another shape has the expression.
+
+    Upper and lower case count as equal, because names become files.
+    """
     used = {found.casefold() for found in taken.values()}
     if expression.casefold() not in used:
         return expression

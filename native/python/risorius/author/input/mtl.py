@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The materials of an OBJ file: its MTL files, and which polygon has which."""
+"""Reads the materials of an OBJ file from its MTL files, and assigns them to polygons."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _ROLES = {"map_kd": "color", "norm": "normal", "map_pr": "roughness"}
 
 
 def with_materials(path: Path, part: HeadPart) -> list[HeadPart]:
-    """The mesh of an OBJ file with its materials: in one piece, or its islands by theirs.
+    """Divide the mesh of an OBJ file by materials; see islands.divided().
 
     Args:
-        path: of the file, which was read.
-        part: what it says.
+        path: the OBJ file.
+        part: the mesh of the file.
     """
     used: list[str] = []
     rows: list[int] = []
@@ -57,7 +57,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _read(path: Path, file: str, out: dict[str, Material]) -> None:
-    """The materials of an MTL file, by name; one that is not there leaves a sentence."""
+    """Read an MTL file into a table of materials. An unreadable file gives a note at the key ""."""
     material = Material(file)
     try:
         if not _is_near(file):
@@ -83,7 +83,7 @@ def _read(path: Path, file: str, out: dict[str, Material]) -> None:
 
 
 def _is_near(file: str) -> bool:
-    """Whether a name is of a file beside the OBJ or below: it may name no others on the disk."""
+    """Whether a path stays in the OBJ's folder or below. Other files must not be read."""
     return not (re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file))
 
 

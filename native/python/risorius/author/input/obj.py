@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wavefront OBJ: the polygons of one mesh in the file's own order, which expressions share."""
+"""Reads the mesh of a Wavefront OBJ file; vertices keep the file's order, as expressions need."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from ..geometry.skeleton import Doubles
 
 
 class ShapeFileError(RisoriusError, ValueError):
-    """A file of a mesh or of an expression that cannot be used."""
+    """A file of a mesh or of an expression is unusable."""
 
     code = "shape_file"
 
 
 @dataclass
 class ObjMesh:
-    """Positions, texture coordinates and polygons, as the file lists them."""
+    """Positions, texture coordinates and polygons in the file's order."""
 
     positions: Doubles  # [V, 3]
     uvs: Doubles  # [T, 2]
-    faces: list[list[int]] = field(default_factory=list)  # vertices of each polygon
-    uv_faces: list[list[int]] = field(default_factory=list)  # the same corners in uvs
+    faces: list[list[int]] = field(default_factory=list)  # vertex indices of each polygon
+    uv_faces: list[list[int]] = field(default_factory=list)  # indices into uvs of each polygon
 
 
 def read_obj(path: Path) -> ObjMesh:
-    """The mesh of an OBJ file; groups, materials and normals are passed over.
+    """Read the mesh of an OBJ file. Groups, materials and normals are ignored.
 
     Raises:
-        ShapeFileError: a line that is no vertex or polygon of its kind, with its number.
+        ShapeFileError: a line of a vertex or polygon is invalid; the message has its number.
         OSError: the file cannot be read.
     """
     positions: list[list[float]] = []
@@ -64,16 +64,16 @@ def read_obj(path: Path) -> ObjMesh:
 
 
 def choose_mesh(path: Path, what: str, found: Sequence[tuple[int, str, int]], wanted: str) -> int:
-    """The number of the mesh to read of a file that may have several.
+    """Choose a mesh of a file. Returns its number.
 
     Args:
-        path: of the file.
-        what: its format's word for blend shapes.
-        found: number, name and vertices in blend shapes of each mesh that has any.
-        wanted: its name; "": the one with most.
+        path: the file, for error messages.
+        what: the format's word for blend shapes.
+        found: (number, name, number of vertices in blend shapes) of each mesh with blend shapes.
+        wanted: name of the mesh; "": the mesh with the most vertices in blend shapes.
 
     Raises:
-        ShapeFileError: none, or none of that name.
+        ShapeFileError: there is no mesh with blend shapes, or none with the name.
     """
     if not found:
         raise ShapeFileError(f"{path}: a mesh with {what} was expected, found none")
@@ -91,10 +91,10 @@ def read_positions(path: Path, count: int) -> Doubles:
 
     Args:
         path: the file.
-        count: vertices of the neutral mesh.
+        count: number of vertices of the neutral mesh.
 
     Raises:
-        ShapeFileError: another number of vertices, or a value that is no finite number.
+        ShapeFileError: the number of vertices differs, or a value is no finite number.
         OSError: the file cannot be read.
     """
     refuse_other_kinds(path, "an OBJ")
@@ -114,15 +114,15 @@ def read_positions(path: Path, count: int) -> Doubles:
 
 
 def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> None:
-    """Refuse a file of another kind by the name of its kind, where its bytes show it.
+    """Reject a file whose bytes show another known format. The message names that format.
 
     Args:
         path: the file.
-        expected: what it was to be, for the error.
-        own: codes of base.signatures that it may be.
+        expected: the expected format, for the message.
+        own: codes of base.signatures that are accepted.
 
     Raises:
-        ShapeFileError: another kind of file.
+        ShapeFileError: the file has another format.
     """
     kind = signatures.other_kind(signatures.ends_of(path), own)
     if kind is not None:
@@ -130,7 +130,7 @@ def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> N
 
 
 def _lines(path: Path) -> Iterator[str]:
-    """Raises: ReadingError: larger than a mesh may be, or no file; OSError."""
+    """Yields a file's lines. Raises ReadingError if it is too large or no file, and OSError."""
     data = read_file(path, MESH, found=True)
     yield from io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
 
@@ -159,7 +159,11 @@ def _polygon(text: str, vertices: int, uvs: int) -> tuple[list[int], list[int]]:
 
 
 def _index(text: str, count: int, what: str) -> int:
-    """From 0; a negative number counts from the end. Raises: ValueError."""
+    """The index from 0 of an OBJ number; negative numbers count from the end.
+
+    Raises:
+        ValueError: the index is out of range.
+    """
     number = whole_text(text, -MOST)
     index = number - 1 if number > 0 else count + number
     if not 0 <= index < count:

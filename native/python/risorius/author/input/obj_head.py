@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A folder of OBJ files: the neutral mesh, one file for each expression, and other meshes."""
+"""Reads a folder of OBJ files: the neutral mesh, a file for each expression, and other meshes."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _NEUTRAL = ("neutral", "basis", "base", "rest", "default", "head", "face")
 
 
 def find_neutral(folder: Path) -> Path:
-    """The file of a folder that is the mesh at rest, by its name.
+    """Find the file of the neutral mesh in a folder by its name.
 
     Raises:
-        ShapeFileError: none that is called so.
+        ShapeFileError: no file name, or no single one, contains a word for neutral.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:
@@ -35,23 +35,23 @@ def find_neutral(folder: Path) -> Path:
 
 
 def read_obj_head(neutral: Path, folder: Path, *, others: bool) -> list[HeadPart]:
-    """The mesh at rest with its expressions first, then other meshes.
+    """Read the neutral mesh with its expressions, and other meshes. The neutral mesh is the first.
 
     Args:
-        neutral: the file of the mesh at rest.
-        folder: of the expressions' files.
-        others: whether a file with another number of vertices, whose name is no expression's, is
-            another mesh; else it is an error.
+        neutral: file of the neutral mesh.
+        folder: folder of the expressions' files.
+        others: True takes a file as another mesh if its number of vertices differs and its name is
+            no known expression. False makes this an error.
 
     Raises:
-        ShapeFileError: a file that cannot be used, or no expressions.
+        ShapeFileError: a file is unusable, or there are no expressions.
         OSError: a file cannot be read.
     """
     mesh = read_obj(neutral)
     face = HeadPart(neutral.stem, mesh, source=neutral.stem)
     out: list[HeadPart] = []
     for path in sorted(folder.glob("*.obj")):
-        if os.path.realpath(path) == os.path.realpath(neutral):  # a loop of links is none
+        if os.path.realpath(path) == os.path.realpath(neutral):  # does not raise for link loops
             continue
         if others and not _is_known(path.stem):
             other = _other(path, len(mesh.positions))
@@ -73,6 +73,6 @@ def _is_known(name: str) -> bool:
 
 
 def _other(path: Path, count: int) -> ObjMesh | None:
-    """A mesh with another number of vertices; None: it is a shape."""
+    """The mesh of a file if its number of vertices is not `count`; None if it is a shape."""
     mesh = read_obj(path)
     return mesh if len(mesh.positions) != count else None

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What a person says that shapes are: the table [controls] of a spec, and files that hold it alone.
+"""The user's meanings of shapes: the table [controls] of a spec or of a separate file.
 
-A shape is a raw control without prefix, or several; "=mouthFunnel": the controls of an ARKit unit;
-"@aa": an expression; []: nothing, it is left out. The tables of controls.vocabulary say the same by
-the same signs.
+A meaning is a raw control without prefix, or a list of raw controls; "=mouthFunnel" stands for the
+controls of an ARKit unit, "@aa" for an expression, and [] leaves the shape out. The tables of
+controls.vocabulary use the same notation.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .obj import ShapeFileError
 
 Said = str | list[str]
 TABLE = "controls"
-_NAME = re.compile(r"[\w-]+")  # of an expression, which becomes the name of a file
+_NAME = re.compile(r"[\w-]+")  # names of expressions, which become file names
 
 
 class SaidMeaning(NamedTuple):
-    """What a shape is; nothing where both are empty.
+    """The meaning of a shape; if both are empty, the shape is left out.
 
     Attributes:
         controls: raw controls without prefix.
-        expression: its name, or "".
+        expression: name of an expression, or "".
     """
 
     controls: tuple[str, ...]
@@ -37,10 +37,10 @@ class SaidMeaning(NamedTuple):
 
 
 def meaning_of(value: Said) -> SaidMeaning:
-    """The controls or the expression that a value of the table stands for.
+    """The controls or the expression of a value of the table.
 
     Raises:
-        GivenError: a unit that ARKit lacks, or no name for an expression.
+        GivenError: the ARKit unit is unknown, or the name of an expression is invalid.
     """
     given = [value] if isinstance(value, str) else value
     if len(given) == 1 and given[0].startswith("@"):
@@ -68,17 +68,18 @@ def _controls(part: str) -> list[str]:
 
 
 def check(value: object) -> Said:
-    """A value of the table as a file has it. Raises: GivenError: it is none."""
+    """Check a value of the table and return it. Raises GivenError if it is invalid."""
     found: Said = list(several(value, of=text)) if isinstance(value, list) else text(value)
     meaning_of(found)
     return found
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Said]:
-    """The table [controls] of a file: of one that holds it alone, or of a SPEC.toml.
+    """Read the table [controls] of a separate file or of a SPEC.toml.
 
     Raises:
-        ShapeFileError: no TOML, no such table, or an entry that says nothing. OSError.
+        ShapeFileError: the file is no TOML, lacks the table, or has an invalid entry.
+        OSError: the file cannot be read.
     """
     try:
         return parse(toml.text_of(path))
@@ -87,7 +88,7 @@ def read(path: str | os.PathLike[str]) -> dict[str, Said]:
 
 
 def parse(content: str) -> dict[str, Said]:
-    """The table [controls] of a text. Raises: TomlError, GivenError: as read."""
+    """The table [controls] of a TOML text. Raises TomlError or GivenError."""
     table = toml.parse(content).get(TABLE)
     if not isinstance(table, dict):
         raise GivenError(f"a table [{TABLE}] was expected, as risorius author --names prints it")
@@ -104,8 +105,8 @@ def row(name: str, value: Said) -> str:
     """A line of the table.
 
     Args:
-        name: of the shape.
-        value: what it is.
+        name: name of the shape.
+        value: its meaning.
     """
     return f"{_quoted(name)} = " + (
         _quoted(value) if isinstance(value, str) else f"[{', '.join(map(_quoted, value))}]"
@@ -113,11 +114,11 @@ def row(name: str, value: Said) -> str:
 
 
 def text_of(said: Mapping[str, Said]) -> str:
-    """The text of a file that holds the table alone. Args: said  by the names of the shapes."""
+    """The text of a file with the table [controls]. Args: said  shape -> its meaning."""
     return "\n".join([f"[{TABLE}]", *(row(name, value) for name, value in said.items()), ""])
 
 
 def _quoted(content: str) -> str:
-    """A string of TOML, which takes no halves of a character."""
+    """A TOML string. Lone surrogates are replaced, because TOML does not allow them."""
     plain = content.encode("utf-8", "replace").decode()
     return json.dumps(plain, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face of blend shapes from a mesh and its expressions: what a joint rig is then made from."""
+"""Makes a face of blend shapes from a mesh and its expressions; joint_rig makes a rig from it."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
 _LIP = re.compile(r"([UD])[LR]$")
-_LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
+_LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as resting
 
 
 @dataclass
 class ShapeSet:
-    """One mesh, y up, and its expressions, all in one unit; of several meshes see heads.joining."""
+    """A mesh with y up and its expressions, in one unit. heads.joining joins several meshes."""
 
     name: str
     mesh: ObjMesh
     expressions: dict[str, Doubles] = field(default_factory=dict)  # name -> displacement [V, 3]
     left: int = 1  # the character's left is +x (1) or -x (-1)
     unit: str = "cm"
-    parts: list[FacePart] = field(default_factory=list)  # meshes that it is divided into
+    parts: list[FacePart] = field(default_factory=list)  # meshes of the face, as ranges of `mesh`
     turns: list[Turn] = field(default_factory=list)  # joints of eyes and jaw
-    notes: list[str] = field(default_factory=list)  # what was guessed, a sentence each
+    notes: list[str] = field(default_factory=list)  # sentences on guesses
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Names of the meshes that turn with an eye's joint, and with no others."""
+        """Beginnings of the names of meshes that follow an eye's joint only."""
         return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
 
 
 def shape_set(name: str, head: Joined) -> ShapeSet:
-    """A head of several meshes as what a face is made from.
+    """The ShapeSet of a joined head.
 
     Args:
-        name: of the face.
-        head: the meshes.
+        name: name of the face.
+        head: the joined head.
     """
     return ShapeSet(
         name,
@@ -64,10 +64,14 @@ def shape_set(name: str, head: Joined) -> ShapeSet:
 
 
 def check_shapes(shapes: ShapeSet) -> list[str]:
-    """What is odd about the expressions, a sentence each; none of it stops the work.
+    """Check expressions. Returns sentences on unusual ones, which are no errors.
+
+    Args:
+        shapes: the mesh and its expressions.
 
     Raises:
-        ValueError: no expression moves a vertex, or one is not of the mesh' size.
+        ArgumentError: coordinates are too large, all vertices are in one point, an expression has
+            another number of vertices, or no expression moves a vertex.
     """
     size = float(np.ptp(shapes.mesh.positions, axis=0).max())
     for name, points in (("the neutral mesh", shapes.mesh.positions), *shapes.expressions.items()):
@@ -107,11 +111,10 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
 
 
 def take_combined(shapes: ShapeSet) -> dict[str, Doubles]:
-    """Sculpts of several expressions at once, whose names are theirs with a + between; they are
-    taken out of the expressions.
+    """Remove and return the sculpts of combined expressions, whose names join names by +.
 
     Args:
-        shapes: is changed.
+        shapes: the mesh and its expressions; it is changed.
     """
     out = {name: delta for name, delta in shapes.expressions.items() if "+" in name}
     for name in out:
@@ -126,18 +129,20 @@ def combined_rows(
     controls: Mapping[str, Sequence[str]],
     raw: Sequence[str],
 ) -> list[tuple[tuple[int, ...], Doubles]]:
-    """The raw controls of each sculpt of several expressions, and float64[V, 3] what it has beside
-    the sum of these and of smaller ones among them.
+    """Convert sculpts of combined expressions to correctives.
 
     Args:
-        where: what errors call the file.
+        where: name of the file in error messages.
         shapes: the mesh and its single expressions.
-        together: what take_combined gave.
-        controls: raw controls without prefix by expression.
+        together: result of take_combined().
+        controls: expression -> raw controls without prefix.
         raw: names of all raw controls.
 
+    Returns: for each sculpt, the indices of its raw controls and its displacements float64[V, 3]
+        minus those of its expressions and of its smaller combinations.
+
     Raises:
-        ShapeFileError: an expression that is not there.
+        ShapeFileError: a combination names an unknown expression.
     """
     out: list[tuple[tuple[int, ...], Doubles]] = []
     used: list[frozenset[str]] = []
@@ -150,7 +155,7 @@ def combined_rows(
                     f"{where}: combination {name}: one of {known} was expected, found {part!r}"
                 )
         if any(not controls[part] for part in parts):
-            continue  # one of them is left out
+            continue  # because an expression of the combination is left out
         delta = together[name] - sum(shapes.expressions[part] for part in parts)
         for smaller, (_, part_delta) in zip(used, out, strict=True):
             if smaller < parts:
@@ -163,19 +168,19 @@ def combined_rows(
 
 
 def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
-    """A Dna with a mesh for each part, a raw control for each expression (or two where it is split
-    by sides), a blend shape for each control, and the joints root and head, eyes and jaw if it has
-    any.
+    """Make a Dna with a mesh for each part and a blend shape for each control.
+
+    The joints are root and head, and those of eyes and jaw if the face has any.
 
     Args:
         shapes: the mesh and its expressions.
-        controls: raw controls without prefix by expression, as matching.assign gives them. Of
-            several each gets a part, and all of them together are the expression: those of a side
-            or a lip that side or lip, with a soft edge, others an equal share. An expression of
-            none is left out.
+        controls: expression -> raw controls without prefix, from matching.assign(). If there are
+            several, the expression is divided among them, so that their sum is the expression:
+            controls of a side or a lip get that side or lip with a soft edge, other controls equal
+            parts. An expression without controls is left out.
 
     Raises:
-        ValueError: all are left out.
+        ArgumentError: all expressions are left out.
     """
     parts = shapes.parts or [
         FacePart("", 0, len(shapes.mesh.positions), (0, len(shapes.mesh.faces)), "head")
@@ -216,7 +221,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
 
 
 def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
-    """What controls do to the joints of eyes and jaw."""
+    """The joint groups that turn the joints of eyes and jaw."""
     convention, out = Convention.of(dna), []
     column = {name.removeprefix(PREFIX): i for i, name in enumerate(dna.raw_control_names)}
     for joint, turn in enumerate(turns, len(dna.joint_names) - len(turns)):
@@ -241,7 +246,7 @@ def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
 def _add_meshes(
     dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[Doubles]
 ) -> None:
-    """A mesh for each part, with what moves of it."""
+    """Add a mesh with blend shape targets for each part."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
     joints, meshes, mapping = list(dna.joint_names), [], []
     for number, part in enumerate(parts):
@@ -292,10 +297,11 @@ def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict
 
 
 def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doubles | float]:
-    """float64[V, 1] for each control: its part of an expression; they sum to 1.
+    """float64[V, 1] for each control: its fraction of an expression. The fractions sum to 1.
 
-    ...L and ...R have their halves; of controls of both lips ...UL and ...DL have the upper and the
-    lower one, which meet in the middle of what moves. The edges are soft.
+    Controls that end in L and R get the left and right half. Controls of lips such as ...UL and
+    ...DL get the upper and lower part, divided at the weighted middle of the displacements. The
+    edges are soft.
     """
     if len(named) == 1:
         return [1.0]

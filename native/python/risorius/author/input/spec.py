@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SPEC.toml: what a joint rig is made from and what it is to be."""
+"""Reads SPEC.toml: the source of a joint rig and its options."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ _TABLES: dict[str, _Checks] = {
 
 @dataclass
 class Spec:
-    """A spec that was read: where the face is, and the options."""
+    """A spec: the source of the face, and the options of the rig."""
 
     path: Path
     name: str
@@ -91,14 +91,14 @@ class Spec:
 
 @dataclass
 class Read:
-    """A face of blend shapes that was read.
+    """A face of blend shapes from the source of a spec.
 
     Attributes:
         dna: the face.
-        became: what each shape became; nothing where the source is a DNA.
-        odd: what is odd, guessed or left out, a sentence each.
-        materials: of meshes of the face, by their names.
-        kept: meshes that keep their joints, see RigOptions.
+        became: the controls of each shape; empty if the source is a DNA file.
+        odd: sentences on unusual, guessed or left-out parts.
+        materials: name of a mesh -> its material.
+        kept: parts of the names of meshes that keep their joints, see RigOptions.
     """
 
     dna: Dna
@@ -109,10 +109,13 @@ class Read:
 
 
 def read_spec(path: Path) -> Spec:
-    """The content of a SPEC.toml; of a head's own file or folder, that with nothing else said.
+    """Read a SPEC.toml. A head's own file or folder gives a spec with default options.
+
+    Args:
+        path: the spec, a file of a head, or a folder of OBJ files.
 
     Raises:
-        ShapeFileError: no TOML, or a table, a name or a kind of value that is not known.
+        ShapeFileError: the file is no TOML, or contains an unknown table, key or value.
         OSError: the file cannot be read.
     """
     if path.is_dir():
@@ -146,10 +149,10 @@ def _spec_of(path: Path, table: dict[str, Any]) -> Spec:
 
 
 def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
-    """What a rig is to be, of a SPEC.toml that leaves out whose: without [source] and [controls].
+    """Read the options of a SPEC.toml without [source], [controls] and name.
 
     Raises:
-        ShapeFileError: as read_spec, or it names a source or controls.
+        ShapeFileError: as read_spec(), or the file has a source, controls or a name.
         OSError: the file cannot be read.
     """
     table = _read_tables(path)
@@ -168,7 +171,7 @@ def _read_tables(path: Path) -> dict[str, Any]:
 
 
 def _checked(path: Path, name: str, found: object) -> Any:
-    """The value of a key of the file's top. Raises: ShapeFileError: none that is known."""
+    """Check a top-level entry of the file and return its value. Raises ShapeFileError."""
     place = name
     try:
         if name == "name":
@@ -220,11 +223,11 @@ def _correctives(table: dict[str, Any]) -> CorrectiveOptions:
 
 
 def read_face(spec: Spec) -> Read:
-    """The face of blend shapes that a spec names.
+    """Read the face of blend shapes from the source of a spec.
 
     Raises:
-        DnaError: the DNA file cannot be used.
-        ShapeFileError: a mesh or an expression cannot be used.
+        DnaError: the DNA file is damaged.
+        ShapeFileError: a mesh or an expression is unusable.
         OSError: a file cannot be read.
     """
     folder = spec.path.parent
@@ -247,7 +250,7 @@ def read_face(spec: Spec) -> Read:
 
 
 def _read_shapes(spec: Spec, folder: Path) -> tuple[ShapeSet, list[str]]:
-    """The head, and what was guessed about it."""
+    """Read and join the meshes of the head. Returns the shapes, and notes on guesses."""
     source, neutral = spec.source, folder / spec.source["neutral"]
     read = _READERS.get(neutral.suffix.lower())
     if read is not None:

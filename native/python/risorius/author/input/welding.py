@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Vertices that a file has several times, for seams of the texture or of the normals, made one.
+"""Welds vertices that a file duplicates along seams of the texture or of the normals.
 
-Such vertices lie on open edges, at one place, and move alike in all shapes. Texture coordinates
-have corners of their own and stay as they are.
+Duplicates are on open edges, have the same position, and move equally in all shapes. Texture
+coordinates are stored per corner and do not change.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ import numpy as np
 from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh
 
-_SAME = 1e-6  # of the mesh' size
-_FARTHEST = 1e30  # beyond, differences of coordinates are no numbers: who checks sizes refuses them
-_ROUNDINGS = 4  # of float32, at the farthest vertex from the origin
+_SAME = 1e-6  # tolerance of equal positions, in sizes of the mesh
+_FARTHEST = 1e30  # larger coordinates are not welded; a later check of sizes rejects them
+_ROUNDINGS = 4  # tolerance in float32 roundings at the largest coordinate
 
 
 def welded(
     mesh: ObjMesh, deltas: Sequence[Doubles], *, all_polygons: bool = True
 ) -> tuple[ObjMesh, list[Doubles]]:
-    """The mesh and its shapes with each vertex once, in the file's order.
+    """The welded mesh and its shapes; vertices keep the file's order.
 
     Args:
-        mesh: as the file has it.
-        deltas: float64[V, 3] of each shape.
-        all_polygons: where a polygon would become a line, its vertices stay apart, so that each
-            keeps its number; else it is left out.
+        mesh: the mesh of the file.
+        deltas: displacements float64[V, 3] of each shape.
+        all_polygons: True keeps vertices apart if a polygon would degenerate to a line, so that
+            all polygons remain. False removes such polygons.
     """
     of = _first_alike(mesh, deltas)
     if all_polygons and (of != np.arange(len(of))).any():
@@ -58,7 +58,7 @@ def welded(
 
 
 def _first_alike(mesh: ObjMesh, deltas: Sequence[Doubles]) -> Ints:
-    """int64[V]: the first vertex that each one is the same as, itself for most."""
+    """int64[V]: the first duplicate of each vertex; itself if it is unique."""
     points = mesh.positions
     out = np.arange(len(points))
     rim = _open_vertices(mesh) if mesh.faces else out[:0]
@@ -88,7 +88,7 @@ def _root(owner: list[int], vertex: int) -> int:
 
 
 def _open_vertices(mesh: ObjMesh) -> Ints:
-    """Vertices of edges that one polygon alone has."""
+    """Vertices of open edges, which belong to a single polygon."""
     faces = mesh.faces
     begins = np.fromiter(itertools.chain.from_iterable(faces), np.int64)
     ends = np.fromiter(itertools.chain.from_iterable((*f[1:], f[0]) for f in faces), np.int64)
@@ -99,15 +99,15 @@ def _open_vertices(mesh: ObjMesh) -> Ints:
 
 
 def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
-    """Vertices that share a cell with another: the cell's first and each other one.
+    """Pairs of vertices in the same grid cell: the cell's first vertex and each other vertex.
 
-    Grids are shifted by half a cell along each axis, so that no border lies between two that are
-    the same in all of them.
+    The grid is also shifted by half a cell along each axis, so that two close vertices share a
+    cell in at least one grid.
     """
     out = []
     cell = 4 * same
     places = (points[rim] - points[rim].min(axis=0)) / cell
-    across = int(places.max()) + 2  # cells: a quarter of a million at most, whose cube is a number
+    across = int(places.max()) + 2  # number of cells, at most 250,000, so the cube fits int64
     for shift in itertools.product((0.0, 0.5), repeat=3):
         x, y, z = np.floor(places + shift).astype(np.int64).T
         _, first, of = np.unique(

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Commands that make faces."""
+"""Commands that make faces: author, mix, sample and solve."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author: a face of joints made from a mesh and its expressions."""
+"""risorius author: makes a joint rig from a head mesh and its expressions."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     read, beside = _read(spec, args, say)
     dna, became = read.dna, read.became
     is_table = args.names == "" or args.out is None
-    for sentence in read.odd:  # in a table as comments: it is a file of names as it is printed
+    for sentence in read.odd:  # comments in a table, which is then a valid file
         mark, into = "# " * is_table, sys.stderr if args.json else sys.stdout
         print(f"{mark}note: {sentence}", file=into, flush=True)
     if is_table:
@@ -153,7 +153,7 @@ def run(args: argparse.Namespace) -> int:
         say.line("looking once more at what joints and shapes do together")
         rig.dna = correct_again(rig.dna, source, asked, say)
     if options.lighter:
-        lighten(rig, source)  # what was found is no part of the input
+        lighten(rig, source)  # correctives that were found do not count as input
     rig.dna.metadata = dict(rig.dna.metadata) | metadata_of(
         rig.dna.mesh_names, read.materials, textures
     )
@@ -168,13 +168,13 @@ def run(args: argparse.Namespace) -> int:
         said = [*as_lines(rig), *about, *textures.notes, trade]
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
-    fileio.write_all(files)  # the page last of what can fail: there is no face without it
+    fileio.write_all(files)  # only now, so that nothing is written if the report fails
     print("\n".join(said))
     return 0
 
 
 def _read(spec: Spec, args: argparse.Namespace, say: _Clock) -> tuple[Read, dict[Path, bytes]]:
-    """The face of shapes, and files that are to be written beside it."""
+    """Read the face with its blend shapes, and the additional files that must be written."""
     return (read_face(spec), {}) if args.onto is None else read_onto(args, say)
 
 
@@ -195,7 +195,7 @@ def _spec(args: argparse.Namespace) -> Spec:
 
 
 def as_names(became: Assignment) -> list[str]:
-    """The table [controls] as it would be used."""
+    """The lines of a table [controls] with the assignment."""
     lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
         expression = became.expressions.get(name)
@@ -225,7 +225,7 @@ def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
 
 
 def _size(spec: Spec, args: argparse.Namespace) -> None:
-    """What the command line says of a head's size goes before what the spec says."""
+    """Replace height and scale of the spec by those of the command line."""
     said = {"height_mm": args.height_mm, "scale": args.scale}
     said = {name: value for name, value in said.items() if value is not None}
     if args.onto is not None:
@@ -245,19 +245,19 @@ def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
 
 
 def _tolerance(text: str) -> tuple[float, str]:
-    """Millimetres, or a share in percent. Raises: ArgumentTypeError: neither."""
+    """(number, "mm" or "%"). Raises ArgumentTypeError for other text."""
     unit = "%" if text.endswith("%") else "mm"
     return number(0.0, 100.0 if unit == "%" else 1e6)(text.removesuffix(unit).strip()), unit
 
 
 class _Clock:
-    """Says how far the work is, at every tenth."""
+    """Prints the progress at each tenth."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._begin, self._last = quiet, time.monotonic(), -1.0
 
     def line(self, text: str) -> None:
-        """Says what is done now; what comes begins at 0."""
+        """Print the current step; its progress begins at 0."""
         self._last = -1.0
         if not self._quiet:
             print(text, flush=True)
@@ -269,13 +269,13 @@ class _Clock:
 
 
 def opposites() -> tuple[tuple[str, str], ...]:
-    """Controls that are never looked at together, without prefix."""
+    """Pairs of opposite controls, without prefix, whose combination needs no corrective."""
     pairs = load_exclusives().opposites
     return tuple((a.rpartition(".")[2], b.rpartition(".")[2]) for a, b in pairs)
 
 
 def as_found(found: Found) -> list[str]:
-    """What was wrong, and what is left of it."""
+    """Lines about the faults of pairs of expressions before and after the correctives."""
     a, b = found.before, found.after
     return [
         f"{found.looked_at:,} pairs of expressions, {found.faulty:,} of them wrong; "
@@ -287,7 +287,7 @@ def as_found(found: Found) -> list[str]:
 
 
 def as_json(rig: JointRig) -> dict[str, object]:
-    """The errors of each mesh and expression, for a program."""
+    """The errors of each LOD, mesh and expression as JSON."""
     return {
         "joints": rig.new_joints,
         "height_mm": rig.height_mm,
@@ -339,7 +339,7 @@ def as_lines(rig: JointRig) -> list[str]:
     """The errors of each mesh as lines of a table.
 
     Args:
-        rig: what was made.
+        rig: the new rig.
     """
     levels = (
         f"{'LOD':>3} {'joints':>7} {'vertices':>9} {'deltas':>9} {'RMS mm':>8} {'largest mm':>11}"
@@ -379,12 +379,12 @@ def as_lines(rig: JointRig) -> list[str]:
 
 
 def as_trade(rig: JointRig, path: Path, size: int) -> str:
-    """What the rig costs and what it leaves, at LOD 0.
+    """A line about joints, deltas, file size and remaining errors at LOD 0.
 
     Args:
-        rig: what was made.
-        path: where it was written.
-        size: of the file, bytes.
+        rig: the new rig.
+        path: path of the written file.
+        size: size of the file in bytes.
     """
     level = rig.levels[0]
     return (

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the option --conform.
 
     Args:
-        parser: of `risorius author`.
+        parser: parser of `risorius author`.
     """
     parser.add_argument(
         "--conform",
@@ -57,8 +57,8 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
     """risorius author --conform HEAD FACE.dna -o OUT.dna
 
     Args:
-        args: of `risorius author`.
-        clock: told the steps.
+        args: arguments of `risorius author`.
+        clock: is called with steps and progress.
 
     Raises:
         CommandLineError: options that do not go together.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius mix: a new face from some of the same topology."""
+"""risorius mix: makes a new face from faces of the same topology."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _share(text: str, option: str) -> tuple[str, float]:
-    """FILE=SHARE; a name may hold a "=" itself."""
+    """Split FILE=SHARE; the file name may contain "=". Without `option` SHARE may be missing: 1."""
     name, equals, number = text.rpartition("=")
     try:
         share = finite_text(number if equals else "")

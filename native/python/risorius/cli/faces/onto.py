@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --onto: a head without expressions gets those of a template."""
+"""risorius author --onto: transfers the expressions of a template to a head that has none."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ _OWN = (
     "write_landmarks",
     "mesh",
     "rig",
-)  # options of --onto alone
+)  # options that need --onto
 
 
 class Clock(Protocol):
-    """Says what is done now, and how far it is."""
+    """Prints the current step and its progress."""
 
     def line(self, text: str) -> None: ...
     def __call__(self, share: float) -> None: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of --onto.
+    """Add the options of --onto.
 
     Args:
-        parser: of `risorius author`.
+        parser: parser of `risorius author`.
     """
     group = parser.add_argument_group("a head without expressions")
     group.add_argument(
@@ -94,10 +94,10 @@ def check_arguments(args: argparse.Namespace) -> None:
     """Refuse options that do not go together.
 
     Args:
-        args: of `risorius author`.
+        args: arguments of `risorius author`.
 
     Raises:
-        CommandLineError: says which.
+        CommandLineError: names the option.
     """
     if args.onto is None:
         given = [name for name in _OWN if getattr(args, name) is not None]
@@ -118,29 +118,29 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def spec_of(args: argparse.Namespace) -> Spec:
-    """The options of the rig, as a spec of the head.
+    """The spec of the head with the rig options of --rig.
 
     Args:
-        args: of `risorius author`, checked.
+        args: checked arguments of `risorius author`.
 
     Raises:
-        ShapeFileError: the file of --rig cannot be used.
+        ShapeFileError: the file of --rig is not valid.
         OSError: it cannot be read.
     """
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
-    if spec.options.tolerance_mm is None:  # a share of the head, and not of the body below it
+    if spec.options.tolerance_mm is None:  # relative to the head, without its body
         spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
 
 
 def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, bytes]]:
-    """The head with the template's expressions, and files to be written beside the face.
+    """Transfer the template's expressions to the head. Returns the face and files to write.
 
     Args:
-        args: of `risorius author`, checked.
-        clock: told the steps.
+        args: checked arguments of `risorius author`.
+        clock: is called with steps and progress.
 
     Raises:
         RisoriusError: the head, the template or landmarks cannot be used.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius sample: the command of the wheel of the sample people, or a sentence without it."""
+"""risorius sample: the command of the wheel with the sample people, or an error without it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def _add_sentence(
     subparsers: argparse._SubParsersAction[argparse.ArgumentParser], missing: NoPeopleError
 ) -> None:
-    """The command that only says what is missing."""
+    """Add a command that only raises the error about the missing wheel."""
 
     def say(_args: argparse.Namespace) -> int:
         raise missing

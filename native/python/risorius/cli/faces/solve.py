@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius solve: the control curves of a mesh that moves."""
+"""risorius solve: finds control curves for a moving mesh."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
 def _counts(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace
 ) -> dict[int, int]:
-    """Vertices of the meshes that are meant, by mesh. Raises: CommandLineError."""
+    """Mesh index -> vertex count of the meshes allowed by --mesh. Raises: CommandLineError."""
     if args.mesh is None:
         return {m: surface.vertex_counts[m] for m in surface.mesh_indices}
     names = list(dna.mesh_names)[: len(surface.vertex_counts)]
@@ -124,7 +124,7 @@ def _counts(
 def _mesh(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace, take: Performance
 ) -> int:
-    """The mesh that a performance fits. Raises: InputError."""
+    """The first allowed mesh with the performance's vertex count. Raises: InputError."""
     counts = _counts(dna, surface, args)
     found = take.frames.shape[1]
     for mesh, count in counts.items():

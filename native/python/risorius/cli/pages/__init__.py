@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Commands that write pages to look at."""
+"""Commands that write HTML pages, pictures and exports of a face."""

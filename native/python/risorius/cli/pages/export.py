@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius export: a face with morph targets, for programs that drive targets by name."""
+"""risorius export: writes a face as glTF or VRM with named morph targets."""
 
 from __future__ import annotations
 
@@ -37,37 +37,46 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--shapes",
         metavar="GROUPS",
-        help=f"groups, separated by commas: {', '.join(GROUPS)}; all: each control by its own "
-        "name; default: arkit,visemes, and vrm,arkit for a VRM",
+        help=f"groups of targets, separated by commas: {', '.join(GROUPS)}; all: one target for "
+        "each control; default: arkit,visemes, or vrm,arkit with --vrm",
     )
     parser.add_argument("--lod", type=whole_number(0, 65535), default=0, metavar="N")
     parser.add_argument(
         "--mb",
         type=number(0, above=True),
         metavar="N",
-        help="largest size in MB: shrinks textures, then quantizes, then takes a coarser LOD",
+        help="size limit in MB: shrinks textures, then quantizes, then takes a coarser LOD",
     )
     parser.add_argument(
-        "--textures", type=whole_number(16, 8192), default=1024, metavar="N", help="pixels per side"
+        "--textures",
+        type=whole_number(16, 8192),
+        default=1024,
+        metavar="N",
+        help="largest side of a texture in pixels (default: 1024)",
     )
     parser.add_argument(
-        "--most", type=whole_number(1), metavar="N", help="target limit of the client"
+        "--most",
+        type=whole_number(1),
+        metavar="N",
+        help="largest number of targets the client takes",
     )
     parser.add_argument(
-        "--no-skeleton", action="store_true", help="no joints of neck, jaw and eyes"
+        "--no-skeleton", action="store_true", help="write no joints of neck, head, jaw and eyes"
     )
     parser.add_argument(
-        "--sparse", action="store_true", help="store only moved vertices of targets"
+        "--sparse", action="store_true", help="store only the vertices a target moves"
     )
-    parser.add_argument("--quantize", action="store_true", help="KHR_mesh_quantization, 16 bits")
-    parser.add_argument("--meshopt", action="store_true", help="EXT_meshopt_compression")
-    parser.add_argument("--normals", action="store_true", help="targets change normals too")
+    parser.add_argument(
+        "--quantize", action="store_true", help="16-bit vertices: KHR_mesh_quantization"
+    )
+    parser.add_argument("--meshopt", action="store_true", help="compress: EXT_meshopt_compression")
+    parser.add_argument("--normals", action="store_true", help="targets also change normals")
     parser.add_argument(
         "--within",
         type=number(0),
         metavar="MM",
-        help="add targets for combinations of two that deviate more, with the JSON and the script "
-        "that drive them",
+        help="add targets where sums of targets deviate from the rig by more than MM millimetres, "
+        "with the JSON and the script that drive them",
     )
     parser.add_argument(
         "--takes",
@@ -75,15 +84,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=Path,
         default=[],
         metavar="TAKE",
-        help="captures with ARKit's units: combinations are fitted to their frames too",
+        help="captures with ARKit units: combinations are also fitted to their frames",
     )
     parser.add_argument(
-        "--humanoid", choices=humanoid.KINDS, help="make up the bones of a body: those that VRM "
-        "needs, or all by Mixamo's names, as TalkingHead wants them",
+        "--humanoid", choices=humanoid.KINDS, help="add the bones of a body that the face "
+        "lacks: those VRM needs, or all, with Mixamo's names, for TalkingHead",
     )  # fmt: skip
-    parser.add_argument("--vrm", choices=licence.VERSIONS, help="write a VRM of this version")
+    parser.add_argument("--vrm", choices=licence.VERSIONS, help="write a VRM file of this version")
     parser.add_argument(
-        "--licence", type=Path, metavar="FILE.toml", help="name, authors and permissions of a VRM"
+        "--licence", type=Path, metavar="FILE.toml", help="the VRM's name, authors and permissions"
     )
     parser.add_argument(
         "--body", type=Path, metavar="BODY.glb",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius plot: a rig as pictures."""
+"""risorius plot: draws a rig as pictures, in HTML or PNG."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for wrong options, before the file is opened."""
+    """Check the options before the file is opened. Raises: CommandLineError."""
     require_suffix(args.out, (".html", ".png"), "-o")
     require_writable(args.out)
 

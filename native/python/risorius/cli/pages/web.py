@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius web: a face as a page for any browser."""
+"""risorius web: writes a face as a page for any browser."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             raise CommandLineError("--sound: it goes with a clip: --clip TAKE")
         require_suffix(args.sound, SOUNDS, "--sound")
     lods = _lods(args.lods)
-    empty_page()  # fails for a build without the page before it reads the file
+    empty_page()  # a build without the page fails here, before it reads the file
     dna = risorius.load(args.file, lods=lods)
     clip = None
     if args.clip is not None:

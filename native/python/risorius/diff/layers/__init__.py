@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The differences, one module for each layer of a DNA."""
+"""The differences of each layer of a DNA file, with one module per layer."""

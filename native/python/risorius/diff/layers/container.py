@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The file around the layers: its version, its index, and layers that are kept as bytes."""
+"""Differences of the file's version, index, and layers that are kept as bytes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layer bhvr: controls, blend shape channels and animated maps."""
+"""Differences of layer bhvr: controls, blend shape channels and animated maps."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def compare(faces: Comparison) -> None:
 def table(
     place: Place, inputs: Space, outputs: Space, a: risorius.Conditionals, b: risorius.Conditionals
 ) -> None:
-    """Report rows of a conditional table, matched by their input and output.
+    """Report differences of a conditional table, whose rows are matched by input and output.
 
     Args:
         place: where the difference is reported.
@@ -87,7 +87,7 @@ def _psds(faces: Comparison, place: Place) -> None:
         ("A", pairs.only_a, rows_a, faces.controls.a[named.only_a]),
         ("B", pairs.only_b, rows_b, faces.controls.b[named.only_b]),
     ):
-        # Whole correctives are reported above.
+        # Correctives that only one face has are reported above.
         left = left[~np.isin(rows[0][left], gone)]  # noqa: PLW2901
         both = zip(
             faces.controls.labels(rows[0][left]), faces.controls.labels(rows[1][left]), strict=True

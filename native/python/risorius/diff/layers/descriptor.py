@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layers desc and dsce: the character and the conventions of its numbers."""
+"""Differences of layers desc and dsce: the character, and the conventions of axes and units."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layer geom: vertices, faces, skin weights and blend shape targets of each mesh."""
+"""Differences of layer geom: vertices, faces, skin weights and blend shape targets of each mesh."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _points(place: Place, a: Floats, b: Floats, noun: str, verb: str, kind: str)
 
 
 def _layout(place: Place, noun: str, a: Numbers, b: Numbers) -> None:
-    """Corners: the position, UV and normal of each."""
+    """Report changed layouts, each of which joins a position, a UV and a normal."""
     if len(a) != len(b):
         place.say(f"{counted(len(a), 'layout')} -> {len(b):,}")
         return
@@ -93,11 +93,11 @@ def _faces(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
 
 
 def rows_changed(offsets_a: Ints, a: Numbers, offsets_b: Ints, b: Numbers) -> Bools:
-    """Which rows of two equally long lists of lists differ.
+    """Find the rows that differ in two lists of equally many rows, bool[rows].
 
     Args:
-        offsets_a, offsets_b: int64[rows + 1], or empty for no rows.
-        a, b: the elements.
+        offsets_a, offsets_b: int64[rows + 1], start of each row in `a` and `b`; empty for no rows.
+        a, b: the elements of all rows.
     """
     sizes = np.diff(offsets_a)
     changed = sizes != np.diff(offsets_b)

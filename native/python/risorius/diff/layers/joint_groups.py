@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layer bhvr: the joint matrix, group by group."""
+"""Differences of layer bhvr: the joint matrix, group by group."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None
 
 
 def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, numbers: Ints) -> None:
-    """Values by joint attribute and control, independent of their places."""
+    """Report changed values, matched by joint attribute and control."""
     x, y = cut(a, rows.a, columns.a), cut(b, rows.b, columns.b)
     changed = place.faces.changed(x, y)
     if not changed.any():
@@ -75,7 +75,7 @@ def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, num
 
 
 def _amounts(faces: Comparison, a: Floats, b: Floats, changed: Bools, kinds: Ints) -> str:
-    """E.g. "by up to 0.3 mm and by up to 2 degrees": translations, rotations, scales."""
+    """The largest changes as text, e.g. "by up to 0.3 mm and by up to 2 degrees"."""
     parts = []
     for kind, measure in enumerate(("length", "angle", "number")):
         mask = changed & (kinds == kind)[:, None]

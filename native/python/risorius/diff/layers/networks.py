@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layer mlbh: neural networks."""
+"""Differences of layer mlbh: neural networks."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _network(place: Place, a: risorius.NeuralNetwork, b: risorius.NeuralNetwork)
 def _regions(
     place: Place, a: risorius.MachineLearnedBehavior, b: risorius.MachineLearnedBehavior
 ) -> None:
-    """Regions of a mesh by their names, and the networks of each."""
+    """Report differences of each mesh's regions, matched by name, and of their networks."""
     faces = place.faces
     names_a, names_b = a.region_names, b.region_names
     if len(names_a) != len(names_b):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layer mlbe: graphs of operations, and the joints that networks move."""
+"""Differences of layer mlbe: graphs of operations, and the joints that networks move."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _size(sets: list[tuple[risorius.MlOperation, ...]], i: int) -> int:
 
 
 def _numbered(noun: str, count_a: int, count_b: int) -> Space:
-    """Elements that are identified only by their index."""
+    """Elements that have no name and are identified by their index."""
     pairs = pair(np.arange(count_a), np.arange(count_b))
     return Space(noun, [""] * count_a, [""] * count_b, pair_in_place(pairs, count_a, count_b))
 
@@ -81,7 +81,7 @@ def _operation(place: Place, a: risorius.MlOperation, b: risorius.MlOperation) -
 
 
 def _parameters(faces: Comparison, operation: risorius.MlOperation, side: str) -> Ints:
-    """Controls and networks under the common numbers of both rigs."""
+    """Parameters of an operation, with controls and networks as numbers common to both rigs."""
     numbers = integers(operation.parameters)
     if operation.operation_type in (_GATHER, _SCATTER):
         return faces.controls.in_a(numbers) if side == "a" else faces.controls.in_b(numbers)
@@ -94,7 +94,7 @@ def _parameters(faces: Comparison, operation: risorius.MlOperation, side: str) -
 
 
 def _list(place: Place, noun: str, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
-    """Integers that are compared by index."""
+    """Report the difference of two integer lists, compared by index."""
     x, y = integers(a), integers(b)
     if len(x) != len(y):
         place.say(f"{counted(len(x), noun)} -> {len(y):,}")
@@ -103,7 +103,7 @@ def _list(place: Place, noun: str, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
 
 
 def _stride(joints: risorius.MlJoints) -> int:
-    """Attributes per joint: 10 with quaternions."""
+    """Attributes per joint: 10 with quaternions, otherwise 9."""
     keys, values = joints.parameter_keys.tolist(), joints.parameter_values.tolist()
     return 10 if (1, 1) in zip(keys, values, strict=False) else 9
 

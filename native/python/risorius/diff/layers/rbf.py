@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layers rbfb and rbfe: solvers and poses."""
+"""Differences of layers rbfb and rbfe: solvers and poses."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _solver(place: Place, a: risorius.RbfSolver, b: risorius.RbfSolver) -> None:
 
 
 def _targets(place: Place, a: risorius.RbfSolver, b: risorius.RbfSolver) -> None:
-    """Target values by pose and control."""
+    """Report changed target values, matched by pose and control."""
     faces = place.faces
     shapes = [(len(s.pose_indices), len(s.raw_control_indices)) for s in (a, b)]
     if any(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layers jbmd and twsw: the rotation of joints."""
+"""Differences of layers jbmd and twsw: the rotation of joints."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _setups(
     a: Sequence[risorius.TwistSwingSetup],
     b: Sequence[risorius.TwistSwingSetup],
 ) -> None:
-    """Setups, identified by the joints that they turn."""
+    """Report differences of setups, which are matched by the joints that they rotate."""
     faces = place.faces
     pairs = pair_sets(
         [faces.joints.in_a(setup.output_joint_indices) for setup in a],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Skin weights of a mesh, matched by joint within each vertex."""
+"""Differences of a mesh's skin weights, matched by joint within each vertex."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..pairing.pairs import Ints, integers, pair_rows
 
 
 def compare_skin(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
-    """Report skin weights, matched by joint within each vertex.
+    """Report differences of skin weights, matched by joint within each vertex.
 
     Args:
         place: where the differences are reported.

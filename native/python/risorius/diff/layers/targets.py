@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Blend shape targets of a mesh, matched by channel, their deltas by vertex."""
+"""Differences of a mesh's blend shape targets, matched by channel, deltas by vertex."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..pairing.pairs import integers, pair
 
 
 def compare_targets(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
-    """Report blend shape targets, matched by their channel, and their deltas, matched by vertex.
+    """Report differences of blend shape targets, matched by channel, and of deltas, by vertex.
 
     Args:
         place: where the differences are reported.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Matches the parts of two DNAs and measures the difference of values."""
+"""Matches the elements of two DNA files and measures differences of values."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Changes of numbers in familiar units."""
+"""Measures changes of numbers, and writes them in familiar units."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def largest(a: Floats, b: Floats) -> float:
 
 
 def length(amount: float, unit: str) -> str:
-    """A length in words, e.g. "0.3 mm".
+    """A length as text, e.g. "0.3 mm".
 
     Args:
-        amount: in the translation unit of the file.
-        unit: that unit, "cm" or "m"; for any other the number has no unit.
+        amount: length in the file's translation unit.
+        unit: the translation unit, "cm" or "m"; for any other, the text has no unit.
     """
     if unit not in _MILLIMETRES:
         return f"{amount:.3g}"
@@ -56,11 +56,11 @@ def length(amount: float, unit: str) -> str:
 
 
 def angle(amount: float, unit: str) -> str:
-    """An angle in words, e.g. "0.5 degrees".
+    """An angle as text, e.g. "0.5 degrees".
 
     Args:
-        amount: in the rotation unit of the file.
-        unit: that unit, "degrees" or "radians".
+        amount: angle in the file's rotation unit.
+        unit: the rotation unit, "degrees" or "radians".
     """
     degrees = math.degrees(amount) if unit == "radians" else amount
     return f"{degrees:.3g} degree{'' if degrees == 1 else 's'}"
@@ -72,8 +72,8 @@ def by(amount: float, words: str, several: bool) -> str:
     Args:
         amount: the largest change; 0 if only the sign of a zero changed, infinite if a number is
             not finite.
-        words: the amount in words, of `length` or `angle`.
-        several: more than one number changed, which gives "up to".
+        words: the amount as text, from `length` or `angle`.
+        several: True: more than one number changed, which gives "up to".
     """
     if amount == 0:
         return "only from 0 to -0 or back"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Comparisons that several layers share. Each reports differences and returns nothing."""
+"""Comparisons shared by several layers. Each reports its differences."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Place:
         self.faces, self.layer, self.field, self.what = faces, layer, field, what
 
     def at(self, name: str, what: str = "") -> Place:
-        """The place of a field within this one.
+        """The place of a field inside this place.
 
         Args:
-            name: name of the field, appended after a dot; "": the same field.
+            name: name of the field, appended after a dot; "" for the same field.
             what: prefix of each text there, after the prefix of this place.
         """
         field = ".".join(part for part in (self.field, name) if part)
@@ -40,7 +40,7 @@ class Place:
 
 
 def value(place: Place, a: Any, b: Any) -> None:
-    """Report a value (a text, an integer, a tuple) if a and b differ.
+    """Report a value (a text, an integer or a tuple) if it differs.
 
     Args:
         place: where the difference is reported.
@@ -83,13 +83,13 @@ def real(place: Place, a: float, b: float) -> None:
 
 
 def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -> None:
-    """Report two lists of floats by number, or their lengths if these differ.
+    """Report differences of two lists of floats, compared by index, or of their lengths.
 
     Args:
         place: where the difference is reported.
-        noun: name of a number, e.g. "weight".
-        a, b: float32[n], float32[m].
-        kind: "length", "angle" or "number": the unit of the amount.
+        noun: noun for a number, e.g. "weight".
+        a, b: float32[n] and float32[m], the numbers of each face.
+        kind: "length", "angle" or "number", for the unit of the amount.
     """
     if len(a) != len(b):
         place.say(f"{counted(len(a), noun)} -> {len(b):,}")
@@ -106,7 +106,7 @@ def order(place: Place, pairs: Pairs, noun: str) -> None:
     Args:
         place: where the difference is reported.
         pairs: matched elements of A and B.
-        noun: name of the elements, in the plural.
+        noun: noun for the elements, in the plural.
     """
     if pairs.reordered:
         place.say(f"the {noun} stand in another order")
@@ -117,8 +117,8 @@ def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> N
 
     Args:
         place: where the difference is reported.
-        space: the indexed elements.
-        a, b: int[n], int[m], indices into the elements of A and of B.
+        space: the elements that the indices mean.
+        a, b: int[n] and int[m], indices into the elements of A and of B.
     """
     x, y = space.in_a(a), space.in_b(b)
     text = more_and_less(place, pair(x, y), space, x, y)
@@ -130,10 +130,10 @@ def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> s
     """The difference of two lists in words, e.g. "3 joints more: x, y, z"; "" if they are equal.
 
     Args:
-        place: its report shortens lists of names.
-        pairs: matched entries of a and b.
-        space: the numbered elements.
-        a, b: int64[n], int64[m], common numbers of the space.
+        place: place whose report shortens lists of names.
+        pairs: matched entries of `a` and `b`.
+        space: the elements with their common numbers.
+        a, b: int64[n] and int64[m], common numbers of the entries.
     """
     listed = place.faces.report.listed
     parts = []
@@ -161,12 +161,12 @@ def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None
 def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.LodMapping) -> None:
     """Report the elements that each LOD lists, if they differ.
 
-    Lists that are equal but stored or shared differently are reported as such.
+    Equal lists that are stored or shared in another way are reported as such.
 
     Args:
         place: where the difference is reported.
         space: the listed elements.
-        a, b: the lists of the LODs in each face.
+        a, b: the LOD lists of each face.
     """
     found = len(place.faces.report.differences)
     for lod in range(max(len(a), len(b))):
@@ -219,7 +219,7 @@ def only_in(place: Place, space: Space, pairs: Pairs) -> None:
 
 
 def cut(values: Floats, rows: Ints, columns: Ints) -> Floats:
-    """float32[len(rows), len(columns)] of a matrix; the matrix itself if nothing is cut.
+    """The selected rows and columns of a matrix; the matrix itself if all are selected.
 
     Args:
         values: float32[n, m].

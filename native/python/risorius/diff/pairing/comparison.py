@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Two rigs, the common numbers of their elements, and the report."""
+"""Two rigs, with common numbers for their matched elements, and the report."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ QUATERNION_ATTRIBUTES = ("tx", "ty", "tz", "qx", "qy", "qz", "qw", "sx", "sy", "
 
 
 class Comparison:
-    """The context that the modules of the layers share.
+    """The data that the modules of the layers share.
 
-    exact: compare bits; false after a conversion, which rounds.
+    exact: True: compare bit for bit; False after a conversion, which rounds.
     """
 
     def __init__(self, a: risorius.Dna, b: risorius.Dna, report: Report, exact: bool = True):
         self.a, self.b, self.report, self.exact = a, b, report, exact
         self.meshes_a, self.meshes_b = a.meshes, b.meshes
 
-    # ---- numbers
+    # ---- amounts of changes
 
     def changed(self, a: Floats, b: Floats) -> Bools:
         """bool[...]: whether float32 arrays a and b of one shape differ.
 
-        In bits if the comparison is exact, otherwise by more than rounding.
+        They differ in any bit if the comparison is exact, otherwise by more than rounding.
         """
         different = amounts.differs(a, b)
         return different if self.exact else different & ~amounts.near(a, b)
 
     def by(self, a: Floats, b: Floats, kind: str = "number") -> str:
-        """The amount of a change, e.g. "by up to 0.3 mm".
+        """The amount of a change as text, e.g. "by up to 0.3 mm".
 
         Args:
             a, b: float32[...] of one shape.
-            kind: "length" or "angle", in the units of A, or "number".
+            kind: "length" or "angle" in the units of A, or "number".
         """
         amount = amounts.largest(a, b)
         return amounts.by(amount, self.measure(amount, kind), a.size > 1)
 
     def distance(self, a: Floats, b: Floats) -> str:
-        """The distance that points moved, e.g. "by up to 0.3 mm".
+        """The distance that points moved as text, e.g. "by up to 0.3 mm".
 
         Args:
-            a, b: float32[n, 3], in the translation unit of A.
+            a, b: float32[n, 3], positions in the translation unit of A.
         """
         with np.errstate(invalid="ignore", over="ignore"):
             apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
@@ -64,10 +64,10 @@ class Comparison:
         return amounts.by(apart, self.measure(apart, "length"), len(a) > 1)
 
     def measure(self, amount: float, kind: str) -> str:
-        """An amount in words.
+        """An amount as text with its unit.
 
         Args:
-            amount: in the units of A.
+            amount: the amount in the units of A.
             kind: "length", "angle" or "number".
         """
         if kind == "length":
@@ -76,7 +76,7 @@ class Comparison:
             return amounts.angle(amount, self.a.rotation_unit)
         return f"{amount:.3g}"
 
-    # ---- index spaces
+    # ---- common numbers of elements
 
     def _named(self, noun: str, a: Sequence[str], b: Sequence[str]) -> Space:
         return Space(noun, a, b, pair_in_place(pair_names(a, b), len(a), len(b)))
@@ -115,7 +115,7 @@ class Comparison:
 
     @cached_property
     def pose_controls(self) -> Space:
-        # A 2.4 file has no layer rbfe: its poses are controls of their own.
+        # A 2.4 file lacks the layer rbfe; there each pose writes a control of its own.
         names = [
             dna.rbf_behavior_ext.pose_control_names or [p.name for p in dna.rbf_behavior.poses]
             for dna in (self.a, self.b)
@@ -137,7 +137,7 @@ class Comparison:
 
     @cached_property
     def psds(self) -> Space:
-        """Correctives, identified by their factors."""
+        """Correctives, matched by their factors."""
         names_a, names_b = (
             correctives(dna, which, self.raw, self.ml, self.pose_controls)
             for dna, which in ((self.a, "a"), (self.b, "b"))
@@ -150,7 +150,7 @@ class Comparison:
 
     @cached_property
     def networks(self) -> Space:
-        """Networks, identified by the controls that they write."""
+        """Networks, matched by the controls that they write."""
         a = self.a.machine_learned_behavior.neural_networks
         b = self.b.machine_learned_behavior.neural_networks
         pairs = pair_sets(
@@ -180,11 +180,11 @@ class Comparison:
         return self.joints.in_b(joint) * stride + attribute
 
     def row_labels(self, numbers: Ints, stride: int = 9) -> list[str]:
-        """Attributes of joints for people, e.g. "FACIAL_C_Jaw.tx".
+        """Attributes of joints as text, e.g. "FACIAL_C_Jaw.tx".
 
         Args:
             numbers: int64[n], from `rows_in_a` or `rows_in_b`.
-            stride: attributes per joint, the same as there.
+            stride: attributes per joint, as in rows_in_a and rows_in_b.
         """
         names = ATTRIBUTES if stride == 9 else QUATERNION_ATTRIBUTES
         joint, attribute = np.divmod(numbers, stride)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Labels of elements that have no name, or a different one."""
+"""Labels for elements without a name, and matches of renamed joints."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ import risorius
 from .pairs import Ints, Pairs, integers, pair_names, with_renamed
 from .spaces import Space, chain
 
-_DEEPEST = 8  # levels of correctives of correctives that are spelled out
+_DEEPEST = 8  # deepest nesting of correctives in a label
 
 
 def padded(names: Sequence[str], count: int) -> list[str]:
-    """The names, padded with empty ones to count."""
+    """The names, extended with empty ones to `count`."""
     return [*names, *[""] * (count - len(names))]
 
 
 def correctives(
     dna: risorius.Dna, which: str, raw: Space, ml: Space, pose_controls: Space
 ) -> list[str]:
-    """The factors of each corrective, e.g. "corrective jaw * smile"; "" if there are none.
+    """A label with the factors of each corrective, e.g.
+
+    "corrective jaw * smile"; "" for no factors.
 
     Args:
-        which: "a" or "b": the face to which dna belongs.
+        which: "a" or "b", the face to which `dna` belongs.
         raw, ml, pose_controls: the other parts of the control vector.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Correctives are not matched yet, so that those of A and B get different numbers.
+    # Correctives are not matched yet, so A's and B's get different numbers.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)
@@ -50,7 +52,7 @@ def correctives(
 
 
 def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
-    """factors[i]: (index, if it is a corrective, and label) of each factor of i."""
+    """Labels of correctives. factors[i]: (index if a corrective, label) of each factor of i."""
 
     def product(i: int, depth: int) -> str:
         parts = []
@@ -63,10 +65,10 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 
 
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
-    """The matching joints of faces a and b.
+    """Match the joints of faces a and b.
 
-    Joints are matched by name. Of the others, joints with the same parent and neutral pose, then
-    joints with the same index and neutral pose, count as renamed.
+    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then those
+    with the same index and neutral pose, count as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)
@@ -87,7 +89,7 @@ def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
 
 
 def _neutral(dna: risorius.Dna) -> list[bytes]:
-    """The neutral translation and rotation of each joint, up to rounding."""
+    """The neutral translation and rotation of each joint as bytes, rounded to 4 decimals."""
     both = [dna.neutral_joint_translations, dna.neutral_joint_rotations]
     count = len(dna.joint_names)
     if any(len(values) != count for values in both):
@@ -97,7 +99,7 @@ def _neutral(dna: risorius.Dna) -> list[bytes]:
 
 
 def _parents(dna: risorius.Dna) -> Ints:
-    """int64[joints]; roots have a number that no joint has."""
+    """The parent of each joint, int64[joints]; 0xFFFF for roots."""
     count = len(dna.joint_names)
     parents = integers(dna.joint_parents)
     if len(parents) != count:
@@ -106,7 +108,7 @@ def _parents(dna: risorius.Dna) -> Ints:
 
 
 def _keys(joints: Ints, parents: Ints, neutral: list[bytes]) -> dict[tuple[int, bytes], int]:
-    """Joints by parent and neutral pose; ambiguous ones are left out."""
+    """(parent, neutral pose) -> joint; joints with equal keys are left out."""
     found: dict[tuple[int, bytes], list[int]] = {}
     for joint in joints.tolist():
         found.setdefault((int(parents[joint]), neutral[joint]), []).append(joint)

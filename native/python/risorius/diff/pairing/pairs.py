@@ -15,7 +15,7 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Pairs:
-    """Positions in two lists.
+    """Matched and unmatched positions of two lists A and B.
 
     a, b: int64[pairs], positions of matched elements in each list, in the order of A.
     only_a, only_b: int64, positions of elements without a match.
@@ -33,12 +33,12 @@ class Pairs:
 
     @property
     def reordered(self) -> bool:
-        """Whether matched elements have another order; an insertion alone does not count."""
+        """Whether matched elements have another order in B; an insertion alone does not count."""
         return bool(np.any(np.diff(self.b) < 0))
 
     @property
     def identical(self) -> bool:
-        """Whether both lists are the same."""
+        """Whether both lists have the same elements in the same order."""
         return self.whole and not self.reordered
 
 
@@ -47,10 +47,10 @@ def integers(values: npt.ArrayLike) -> Ints:
 
 
 def pair(a: Ints, b: Ints) -> Pairs:
-    """Match equal numbers; of repeated numbers the first with the first, and so on.
+    """Match equal numbers; of repeated numbers, the first in A matches the first in B, and so on.
 
     Args:
-        a, b: int64[n], int64[m].
+        a, b: int64[n] and int64[m].
     """
     none = np.zeros(0, np.int64)
     if len(a) == len(b) and np.array_equal(a, b):
@@ -73,7 +73,7 @@ def _rest(taken: Ints, count: int) -> Ints:
 
 
 def occurrence(keys: Ints) -> Ints:
-    """int64[n]: the number of earlier occurrences of each key."""
+    """The number of earlier occurrences of each key, int64[n]."""
     order = np.argsort(keys, kind="stable")
     run = keys[order]
     first = np.ones(len(keys), np.bool_)
@@ -85,7 +85,7 @@ def occurrence(keys: Ints) -> Ints:
 
 
 def together(parts: Sequence[Ints]) -> Ints:
-    """All keys as small numbers, equal for equal keys, part after part."""
+    """Join the keys of all parts and replace them by small numbers, equal for equal keys."""
     _, small = np.unique(np.concatenate(parts), return_inverse=True)
     return small.reshape(-1).astype(np.int64)
 
@@ -94,7 +94,7 @@ def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
     """Match equal rows of several numbers, like `pair` for single numbers.
 
     Args:
-        a, b: the columns of each list, the same number of them: int64[n] each, int64[m] each.
+        a, b: columns of each list, int64[n] each and int64[m] each; equally many for both.
     """
     if all(len(x) == len(y) and np.array_equal(x, y) for x, y in zip(a, b, strict=True)):
         return pair(np.arange(len(a[0])), np.arange(len(b[0])))
@@ -106,18 +106,18 @@ def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
 
 
 def pair_names(a: Sequence[str], b: Sequence[str]) -> Pairs:
-    """Match equal texts of the lists a and b, like `pair` for numbers."""
+    """Match equal texts of the lists `a` and `b`, like `pair` for numbers."""
     number: dict[str, int] = {}
     numbered = [integers([number.setdefault(name, len(number)) for name in x]) for x in (a, b)]
     return pair(*numbered)
 
 
 def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
-    """The pairs and additional ones.
+    """Add matches to the pairs.
 
     Args:
-        pairs: the known ones.
-        extra_a, extra_b: int64[n], unmatched positions: extra_a[i] matches extra_b[i].
+        pairs: known matches.
+        extra_a, extra_b: int64[n], unmatched positions; extra_a[i] matches extra_b[i].
     """
     a, b = np.concatenate([pairs.a, extra_a]), np.concatenate([pairs.b, extra_b])
     order = np.argsort(a)
@@ -127,10 +127,10 @@ def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
 
 
 def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
-    """The pairs, and matches of unmatched elements at the same position in both lists.
+    """Add matches of unmatched elements at the same position in both lists.
 
     Args:
-        pairs: the known ones.
+        pairs: known matches.
         count_a, count_b: lengths of the lists; nothing is added if they differ.
     """
     if count_a != count_b:
@@ -140,7 +140,7 @@ def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
 
 
 def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Match sets without names: equal ones, then those with the most common keys, then by index.
+    """Match sets of keys: equal sets first, then sets with the most common keys, then by index.
 
     Args:
         a, b: the keys of each set.

@@ -1,38 +1,38 @@
 # SPDX-License-Identifier: MIT
-"""The collected differences."""
+"""Collects the differences of two rigs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-_NAMES = 5  # number of names of a list that are shown
+_NAMES = 5  # most names of a list that are shown
 
 
 class Difference(NamedTuple):
     """One difference between the rigs A and B."""
 
     layer: str
-    """descriptor, definition, behavior ...: the layer."""
+    """Name of the layer: descriptor, definition, behavior ..."""
     field: str
-    """The property of Dna, e.g. meshes.positions."""
+    """Name of the property of Dna, e.g. meshes.positions."""
     text: str
-    """The description."""
+    """Description of the difference."""
 
 
 class Report:
-    """Collects differences. everything: do not shorten lists of names."""
+    """Collects differences. Args: everything  True: lists of names are not shortened."""
 
     def __init__(self, everything: bool = False) -> None:
         self.differences: list[Difference] = []
         self.everything = everything
 
     def add(self, layer: str, field: str, text: str) -> None:
-        """Add a difference with the layer, field and text of `Difference`."""
+        """Add a difference; for layer, field and text see `Difference`."""
         self.differences.append(Difference(layer, field, text))
 
     def listed(self, names: Sequence[str]) -> str:
-        """E.g. "jaw, brow and 40 more"."""
+        """Names as a list that may be shortened, e.g. "jaw, brow and 40 more"."""
         if self.everything or len(names) <= _NAMES + 1:
             return ", ".join(names)
         return f"{', '.join(names[:_NAMES])} and {len(names) - _NAMES:,} more"

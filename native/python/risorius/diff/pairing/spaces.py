@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Common numbers for the elements of two rigs: matched elements have the same number."""
+"""Common numbers for the elements of two rigs, equal for matched elements."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy.typing as npt
 from ...base.words import plural
 from .pairs import Ints, Pairs, integers
 
-_OUTSIDE = 1 << 40  # numbers of indices beyond a list begin here
+_OUTSIDE = 1 << 40  # numbers from here on stand for indices beyond the end of a list
 
 
 class Space:
-    """The elements of two lists under common numbers.
+    """The elements of lists A and B with common numbers.
 
-    noun: name of an element, e.g. "joint".
+    noun: noun for an element, e.g. "joint". names: names by number, A's elements first. a, b:
+        int64, the number of each element of A and B. pairs: the matched elements.
     names: by number; first those of A, then those of B.
     a, b: int64, the number of each element.
     pairs: the matched elements.
@@ -32,15 +33,15 @@ class Space:
         self.b[pairs.b] = pairs.a
 
     def in_a(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of indices of A."""
+        """The common numbers of elements of A by index."""
         return _look_up(self.a, integers(indices))
 
     def in_b(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of indices of B."""
+        """The common numbers of elements of B by index."""
         return _look_up(self.b, integers(indices))
 
     def label(self, number: int) -> str:
-        """The name of an element for people."""
+        """The name of an element for display, or its noun and index."""
         if number >= _OUTSIDE:
             return f"{self.noun} {number - _OUTSIDE}"
         place = number if number < len(self.a) else number - len(self.a)
@@ -60,13 +61,14 @@ def _look_up(numbers: Ints, indices: Ints) -> Ints:
 
 
 def chain(noun: str, parts: Sequence[Space]) -> Space:
-    """Joins several spaces to one.
+    """Join several spaces into one.
 
-    The control vector is made so: raw controls, correctives, outputs of networks, RBF poses.
+    The space of all controls is joined from raw controls, correctives, outputs of networks and RBF
+    poses.
 
     Args:
-        noun: name of an element of the joined space.
-        parts: the spaces in their order.
+        noun: noun for an element of the joined space.
+        parts: the spaces, in their order.
     """
     first_a = np.cumsum([0] + [len(part.a) for part in parts])
     first_b = np.cumsum([0] + [len(part.b) for part in parts])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A face with a body's bones: humanoids, and the tables of VRM 1.0 and 0.x."""
+"""Faces with the bones of a body: humanoids, and the tables of VRM 1.0 and 0.x."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bones of a humanoid: their names in programs and files, and where a made-up one lies."""
+"""The bones of a humanoid: their names in programs and files, and positions of added ones."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import numpy.typing as npt
 Doubles = npt.NDArray[np.float64]
 
 KINDS = ("minimal", "mixamo")
-_HEAD_HEIGHT = 1.5  # metres, of a made-up body whose head is at the origin
-_STANDING = (0.8, 2.4)  # metres: a head at such a height stands on the ground
+_HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near the origin
+_STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Mixamo's bones lie along their own y, and poses of TalkingHead turn such bones. Columns: x, y, z.
+# Axes of Mixamo's bones, which TalkingHead's poses need. Columns: the bone's x, y (along it), z.
 _TURNS = {
     "": _STRAIGHT,
     "arm left": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
@@ -24,7 +24,7 @@ _TURNS = {
     "leg": ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
     "foot": ((-1, 0, 0), (0, -0.5, 0.75**0.5), (0, 0.75**0.5, 0.5)),
 }
-# bone: parent, Mixamo's name, words in files, is needed, place in heights of the head, turn.
+# bone: parent, Mixamo name, words in files, is needed, position as a fraction of head height, turn.
 _Row = tuple[str, str, str, bool, tuple[float, float, float], str]
 _MIDDLE: Mapping[str, _Row] = {
     "hips": ("", "Hips", "hips hip pelvis", True, (0, 0.60, 0), ""),
@@ -53,17 +53,17 @@ _SIDES = {"left": 1.0, "right": -1.0}
 
 @dataclass(frozen=True)
 class Bone:
-    """A bone of a humanoid.
+    """A bone of a humanoid: its names, parent, and position in a body whose head has height 1.
 
     Attributes:
-        name: as VRM 1.0 spells it.
-        parent: of the same names, "" for the hips.
-        node: the node's name, as Mixamo has it.
-        words: what files call it, without separators and side.
-        side: left, right, or "".
-        is_needed: VRM takes no humanoid without it.
-        at: shares of the head's height: to the left, up, to the front.
-        turn: of a bone that lies as Mixamo's do.
+        name: VRM 1.0 name.
+        parent: VRM 1.0 name of the parent, "" for the hips.
+        node: name of its node, which is Mixamo's name of the bone.
+        words: names in files, without separators and side.
+        side: "left", "right", or "".
+        is_needed: whether VRM requires the bone.
+        at: position as fractions of the head's height: to the left, up, to the front.
+        turn: key of the axes in _TURNS that Mixamo gives the bone.
     """
 
     name: str
@@ -107,15 +107,15 @@ def _finger(side: str, sign: float, finger: str, forward: float) -> Iterator[Bon
 
 
 BONES = {bone.name: bone for bone in _bones()}
-"""Bones by name, parents before children."""
+"""Bone name -> bone, parents before children."""
 NEEDED = tuple(name for name, bone in BONES.items() if bone.is_needed)
 
 
 def bone_of(joint: str) -> str:
-    """The bone that a joint of a file is by its name, "" for none.
+    """The humanoid bone that a joint's name means, "" for none.
 
     Args:
-        joint: such as upperarm_l, mixamorig:LeftArm, J_Bip_L_UpperArm, leftUpperArm.
+        joint: a name such as upperarm_l, mixamorig:LeftArm, J_Bip_L_UpperArm, leftUpperArm.
     """
     plain, side = _plain(joint)
     for name, bone in BONES.items():
@@ -125,7 +125,7 @@ def bone_of(joint: str) -> str:
 
 
 def _plain(joint: str) -> tuple[str, str]:
-    """A joint's name without separators, and its side."""
+    """A joint's name without separators and side, and its side."""
     # Loaders drop the colon of mixamorig:Hips.
     name = re.sub(r"^(mixamorig\d*_?|j_(bip|adj)_(c_)?)", "", re.sub(r"^.*:", "", joint.lower()))
     for side in _SIDES:
@@ -146,24 +146,24 @@ def new_bone(name: str) -> str:
 
 
 def wanted(own: Iterable[str], kind: str) -> list[str]:
-    """The bones of a humanoid, parents first.
+    """The names of a humanoid's bones, parents first.
 
     Args:
         own: bones that the face has.
-        kind: of KINDS: minimal has those that are needed, mixamo has all; "": none is made up.
+        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none.
     """
     out = set(own)
     if kind == "mixamo":
         out |= BONES.keys() - {"jaw"}
     elif kind:
         out |= set(NEEDED)
-    if "upperChest" in out:  # VRM has no upper chest without a chest
+    if "upperChest" in out:  # VRM requires a chest if there is an upper chest
         out.add("chest")
     return [name for name in BONES if name in out]
 
 
 def parent_of(name: str, there: list[str]) -> str:
-    """The bone above; "" for the hips. Args: name: of a bone; there: bones that there are."""
+    """The nearest ancestor in `there`; "" for the hips. Args: name: bone; there: bones."""
     above = BONES[name].parent
     while above and above not in there:
         above = BONES[above].parent
@@ -171,12 +171,12 @@ def parent_of(name: str, there: list[str]) -> str:
 
 
 def place_of(name: str, head: Doubles, trunk: Doubles) -> Doubles:
-    """float64[3], metres, of a made-up bone.
+    """float64[3]: position of an added bone, in metres.
 
     Args:
-        name: of a bone.
-        head: float64[3], the head's joint, y up; a head near the origin has its body below it.
-        trunk: float64[3], the lowest joint of the face's own: the body stands below that.
+        name: name of the bone.
+        head: float64[3], the head's joint, y up; near the origin, the body is 1.5 m below it.
+        trunk: float64[3], the lowest of the face's own trunk joints, above which x and z continue.
     """
     height, low = float(head[1]), 0.0
     if not _STANDING[0] <= height <= _STANDING[1]:
@@ -187,5 +187,5 @@ def place_of(name: str, head: Doubles, trunk: Doubles) -> Doubles:
 
 
 def turn_of(name: str) -> Doubles:
-    """float64[3, 3] of a bone that lies as Mixamo's do. Args: name: of it."""
+    """float64[3, 3]: the axes that Mixamo gives a bone. Args: name: name of the bone."""
     return np.array(_TURNS[BONES[name].turn], np.float64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a VRM file says of its author and of what others may do: said by people, never assumed."""
+"""The licence fields of a VRM file; a person must state them, they are never assumed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..errors import GameFaceError
 
 VERSIONS = ("1.0", "0.x")
 TEXT, TEXTS, YES_NO = "a text", "a list of texts", "true or false"
-# Field as VRM 1.0 spells it -> what it is; the choices of those that have some.
+# Field with its VRM 1.0 name -> kind of its value, or the allowed values.
 _BOTH: dict[str, str | tuple[str, ...]] = {
     "name": TEXT,
     "authors": TEXTS,
@@ -39,7 +39,7 @@ ASKED: dict[str, dict[str, str | tuple[str, ...]]] = {
         ),
     },
 }  # fmt: skip
-"""Version -> fields that must be said."""
+"""Version -> required fields."""
 _MORE: dict[str, str | tuple[str, ...]] = {
     "version": TEXT, "copyrightInformation": TEXT, "contactInformation": TEXT,
     "references": TEXTS, "thirdPartyLicenses": TEXT, "otherLicenseUrl": TEXT,
@@ -51,30 +51,30 @@ _USERS = {
 
 
 def read(path: Path, version: str) -> dict[str, Any]:
-    """A TOML file of a licence, checked.
+    """Reads and checks a TOML file with a licence.
 
     Args:
-        path: of the file.
-        version: of VERSIONS.
+        path: path of the file.
+        version: one of VERSIONS.
 
     Raises:
-        GameFaceError: a field is missing, empty, unknown, or says something else.
-        ArgumentError: no TOML.
+        GameFaceError: a field is missing, empty, unknown, or has a value that is not allowed.
+        ArgumentError: not a TOML file.
         OSError: the file cannot be read.
     """
     return checked(toml.read(path), version, str(path))
 
 
 def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any]:
-    """The fields of a licence.
+    """Checks the fields of a licence, and returns them.
 
     Args:
-        table: field as VRM 1.0 spells it -> value.
-        version: of VERSIONS.
-        where: says in errors where the fields come from.
+        table: field with its VRM 1.0 name -> value.
+        version: one of VERSIONS.
+        where: source of the fields, for errors.
 
     Raises:
-        GameFaceError: a field is missing, empty, unknown, or says something else.
+        GameFaceError: a field is missing, empty, unknown, or has a value that is not allowed.
     """
     asked = ASKED[version]
     known = {**asked, **_MORE, **{f: k for own in ASKED.values() for f, k in own.items()}}
@@ -112,14 +112,14 @@ def _said(kind: str | tuple[str, ...]) -> str:
 
 
 def meta_1(said: Mapping[str, Any]) -> dict[str, Any]:
-    """The meta table of VRM 1.0. Args: said: of checked."""
+    """The meta table of VRM 1.0. Args: said: licence fields from `checked`."""
     own = {**ASKED["1.0"], **_MORE}
     out = {field: value for field, value in said.items() if field in own}
     return {**out, "licenseUrl": "https://vrm.dev/licenses/1.0/"}
 
 
 def meta_0(said: Mapping[str, Any]) -> dict[str, Any]:
-    """The meta table of VRM 0.x. Args: said: of checked."""
+    """The meta table of VRM 0.x. Args: said: licence fields from `checked`."""
     out = {
         "title": said["name"],
         "author": ", ".join(said["authors"]),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables that make a glTF a VRM: humanoid, expressions, look-at, first person, licence."""
+"""Makes the tables of a VRM: humanoid, expressions, look-at, first person, licence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PRESETS = (
 FEELINGS = PRESETS[:5]
 BLINKS = PRESETS[11:14]
 KINDS = {"Blink": ("blink",), "LookAt": PRESETS[-4:], "Mouth": ("aa", "ih", "ou", "ee", "oh")}
-"""What an expression may hold back, and the presets of it."""
+"""Kinds of presets that an expression may override, and the presets of each kind."""
 _OLD = {
     "happy": "joy", "angry": "angry", "sad": "sorrow", "relaxed": "fun", "neutral": "neutral",
     "aa": "a", "ih": "i", "ou": "u", "ee": "e", "oh": "o", "blink": "blink",
@@ -30,19 +30,20 @@ _OLD_TITLES = {
     "lookleft": "LookLeft", "lookright": "LookRight",
 }  # fmt: skip
 _OLD_FIRST = {"auto": "Auto", "both": "Both", "thirdPersonOnly": "ThirdPersonOnly"}
-_STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]  # of Unity's curves: from 0 to 1
-# The thumb begins one part later in VRM 0.x.
+# a straight line from (0, 0) to (1, 1) in Unity's curve format
+_STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]
+# VRM 0.x names the first two thumb bones one part further out.
 _OLD_THUMB = {"ThumbMetacarpal": "ThumbProximal", "ThumbProximal": "ThumbIntermediate"}
 
 
 @dataclass(frozen=True)
 class Manner:
-    """What is measured at the face.
+    """Values that are measured at the face.
 
     Attributes:
-        look: degrees that the eyes turn at lookLeft or lookRight, lookUp and lookDown; without
-            those that the face has no eyes for.
-        held: preset -> those of KINDS that it does not go with.
+        look: preset lookLeft, lookRight, lookUp or lookDown -> rotation of the eyes in degrees;
+            presets that do not turn the eyes are absent.
+        held: preset -> kinds of KINDS that it overrides.
     """
 
     look: Mapping[str, float] = field(default_factory=dict)
@@ -51,12 +52,12 @@ class Manner:
 
 @dataclass(frozen=True)
 class Shown:
-    """A mesh of the file.
+    """A mesh of the file, its morph targets, and whether the wearer sees it.
 
     Attributes:
-        node, mesh: their numbers.
+        node, mesh: numbers of its node and mesh.
         targets: names of its morph targets.
-        first: auto, both or thirdPersonOnly: whether its owner sees it.
+        first: first-person flag: "auto", "both" or "thirdPersonOnly".
     """
 
     node: int
@@ -67,15 +68,15 @@ class Shown:
 
 @dataclass(frozen=True)
 class Avatar:
-    """What the tables are made of.
+    """Input of the VRM tables.
 
     Attributes:
-        bones: VRM's name of a bone -> node.
-        eyes: metres from the head's joint to the middle of the eyes.
-        meshes: those of the file.
-        own: names of targets that are expressions by their own name.
-        said: the licence.
-        manner: what was measured.
+        bones: VRM name of a bone -> number of its node.
+        eyes: offset in metres from the head's joint to the midpoint of the eyes.
+        meshes: the meshes of the file.
+        own: names of targets that become custom expressions.
+        said: the licence fields.
+        manner: the measured values.
         plain: number of a material -> what VRM 0.x says of it, where a body has said so.
         springs: chains that swing.
     """
@@ -90,7 +91,7 @@ class Avatar:
     springs: Springs = field(default_factory=Springs)
 
     def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
-        """Meshes that have a target, and its number there."""
+        """The meshes that have a target, and its index in each."""
         for shown in self.meshes:
             if name in shown.targets:
                 yield shown, shown.targets.index(name)
@@ -99,12 +100,12 @@ class Avatar:
 def extension(
     version: str, avatar: Avatar, materials: Sequence[Mapping[str, Any]]
 ) -> tuple[str, dict[str, Any]]:
-    """The name and the table of the extension.
+    """The name and the table of the VRM extension.
 
     Args:
-        version: 1.0 or 0.x.
-        avatar: of the face.
-        materials: of the file.
+        version: "1.0" or "0.x".
+        avatar: input of the tables.
+        materials: material tables of the file.
     """
     return ("VRMC_vrm", _new(avatar)) if version == "1.0" else ("VRM", _old(avatar, materials))
 
@@ -141,7 +142,7 @@ def _expression(avatar: Avatar, name: str) -> dict[str, Any]:
 
 
 def _ranges(manner: Manner) -> Iterator[tuple[str, float]]:
-    """The maps of a look, and the degrees at which its expression is fully on."""
+    """Keys of the look-at ranges, and the rotation in degrees at which the expression is at 1."""
     sideways = [manner.look[n] for n in ("lookLeft", "lookRight") if n in manner.look]
     if sideways:
         mean = sum(sideways) / len(sideways)
@@ -208,7 +209,7 @@ def _old_bone(name: str) -> str:
 
 
 def _plain(name: str) -> dict[str, Any]:
-    """A material that programs show as glTF says it."""
+    """The VRM 0.x table of a material that is shown with its glTF properties."""
     tables = ("floatProperties", "vectorProperties", "textureProperties", "keywordMap", "tagMap")
     return {
         "name": name, "shader": "VRM_USE_GLTFSHADER", "renderQueue": 2000,

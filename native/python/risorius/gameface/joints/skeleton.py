@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joints of a game face: root, neck, head, jaw and eyes, or the bones of a humanoid."""
+"""Finds the joints of a game face: root, neck, head, jaw and eyes, or the bones of a humanoid."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..errors import GameFaceError
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# What faces call the joints that each of them may have; the first in the file counts.
+# Patterns of joint names in files; the first joint that matches counts.
 _JOINTS = {
     "neck": re.compile(r"neck([_.]?0?1)?$"),
     "head": re.compile(r"head$"),
@@ -28,19 +28,21 @@ _JOINTS = {
     "leftEye": re.compile(r"(facial_l_eye|eye_?l(eft)?|left_?eye)$"),
     "rightEye": re.compile(r"(facial_r_eye|eye_?r(ight)?|right_?eye)$"),
 }
-ROOT = {"mixamo": "Armature"}  # as TalkingHead looks for it
+ROOT = {"mixamo": "Armature"}  # TalkingHead looks for this name
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Attributes:
-    names: of its joints, the root first; each stands behind its parent.
-    parents: -1 for the root.
-    places: float64[n, 3], metres, in the axes of glTF.
-    of_joint: int64[joints of the file], which of these each hangs on.
-    head: the joint that takes what hangs on none.
-    turns: float64[n, 3, 3], from each joint's axes to those of glTF.
-    bones: VRM's name of a bone -> its joint here.
+    """The joints of the exported file.
+
+    Attributes:
+    names: names of the joints, the root first, parents before children.
+    parents: index of each parent, -1 for the root.
+    places: float64[n, 3], positions in metres in glTF's axes.
+    of_joint: int64[joints of the DNA file], the joint here that each one follows.
+    head: index of the head's joint, which also takes vertices without a joint.
+    turns: float64[n, 3, 3], rotation from each joint's axes to glTF's.
+    bones: VRM name of a bone -> index of its joint here.
     hooks: joint -> node of a body that it hangs on; the root is that node itself.
     """
 
@@ -57,24 +59,24 @@ class Skeleton:
 def find_skeleton(
     dna: Dna, axes: Doubles, *, kind: str = "", is_body: bool = False, is_turned: bool = False
 ) -> Skeleton:
-    """The joints of a face.
+    """The joints that a face is exported with.
 
     Args:
-        dna: with its joints.
-        axes: float64[3, 3] from the file's to those of glTF.
-        kind: of humanoid.KINDS: bones that the face lacks are made up; "": it has what it has.
-        is_body: the body's bones too, where the face has them.
-        is_turned: bones lie as Mixamo's do.
+        dna: the face with its joints.
+        axes: float64[3, 3], maps the file's axes to glTF's.
+        kind: one of humanoid.KINDS, which adds missing bones; "": only joints of the face.
+        is_body: whether to include the bones of the body that the face has.
+        is_turned: whether bones have the axes of Mixamo's bones.
 
     Raises:
-        GameFaceError: a humanoid is wished, and the face has no head, or lacks bones.
+        GameFaceError: a humanoid was requested, but the face has no head, or lacks needed bones.
     """
     found = _own(dna, is_body=is_body or bool(kind))
     if kind and "head" not in found:
         raise GameFaceError("a joint called head was expected, which a humanoid hangs on")
     parents = np.asarray(dna.joint_parents, np.int64)
     world = world_matrices(dna, np.zeros((len(parents), 9)))[:, :3, 3] @ axes.T
-    # Parents of a file stand before their children or behind them: each is followed to the root.
+    # A file may list parents before or after their children: each chain is followed to the root.
     chains = [_chain(parents, joint) for joint in range(len(parents))]
     if is_body or kind:
         bones, above = _humanoid(found, kind)
@@ -93,7 +95,8 @@ def find_skeleton(
             humanoid.place_of(name, world[found["head"]], world[trunk]) if made else world[own]
         )
         turns.append(humanoid.turn_of(name) if is_turned else np.eye(3))
-    rest = number.get(humanoid.parent_of("neck", bones), 0)  # of what hangs on none of them
+    # for joints that follow none of the bones
+    rest = number.get(humanoid.parent_of("neck", bones), 0)
     return Skeleton(
         [ROOT.get(kind, "Root"), *(humanoid.BONES[name].node for name in bones)],
         [-1, *(number.get(name, 0) for name in above)],
@@ -106,13 +109,13 @@ def find_skeleton(
 
 
 def facing_back(skeleton: Skeleton) -> Skeleton:
-    """The same, turned about the vertical: VRM 0.x looks against z. Args: skeleton: upright."""
+    """A skeleton rotated by 180° about y, for VRM 0.x. Args: skeleton: facing +z."""
     turns = np.tile(np.eye(3), (len(skeleton.names), 1, 1))  # VRM 0.x turns no bone
     return replace(skeleton, places=skeleton.places * [-1.0, 1.0, -1.0], turns=turns)
 
 
 def _own(dna: Dna, *, is_body: bool) -> dict[str, int]:
-    """Bones that the joints of a face are: name -> joint."""
+    """Bone name -> index of the face's joint with that role."""
     found: dict[str, int] = {}
     for name, pattern in _JOINTS.items():
         at = [i for i, joint in enumerate(dna.joint_names) if pattern.match(joint.lower())]
@@ -127,10 +130,10 @@ def _own(dna: Dna, *, is_body: bool) -> dict[str, int]:
 
 
 def _humanoid(found: Mapping[str, int], kind: str) -> tuple[list[str], list[str]]:
-    """The bones of a humanoid, and what each of them hangs on.
+    """The bones of a humanoid, and the parent of each.
 
     Raises:
-        GameFaceError: the face lacks some, and none is made up.
+        GameFaceError: needed bones are missing, and `kind` does not add them.
     """
     bones = humanoid.wanted(found, kind)
     if missing := [name for name in humanoid.NEEDED if name not in bones]:
@@ -142,12 +145,12 @@ def _humanoid(found: Mapping[str, int], kind: str) -> tuple[list[str], list[str]
 
 
 def _first(keys: Iterable[Any], table: Mapping[Any, Any], otherwise: Any) -> Any:
-    """What a table says of the first of several keys that it has."""
+    """The table's value for the first key that it has, else `otherwise`."""
     return next((table[key] for key in keys if key in table), otherwise)
 
 
 def _chain(parents: Ints, joint: int) -> list[int]:
-    """A joint and those above it."""
+    """A joint and its ancestors, from the joint to the root."""
     out = [joint]
     while parents[out[-1]] != out[-1] and len(out) <= len(parents):
         out.append(int(parents[out[-1]]))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The times of a file's frames: units of time in various spellings, and timecodes."""
+"""Reads the times of a file's frames: units of time in various spellings, and timecodes."""

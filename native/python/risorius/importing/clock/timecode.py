@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SMPTE timecodes HH:MM:SS:FF, with fractions of a frame, drop-frame or not."""
+"""Reads SMPTE timecodes HH:MM:SS:FF, drop-frame or not, whose frames may have fractions."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from ..errors import AnimationFileError
 
-BASES = (24, 25, 30, 48, 50, 60, 100, 120)
-PHONES = (30, 60)  # the frame rates of nearly all phones
+BASES = (24, 25, 30, 48, 50, 60, 100, 120)  # frames per second that timecodes count
+PHONES = (30, 60)  # frames per second of nearly all phones
 DAY = 86400.0
-# A ; or , as the last separator means drop-frame, as in edit lists.
+# A ; or , before the frame number means drop-frame, as in edit lists.
 _FORM = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})([:;,])(\d{1,3}(?:\.\d*)?)")
 
 
@@ -24,12 +24,12 @@ class Timecode(NamedTuple):
     minutes: int
     seconds: int
     frames: float
-    """Including its fraction."""
+    """Frame number, which may have a fraction."""
     is_dropped: bool
 
 
 def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
-    """A timecode HH:MM:SS:FF, whose frame may have a fraction.
+    """Parses a timecode HH:MM:SS:FF, whose frame number may have a fraction.
 
     Args:
         text: the cell; ; or , before the frame means drop-frame.
@@ -60,7 +60,7 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 
 
 def infer_base(codes: Sequence[Timecode]) -> int | None:
-    """Frames per second of the timecodes' own clock, or None if it cannot be inferred.
+    """Frames per second that the timecodes count, or None if it cannot be inferred.
 
     A rate measured from the timecodes wins. If they never reach the next second, or lost too many
     rows around it, the largest frame number decides, provided that only one usual rate fits it.
@@ -75,7 +75,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # Frame 29 is the highest, and the take is so long that at 60 frames it would go beyond 29.
+    # At 60 frames per second, a take of 2 s would have frame numbers above 29.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -84,10 +84,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """The base that the frame numbers show where the second increases by one, or None.
+    """Infers the base from the drop of the frame number at each new second, or None.
 
-    There they fall by the base minus one step. Lost rows make them fall by less, so that an unusual
-    base counts only if others agree with it, or if no rows are lost.
+    The frame number then drops by the base minus one step. Lost rows make it drop by less, so that
+    an unusual base is accepted only if several drops agree or no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -108,23 +108,24 @@ def _measured(
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
-    """Seconds of each timecode since midnight of the first, with midnights counted.
+    """Seconds of each timecode since midnight before the first; later midnights are counted.
 
     Args:
         codes: from `parse`, in the order of the frames.
-        base: frames that the timecode counts per second: 30 for 29.97.
-        is_true_rate: False if a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
+        base: frames per second that the timecode counts: 30 for 29.97.
+        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94.
 
     Returns:
         float64[codes].
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
-    # Drop-frame skips the first two numbers (of 30) of each minute except every tenth.
+    # Drop-frame skips the first 2 of 30 frame numbers (4 of 60) in each minute except every tenth.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by hours is midnight; a smaller one is a row out of order and is kept.
+    # A step back by more than 12 hours is midnight; smaller ones are rows out of order, and are
+    # kept.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

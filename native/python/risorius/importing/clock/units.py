@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Units of time in headers and keys, and their conversion to seconds."""
+"""Recognises units of time in headers and keys, and converts times to seconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 """Seconds in one unit."""
 FRAMES, ROWS = "frames", "rows"
 CHOICES = (*UNITS, FRAMES, ROWS)
-"""Units that a caller may state; ROWS: times are ignored, and each row is a frame."""
+"""Units that a caller may state; ROWS ignores the times, and each row is a frame."""
 GIVE_RATE = "give the rate in frames a second (clip convert --input-rate; File Rate in Blender)"
 COUNT_ROWS = (
     "clip convert --time-unit rows with --input-rate (Time Unit and File Rate in Blender) counts "
@@ -39,47 +39,48 @@ _WORDS = (
     "unixtime unixtimestamp frametime sampletime"
 ).split()
 _FRAME_NUMBERS = "frame frames framenumber frameindex frameid frameno framenr".split()
-# Units that may stand alone, because they are not names of curves or mouth shapes.
+# Units that are a header on their own, because they are not names of curves or mouth shapes.
 _ALONE = "s sec secs second seconds ms msec millis milliseconds us microseconds nanoseconds".split()
 _NAMES: dict[str, str] = {
     **{word + unit: of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    **dict.fromkeys([*_WORDS, "t", "ts"], ""),  # "times" does not mean "time" in "s"
+    # last, so that "times" does not mean "time" in the unit "s"
+    **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
-# Texts in brackets behind a frame number that are not units.
+# Texts in brackets after a frame number that are no unit.
 _NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
 _BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
-# Times without a unit are taken as seconds up to this step between two of them: keys may lie this
-# far apart, frames never do.
+# Times without a unit are seconds if they step by at most this much (seconds): keys may be so far
+# apart, frames never are.
 _LONGEST_STEP = 4.0
-# Steps of a capture in milliseconds: 250 to 5 frames per second.
+# Smallest and largest usual step of a capture in milliseconds: 250 and 5 frames per second.
 _STEPS = (4.0, 200.0)
-_LEAST_ROWS = 8  # number of rows from which even steps identify a unit
-# Times since 1970: dates after 1973 in milliseconds, microseconds and nanoseconds.
+_LEAST_ROWS = 8  # number of rows from which a unit is inferred from even steps
+# Smallest time since 1970 in each unit: a date after 1973.
 _DATES = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))
-_LONGEST = 1e8  # seconds; a later start is a date
+_LONGEST = 1e8  # seconds; a larger start time is a date
 
 
 class TimeName(NamedTuple):
-    """The unit in a header of times."""
+    """The unit of time in a header."""
 
     unit: str
-    """One of UNITS, FRAMES, or "" if it has none."""
+    """One of UNITS, FRAMES, or "" if the header names none."""
     odd: str = ""
-    """An unknown unit in brackets."""
+    """The text in brackets if it is an unknown unit, or ""."""
 
 
 class Asked(NamedTuple):
-    """The caller's options on time; None: as the file says."""
+    """The caller's options on time; None leaves a value to the file."""
 
     rate: float | None = None
-    """Frames per second."""
+    """Frames per second of the file."""
     timecode_rate: float | None = None
     """Frames per second of timecodes."""
     unit: str | None = None
-    """One of CHOICES."""
+    """Unit of the times, one of CHOICES."""
 
     @property
     def counts_rows(self) -> bool:
@@ -87,12 +88,13 @@ class Asked(NamedTuple):
 
 
 def plain(header: str) -> str:
-    """A header without letter case, blanks and punctuation; both letters for micro become u."""
+    """A header in lower case without blanks and punctuation; the signs for micro become u."""
     return re.sub(r"[^a-z0-9]", "", re.sub("[µμ]", "u", header.lower()))
 
 
 def time_name(header: str) -> TimeName | None:
-    """The unit in a header of times such as "Time (ms)", "timestamp_us", "frame"; None: not a time.
+    """The unit in a header such as "Time (ms)", "timestamp_us", "frame"; None: not a header of
+    times.
 
     Args:
         header: header of a column, or a key of JSON.
@@ -114,15 +116,15 @@ def time_name(header: str) -> TimeName | None:
 
 
 def row_times(count: int, asked: Asked, name: str) -> Doubles:
-    """float64[count] seconds of evenly spaced rows.
+    """float64[count]: seconds of rows that are evenly spaced at the given rate.
 
     Args:
         count: number of rows.
-        asked: has the rate.
+        asked: the caller's options; the rate is required.
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: no rate.
+        AnimationFileError: the options have no rate.
     """
     if asked.rate is None:
         raise AnimationFileError(name, f"nothing gives the time: {GIVE_RATE}")
@@ -138,8 +140,7 @@ def seconds_of(
     name: str,
     column: str | None = None,
 ) -> Doubles:
-    """Seconds of times in the caller's unit, else the header's, else the one inferred from the
-    values.
+    """Converts times to seconds, by the caller's unit, else the header's, else the inferred unit.
 
     Args:
         values: float64[frames], as in the file.
@@ -181,14 +182,15 @@ def seconds_of(
 
 
 def _shown(values: Doubles, name: str, column: str | None) -> str:
-    """The unit inferred from the size of times. Raises: AnimationFileError: none fits."""
+    """Infers the unit from the size and steps of times. Raises: AnimationFileError: none fits."""
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
         if np.isfinite(smallest) and smallest > least:
             return unit
     steps = np.diff(values)
     steps = np.sort(steps[steps > 0.0])
-    step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0  # a single gap tells nothing
+    # the lower middle, because a single gap may be large
+    step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0
     if step <= _LONGEST_STEP:
         return "s"
     is_even = float(np.mean(np.abs(steps - step) <= 0.5 * step)) >= 0.8

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Reads glTF meshes that Draco packed (KHR_draco_mesh_compression), with the package DracoPy.
+"""Reads glTF meshes packed with Draco (KHR_draco_mesh_compression); needs the package DracoPy.
 
-Vertices are in the order of the packed data. Draco never packs morph targets; the extension asks
-writers to keep them in that order.
+Vertices are in the order of the packed data. Draco never packs morph targets; the glTF extension
+requires writers to keep their vertices in the same order.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ EXTENSION = "KHR_draco_mesh_compression"
 
 
 class MissingDracoError(RisoriusError):
-    """The package DracoPy is not installed."""
+    """A mesh is packed with Draco, but the package DracoPy is not installed."""
 
     code = "missing_draco"
 
 
 class DracoMesh:
-    """An unpacked mesh.
+    """The triangles and attributes of an unpacked mesh.
 
     Attributes:
         triangles: int64[n, 3].
     """
 
     def __init__(self, packed: bytes) -> None:
-        """Unpack the bytes.
+        """Unpacks a mesh.
 
         Args:
-            packed: the bytes in the file.
+            packed: the bytes of the buffer view.
 
         Raises:
             MissingDracoError: DracoPy is not installed.
@@ -57,7 +57,7 @@ class DracoMesh:
         self.triangles: npt.NDArray[np.int64] = faces
 
     def rows(self, identity: object) -> npt.NDArray[np.float64]:
-        """float64[V, n] of the attribute with this number.
+        """float64[V, n]: values of the attribute with this unique_id.
 
         Raises:
             GivenError: no such attribute.

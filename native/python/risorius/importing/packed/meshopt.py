@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Buffer views of glTF that meshoptimizer packed: EXT_meshopt_compression and its successor with
-the same fields."""
+"""Unpacks buffer views of glTF files: EXT_meshopt_compression and KHR_meshopt_compression, which
+has the same fields."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ...base.given import GivenError, shown, text, whole
 EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL")
-_WIDEST = 256  # bytes in a row
+_WIDEST = 256  # largest number of bytes per row
 
 
 @dataclass(frozen=True)
 class Packing:
-    """The packing of a buffer view.
+    """The fields of the extension that packs a buffer view.
 
     Attributes:
         name: name of the extension.
         table: the extension's table; buffer, byteOffset and byteLength locate the packed bytes.
         count, stride: rows, and bytes per row, after unpacking.
-        mode, filter: from MODES and FILTERS.
+        mode, filter: one of MODES and one of FILTERS.
     """
 
     name: str
@@ -37,18 +37,18 @@ class Packing:
 
     @property
     def size(self) -> int:
-        """Bytes after unpacking."""
+        """Number of bytes after unpacking."""
         return self.count * self.stride
 
 
 def packing_of(view: Mapping[str, Any]) -> Packing | None:
-    """The packing of a buffer view, or None if it is not packed.
+    """Reads how a buffer view is packed; None if it is not packed.
 
     Args:
-        view: the table in the JSON.
+        view: the buffer view's table in the JSON.
 
     Raises:
-        GivenError: an invalid entry of the extension, which begins the sentence.
+        GivenError: an invalid entry; the message begins with the name of the extension.
     """
     found = view.get("extensions")
     extensions = found if isinstance(found, dict) else {}
@@ -70,14 +70,15 @@ def packing_of(view: Mapping[str, Any]) -> Packing | None:
 
 
 def unpacked(packed: bytes, packing: Packing) -> bytes:
-    """The unpacked bytes of a buffer view, packing.size of them.
+    """The packing.size bytes of a buffer view, unpacked.
 
-    Args:
+    packed: the bytes of the buffer.
         packed: the bytes in the file.
         packing: from packing_of.
 
     Raises:
-        GivenError: bytes of another kind, damaged bytes, or rows that the mode does not allow.
+        GivenError: bytes of another kind, damaged bytes, or a row size that the mode does not
+            allow.
     """
     try:
         return _native.unpack_buffer(

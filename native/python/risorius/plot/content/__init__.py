@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Data of the drawings, taken from a DNA without drawing."""
+"""Collects the data of the drawings from a DNA file, without Matplotlib."""

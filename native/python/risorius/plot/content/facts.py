@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The data of all drawings: counts, sizes, regions, levels of detail."""
+"""Collects the data of all drawings: counts, sizes, regions, levels of detail."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .regions import REGIONS, regions_of
 
 @dataclass(frozen=True)
 class Lod:
-    """One level of detail: joints of each region, and the amount of evaluation."""
+    """One LOD: number of joints per region, and numbers of evaluated parts."""
 
     joints: dict[str, int]
     coefficients: int
@@ -28,7 +28,7 @@ class Lod:
 
 @dataclass(frozen=True)
 class Facts:
-    """A rig's data for the drawing modules. `title` and `file_name` are for people."""
+    """A rig's data for the drawing modules; `title` and `file_name` are only displayed."""
 
     dna: risorius.Dna
     title: str
@@ -42,7 +42,7 @@ class Facts:
 
     @property
     def controls(self) -> list[tuple[str, int]]:
-        """The kinds of control inputs in the order of the matrix's columns, with their counts."""
+        """(kind, number) of the controls in the order of the joint matrix's columns."""
         return [
             ("raw", len(self.dna.raw_control_names)),
             ("psd", self.dna.psd_count),
@@ -52,7 +52,7 @@ class Facts:
 
     @property
     def stored(self) -> int:
-        """Coefficients stored in the joint groups, zeros included."""
+        """Number of coefficients stored in the joint groups, including zeros."""
         return sum(int(group.values.size) for group in self.dna.joint_groups)
 
     @property
@@ -60,19 +60,19 @@ class Facts:
         return sum(int(np.count_nonzero(group.values)) for group in self.dna.joint_groups)
 
     def region_counts(self) -> dict[str, int]:
-        """Number of joints of each non-empty region, in the order of REGIONS."""
+        """Region -> number of its joints, for regions with joints, in the order of REGIONS."""
         votes = Counter(self.joint_regions)
         return {region: votes[region] for region in REGIONS if votes[region]}
 
 
 def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = None) -> Facts:
-    """The facts of one file.
+    """Collects the data of one file.
 
     Args:
-        dna: read from `data` with all layers.
-        data: the bytes of the file, for the sizes.
-        file_name: for display, without folder.
-        title: replaces the character's name.
+        dna: the face, loaded from `data` with all layers.
+        data: bytes of the file, from which sizes are read.
+        file_name: file name without folder, for display.
+        title: displayed title; None: the character's name.
     """
     regions = regions_of(dna.joint_names)
     return Facts(
@@ -89,7 +89,7 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
 
 
 def listed(mapping: risorius.LodMapping, lod: int) -> npt.NDArray[np.int64]:
-    """int64[listed]: the indices that a mapping lists for `lod`; empty if it lacks this LOD."""
+    """int64[n]: the indices that a mapping lists for `lod`; empty if it lacks this LOD."""
     return np.asarray(mapping[lod] if lod < len(mapping) else [], np.int64)
 
 
@@ -109,7 +109,7 @@ def _lod(dna: risorius.Dna, level: int, regions: list[str]) -> Lod:
 
 
 def counts(facts: Facts) -> list[tuple[str, int]]:
-    """All counts, in the order of the table."""
+    """(name, number) for each row of the table of counts."""
     dna, meshes = facts.dna, facts.dna.meshes
     targets = [target for mesh in meshes for target in mesh.blend_shape_targets]
     return [
@@ -134,7 +134,7 @@ def counts(facts: Facts) -> list[tuple[str, int]]:
 
 
 def human_bytes(size: int) -> str:
-    """A size in a decimal unit with two to four digits."""
+    """A size as text in B, kB or MB."""
     if size < 1000:
         return f"{size} B"
     if size < 1_000_000:
@@ -143,7 +143,7 @@ def human_bytes(size: int) -> str:
 
 
 def descriptor(facts: Facts) -> str:
-    """A line about the character."""
+    """A line of text about the character and its file."""
     dna = facts.dna
     parts = [
         f"DNA {dna.generation}.{dna.version}",

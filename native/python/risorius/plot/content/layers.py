@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The size of each layer in bytes, read from the file's container."""
+"""Reads the size of each layer in bytes from a DNA file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of the file. `key` is the four letters of the index table, or empty."""
+    """A part of the file. `key` is its four letters in the index table, or empty."""
 
     key: str
     title: str
@@ -43,7 +43,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """Counts in the newer layers: controls after raw ones and correctives, and networks."""
+    """Numbers of network controls, RBF poses and networks, which newer layers state."""
 
     ml_controls: int
     rbf_poses: int
@@ -51,7 +51,7 @@ class Extras:
 
 
 class _Bytes:
-    """A reader of big-endian fields that never passes the end of its layer."""
+    """Reads big-endian fields, and raises ValueError at the end of its layer."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at = data, 0
@@ -74,7 +74,7 @@ class _Bytes:
         return count
 
     def skip_list(self, depth: int) -> None:
-        """A list of u16, or of such lists."""
+        """Skips a list of u16 if depth is 1, else a list of lists one level less deep."""
         count = self.u32()
         if depth == 1:
             self.skip(2 * count)
@@ -84,7 +84,7 @@ class _Bytes:
 
 
 def read_layers(data: bytes) -> list[Layer]:
-    """The layers in file order; with the gaps between them they add up to the file's size.
+    """The layers in file order, plus entries for other bytes; sizes add up to the file's size.
 
     Args:
         data: the bytes of a DNA file that `risorius.load` accepts.
@@ -96,7 +96,7 @@ def read_layers(data: bytes) -> list[Layer]:
 
 def _sections_of_2_1(data: bytes) -> list[Layer]:
     offsets = struct.unpack_from(">8I", data, 7)
-    # The third offset is for "behavior", which has no bytes of its own.
+    # The third offset, of "behavior", is skipped, because that section has no bytes of its own.
     starts = [offsets[0], offsets[1], *offsets[3:8], len(data) - 3]
     layers = [Layer("", "header", 0, 39)]
     for title, (start, end) in zip(_SECTIONS_OF_2_1, pairwise(starts), strict=True):
@@ -115,7 +115,7 @@ def _entries(data: bytes) -> list[Layer]:
 
 
 def _with_gaps(layers: list[Layer], end: int) -> list[Layer]:
-    """The layers, followed by an entry for bytes outside of all layers."""
+    """The layers, followed by an entry for bytes outside all layers."""
     covered, at = 0, 0
     for layer in layers:
         stop = min(end, layer.offset + layer.size)
@@ -127,7 +127,10 @@ def _with_gaps(layers: list[Layer], end: int) -> list[Layer]:
 
 
 def read_extras(data: bytes) -> Extras:
-    """Counts from the layers of networks and RBF poses; 0 for absent or damaged layers."""
+    """Reads counts from the layers of networks and RBF poses; 0 for absent or damaged layers.
+
+    Args:
+        data: the bytes of a DNA file."""
     if int.from_bytes(data[5:7], "big") == 1:
         return Extras(0, 0, 0)
     bodies = {x.key: data[x.offset : x.offset + x.size] for x in _entries(data) if x.key}
@@ -136,7 +139,7 @@ def read_extras(data: bytes) -> Extras:
 
 
 def _machine_learning(body: bytes) -> tuple[int, int]:
-    """The numbers of controls that networks write, and of networks."""
+    """(number of controls that networks write, number of networks) from the layer mlbh."""
     reader, names = _Bytes(body), 0
     try:
         names = reader.skip_texts()
@@ -151,7 +154,7 @@ def _machine_learning(body: bytes) -> tuple[int, int]:
 
 
 def _pose_controls(bodies: dict[str, bytes]) -> int:
-    """The number of controls that RBF poses write; a 2.4 file has one per pose."""
+    """The number of controls that RBF poses write; without the layer rbfe, one per pose."""
     try:
         reader = _Bytes(bodies.get("rbfe", b""))
         if names := reader.u32():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix as an image: position and colour of each coefficient."""
+"""Computes the image of the joint matrix: position and colour of each coefficient."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cells:
-    """Non-zero coefficients: int64[N] row, column and group of each, in a grid of `shape`."""
+    """Row, column and joint group of each non-zero coefficient, int64[N], in a grid of `shape`."""
 
     rows: Ints
     columns: Ints
@@ -30,7 +30,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Block:
-    """A joint group as a rectangle: its first row among the regrouped ones, and its size."""
+    """The rectangle of a joint group in the regrouped matrix: its first row and its size."""
 
     group: int
     region: str
@@ -40,7 +40,7 @@ class Block:
 
 
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
-    """The region of each joint group: the one of most of the joints that it moves.
+    """The region of each joint group: the region of most joints that it moves.
 
     Args:
         dna: the face.
@@ -55,21 +55,21 @@ def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
 
 
 def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
-    """Rows and columns that contain every coefficient of dna: at least 9 per joint x `controls`."""
+    """(rows, columns) that contain all coefficients of dna; at least 9 per joint and `controls`."""
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
-        # 64-bit, because -1 as an unsigned 16-bit number would be 65,535.
+        # Converted to 64 bits, because -1 as an unsigned 16-bit number would be 65,535.
         rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
         columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
     return rows, columns
 
 
 def by_index(dna: risorius.Dna, controls: int) -> Cells:
-    """The joint matrix of dna by index: row 9 * joint + attribute, column = control.
+    """The coefficients in a grid with row 9 * joint + attribute, and column = control.
 
     Args:
         dna: the face.
-        controls: least number of columns.
+        controls: smallest number of columns.
     """
     parts = []
     for number, group in enumerate(dna.joint_groups):
@@ -80,14 +80,16 @@ def by_index(dna: risorius.Dna, controls: int) -> Cells:
 
 
 def regrouped(dna: risorius.Dna, regions: Sequence[str]) -> tuple[Cells, list[Block]]:
-    """Rows grouped by joint group and region, with each group's columns moved to the left.
+    """The coefficients with the rows of each joint group together, groups ordered by region.
+
+    The columns that a group reads are moved to the left without gaps.
 
     Args:
-        dna: a rig.
-        regions: regions of each joint group.
+        dna: the face.
+        regions: region of each joint group.
 
     Returns:
-        The cells, and the rectangle of each non-empty group, as the evaluator stores it.
+        The coefficients, and the rectangle of each non-empty group.
     """
     groups = dna.joint_groups
     order = sorted(range(len(groups)), key=lambda g: (REGIONS.index(regions[g]), g))
@@ -113,13 +115,14 @@ def _joined(parts: Sequence[tuple[npt.NDArray[Any], ...]], shape: tuple[int, int
 
 
 def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[np.uint8]:
-    """The cells as a picture; empty cells are transparent.
+    """Paints the coefficients as a picture; empty cells are transparent.
 
     Args:
-        cells: the cells.
-        colors: float64[groups, 3] in 0..1.
-        limit: the most rows and columns of pixels. A smaller grid has one pixel per cell; otherwise
-            a pixel shows the mean colour of several cells, more opaque the more are filled.
+        cells: the coefficients.
+        colors: float64[groups, 3], colour of each joint group in 0..1.
+        limit: largest height and width in pixels. A smaller grid has one pixel per cell; otherwise
+            a pixel has the mean colour of its cells, and is more opaque the more of them are
+            filled.
 
     Returns:
         uint8[h, w, 4], RGBA.
@@ -134,13 +137,13 @@ def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[n
         shade = colors[cells.groups, channel] if len(cells.groups) else np.zeros(0)
         picture[:, channel] = np.bincount(flat, shade, minlength=size) / np.maximum(count, 1)
     area = np.outer(_spread(cells.shape[0], high), _spread(cells.shape[1], wide)).ravel()
-    # The floor keeps a single coefficient among fifty zeros visible.
+    # At least 0.3 opaque, so that a single coefficient among fifty zeros is visible.
     fill = np.sqrt(np.minimum(1, count / area))
     picture[:, 3] = np.where(count > 0, 0.3 + 0.7 * fill, 0)
     return np.asarray(np.rint(picture * 255), np.uint8).reshape(high, wide, 4)
 
 
 def _spread(cells: int, pixels: int) -> Floats:
-    """The number of cells on each pixel: float64[pixels]."""
+    """float64[pixels]: the number of cells that each pixel covers."""
     places = np.arange(max(1, cells)) * pixels // max(1, cells)
     return np.bincount(places, minlength=pixels).astype(float)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Face regions of joints, derived from their names, and a colour for each."""
+"""Finds the face region of joints by their names, and defines a colour for each region."""
 
 from __future__ import annotations
 
@@ -32,8 +32,7 @@ COLORS = {
     "neck": "#54a24b",
     "other": "#8b95a1",
 }
-# The order matters: NasolabialBulge is a cheek though it begins like a nose, UnderChin a chin,
-# EyelashesUpper an eye, a joint of the upper lip's rotation a mouth.
+# The first match counts: NasolabialBulge is a cheek although it begins like a nose.
 _STARTS = (
     ("cheek", ("naso", "cheek", "masseter", "sideburn", "temple")),
     ("forehead, brow", ("forehead", "brow", "eyebrow", "hair", "skull", "corrugator")),
@@ -45,7 +44,7 @@ _STARTS = (
     ("ear", ("ear",)),
     ("neck", ("neck", "adams", "throat", "clavicle", "spine")),
 )
-# FACIAL_L_12IPV_EyelidUpperB1: side and kind do not tell the region.
+# Prefixes such as FACIAL_L_12IPV_, which state side and kind but not the region.
 _PREFIX = re.compile(r"^(?:facial_)?(?:[lrc]_)?(?:12ipv_)?", re.IGNORECASE)
 
 
@@ -64,13 +63,13 @@ def regions_of(joints: Iterable[str]) -> list[str]:
 
 
 def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
-    """The region of most of the joints; on a tie the first one in REGIONS.
+    """The region that most of the joints have; on a tie the first one in REGIONS.
 
     Args:
         indices: indices of joints; indices out of range are ignored.
-        regions: regions of every joint.
+        regions: region of each joint.
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]
-    # "other" wins only if no joint has a named region: one root joint among lips does not count.
+    # "other" is the result only if no joint has a named region.
     return max(named, key=lambda region: votes[region]) if named else "other"

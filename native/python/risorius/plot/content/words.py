@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Headings and captions of the drawings, for the page and the sheet."""
+"""Headings and captions of the drawings, used by the page and the sheet."""
 
 from __future__ import annotations
 

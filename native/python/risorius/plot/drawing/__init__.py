@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The individual drawings of a page."""
+"""Draws the figures of the page and the sheet with Matplotlib."""

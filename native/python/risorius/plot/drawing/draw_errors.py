@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions coloured by error: the distance of a face from its source."""
+"""Draws heads with expressions, coloured by the error of each vertex."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .paper import MUTED, Canvas
 Floats = npt.NDArray[np.float64]
 
 COLUMNS = 6
-_HEAD = 0.62  # inches above a picture, for its name
-_BAR = 0.75  # inches below all pictures, for the scale
-# From clay over yellow and red to violet, so that the worst places stand out.
+_HEAD = 0.62  # inches above a picture, for the expression's name
+_BAR = 0.75  # inches below all pictures, for the colour scale
+# Colour scale from white over yellow and red to violet, so that the largest errors stand out.
 _STOPS = np.array([0.0, 0.2, 0.45, 0.75, 1.0])
 _COLORS = np.array(
     [[1.0, 1.0, 1.0], [1.0, 0.93, 0.55], [1.0, 0.6, 0.2], [0.85, 0.15, 0.25], [0.45, 0.05, 0.5]]
@@ -28,32 +28,32 @@ _COLORS = np.array(
 
 @dataclass(frozen=True)
 class Expression:
-    """A control at 1: its target meshes, and the error of each vertex."""
+    """An expression at weight 1: its target meshes, and the error of each vertex."""
 
     name: str
     meshes: list[risorius.Mesh]
-    errors: list[Floats]  # float64[V] of each mesh, mm
-    largest: float
-    rms: float
+    errors: list[Floats]  # float64[V] of each mesh, in mm
+    largest: float  # mm
+    rms: float  # mm
 
 
 def colors(errors: Floats, most: float) -> Floats:
-    """float64[V, 3], colours of errors: 0 is clay, `most` and more the end of the scale.
+    """float64[V, 3]: colours of errors, from white at 0 to violet at `most` and above.
 
     Args:
-        errors: float64[V].
-        most: the end of the scale, in the same unit.
+        errors: float64[V], in the unit of `most`.
+        most: error at the end of the scale.
     """
     share = np.clip(errors / most, 0, 1)
     return np.stack([np.interp(share, _STOPS, _COLORS[:, c]) for c in range(3)], axis=1)
 
 
 def height(count: int, width: float) -> float:
-    """Inches for this number of pictures.
+    """The height in inches that the pictures need.
 
     Args:
         count: number of expressions.
-        width: width of the canvas, inches.
+        width: width of the canvas in inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.25 * width / COLUMNS + _HEAD) + _BAR
 
@@ -61,14 +61,14 @@ def height(count: int, width: float) -> float:
 def draw(
     canvas: Canvas, dna: risorius.Dna, expressions: Sequence[Expression], most: float, dpi: int
 ) -> None:
-    """A head for each expression, all on one scale.
+    """Draws a head for each expression, all with the same colour scale.
 
     Args:
-        canvas: the canvas.
-        dna: has the axes.
-        expressions: in drawing order.
-        most: the error at the end of the scale, mm.
-        dpi: resolution of the images.
+        canvas: receives the drawing.
+        dna: the face, whose coordinate system is used.
+        expressions: expressions in drawing order.
+        most: error at the end of the colour scale, in mm.
+        dpi: resolution of the images in dots per inch.
     """
     if not expressions:
         canvas.say("No expression moves this face.")

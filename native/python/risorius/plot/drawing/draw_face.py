@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The neutral face from the front and the side, with its joints and bones."""
+"""Draws the neutral face from the front and the side, with its joints and bones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .paper import MUTED, Canvas, heading, rgb
 
 Floats = npt.NDArray[np.float64]
 
-# Transparent films and hair, which would hide the face if drawn as clay.
+# Names of transparent films and hair, which would hide the face because they are drawn opaque.
 _FILMS = (
     "eyeshell",
     "cornea",
@@ -35,7 +35,7 @@ _MARGIN = 0.04
 
 @dataclass(frozen=True)
 class Scene:
-    """The data of both views, in view axes (right, up, front) and file units."""
+    """The data of one view, in view axes (right, up, front) and file units."""
 
     shape: shade.Surface
     joints: Floats
@@ -44,11 +44,11 @@ class Scene:
 
 
 def scene(facts: Facts, lod: int) -> Scene:
-    """The meshes and joints of one level of detail, turned to face the viewer.
+    """The meshes and joints of one LOD, in view axes.
 
     Args:
         facts: facts of the face.
-        lod: from 0.
+        lod: number of the LOD, from 0.
     """
     dna = facts.dna
     axes = skeleton.view_axes(dna)
@@ -65,7 +65,7 @@ def scene(facts: Facts, lod: int) -> Scene:
 
 
 def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]]:
-    """The meshes of a level without transparent films, unless there are no others."""
+    """Names and meshes of a LOD without transparent films, unless it has nothing else."""
     wanted = listed(dna.lod_mesh_mapping, lod).tolist()
     found = [(dna.mesh_names[i], dna.meshes[i]) for i in wanted if i < len(dna.meshes)]
     solid = [(name, mesh) for name, mesh in found if not name.lower().startswith(_FILMS)]
@@ -74,7 +74,7 @@ def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]
 
 
 def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
-    """The lightness of each vertex: float64[V]. An eyeball gets an iris and a pupil."""
+    """float64[V]: lightness of each vertex; an eyeball gets an iris and a pupil."""
     points = np.asarray(mesh.positions, float).reshape(-1, 3) @ axes
     tone = np.ones(len(points))
     if not name.lower().startswith("eye") or not len(points):
@@ -90,19 +90,19 @@ def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
 
 
 def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
-    """Both views, on one scale.
+    """Draws both views at the same scale.
 
     Args:
-        canvas: the canvas.
+        canvas: receives the drawing.
         facts: facts of the rig.
-        lod: the level of detail of meshes and joints.
-        dpi: resolution of the images.
+        lod: number of the LOD, from 0.
+        dpi: resolution of the images in dots per inch.
     """
     seen = scene(facts, lod)
     if not len(seen.joints) and not len(seen.shape.triangles):
         canvas.say("This file has neither meshes nor joints.")
         return
-    # In the side view, the right of the picture is the back of the head.
+    # The face looks to the left of the side view.
     side = _turned(seen, np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], float))
     frames = [frame_of(seen), frame_of(side)]
     bottom, top = min(f[2] for f in frames), max(f[3] for f in frames)
@@ -135,20 +135,20 @@ def _words(seen: Scene) -> str:
 
 
 def frame_of(seen: Scene) -> tuple[float, float, float, float]:
-    """Left, right, bottom, top that contain the meshes, and joints that are near to them."""
+    """(left, right, bottom, top) that contain the meshes, and the joints near them."""
     used = seen.shape.points[np.unique(seen.shape.triangles)]
     joints = seen.joints[seen.shown]
     if len(used):
         low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
-        # The root of a spine may be metres below a head; the face is the subject.
+        # Distant joints are left out, because the root of a spine may be metres below a head.
         reach = 0.1 * float((high - low).max())
         near = np.all((joints[:, :2] > low - reach) & (joints[:, :2] < high + reach), axis=1)
-        # If most joints lie elsewhere it is not a face, and everything is shown.
+        # If most joints are distant, this is not a face, and all of them are shown.
         used = np.concatenate([used, joints[near] if 2 * near.sum() >= len(near) else joints])
     else:
         used = joints
     low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
-    # A single joint, or joints on one line, still give a picture with two dimensions.
+    # The frame of a single joint, or of joints on a line, still needs a width and a height.
     size = max(float((high - low).max()), 1e-3)
     pad = np.maximum(_MARGIN * size, (0.3 * size - (high - low)) / 2)
     (left, bottom), (right, top) = (low - pad).tolist(), (high + pad).tolist()
@@ -168,7 +168,7 @@ def _draw_view(
 
 
 def _draw_joints(axes: Axes, facts: Facts, seen: Scene) -> None:
-    """Draw far joints first and fainter, so that the near side of the head is recognisable."""
+    """Draws joints and bones; far joints first and fainter, so that the near side is clear."""
     if not len(seen.shown):
         return
     order = seen.shown[np.argsort(seen.joints[seen.shown, 2], kind="stable")]
@@ -176,7 +176,7 @@ def _draw_joints(axes: Axes, facts: Facts, seen: Scene) -> None:
     depth = points[:, 2] - points[:, 2].min()
     near = 1 - 0.75 * (1 - depth / max(float(depth.max()), 1e-9))
     many = len(order) > 100
-    # Hundreds of bones start at one root: drawn as strongly as a few they would hide the face.
+    # Hundreds of bones may start at one root; strong lines would hide the face.
     width, alpha = (0.4, 0.3) if many else (1.4, 0.6)
     lines = [seen.joints[pair][:, :2] for pair in seen.bones]
     axes.add_collection(

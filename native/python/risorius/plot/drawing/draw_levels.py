@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All levels of detail side by side: shaded meshes, and joints by region."""
+"""Draws all LODs of a face side by side: shaded meshes, and joints coloured by region."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from . import draw_face, shade
 from .paper import INK, Canvas, rgb
 
 COLUMNS = 4
-_HEAD = 0.62
+_HEAD = 0.62  # inches above a picture, for its title
 
 
 def height(count: int, width: float) -> float:
-    """Inches for this number of levels.
+    """The height in inches that the pictures need.
 
     Args:
-        count: number of levels.
-        width: width of the canvas, inches.
+        count: number of LODs.
+        width: width of the canvas in inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.2 * width / COLUMNS + _HEAD)
 
 
 def draw(canvas: Canvas, facts: Facts, words: Sequence[str], dpi: int) -> None:
-    """A head for each level with its edges and joints.
+    """Draws a head with its edges and joints for each LOD.
 
     Args:
-        canvas: the canvas.
+        canvas: receives the drawing.
         facts: facts of the face.
-        words: a line for each level.
-        dpi: resolution of the images.
+        words: text below the title of each LOD.
+        dpi: resolution of the images in dots per inch.
     """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")
@@ -64,7 +64,7 @@ def draw(canvas: Canvas, facts: Facts, words: Sequence[str], dpi: int) -> None:
 
 
 def _edges(axes: object, seen: draw_face.Scene) -> None:
-    """The triangles that face the viewer, if they are few enough to be distinguishable."""
+    """Draws the edges of triangles that face the viewer, unless there are too many to see."""
     points, triangles = seen.shape.points, seen.shape.triangles
     if not 0 < len(triangles) <= 6000:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The levels of detail: joints by region, and the amount of evaluation."""
+"""Draws bar charts of the LODs: joints by region, and numbers of evaluated parts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .paper import ACCENT, MUTED, RULE, Canvas, compact, heading
 
 
 def draw(canvas: Canvas, facts: Facts) -> None:
-    """A large panel of joints, and three small ones for the work of each level.
+    """Draws a large chart of joints, and three small charts of evaluated parts per LOD.
 
     Args:
-        canvas: the canvas.
+        canvas: receives the drawing.
         facts: facts of the face.
     """
     if not facts.lods:

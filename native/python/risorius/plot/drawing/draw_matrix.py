@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix by index, and with its rows regrouped into dense blocks."""
+"""Draws the joint matrix in the file's order, and regrouped into dense blocks."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _TITLES = {"raw": "raw controls", "psd": "correctives", "ml": "networks", "rbf":
 
 
 def draw(canvas: Canvas, facts: Facts, dpi: int) -> None:
-    """Both panels.
+    """Draws the matrix in both orders, side by side.
 
     Args:
-        canvas: the canvas.
+        canvas: receives the drawing.
         facts: facts of the rig.
-        dpi: resolution of the images.
+        dpi: resolution of the images in dots per inch.
     """
     if not facts.stored:
         canvas.say("This file has no joint matrix: no control moves a joint.")
@@ -69,7 +69,7 @@ def _show(axes: Axes, cells: matrix.Cells, facts: Facts, pixels: tuple[int, int]
 
 
 def _draw_kinds(axes: Axes, facts: Facts, columns: int) -> None:
-    """Borders between the kinds of control inputs, with their names below."""
+    """Draws borders between the kinds of controls, and their names below the matrix."""
     at, kinds = 0, [(_TITLES[kind], count) for kind, count in facts.controls if count]
     if columns > (known := sum(count for _, count in kinds)):
         kinds.append(("unknown", columns - known))
@@ -78,7 +78,7 @@ def _draw_kinds(axes: Axes, facts: Facts, columns: int) -> None:
     for edge in edges[1:-1]:
         axes.axvline(edge, color=INK, linewidth=0.9)
     for title, count in kinds:
-        # A stripe that is too narrow has no name.
+        # A kind with too few columns has no name.
         if count > 0.12 * columns:
             axes.annotate(
                 title, (at + count / 2, 0), (0, -20), axes.get_xaxis_transform(), "offset points",
@@ -91,7 +91,8 @@ def _draw_kinds(axes: Axes, facts: Facts, columns: int) -> None:
 
 
 def _draw_row_owners(axes: Axes, facts: Facts, rows: int) -> None:
-    """A stripe left of the matrix with the region of each row's group; lines separate groups."""
+    """Draws a stripe left of the matrix with the region of each row's joint group, and lines
+    between groups."""
     owner = np.full(rows, -1)
     for number, group in enumerate(facts.dna.joint_groups):
         owner[np.asarray(group.output_indices, np.int64)] = number
@@ -106,7 +107,7 @@ def _draw_row_owners(axes: Axes, facts: Facts, rows: int) -> None:
         lines.append([(0, 9 * first), (axes.get_xlim()[1], 9 * first)])
     patches = PatchCollection(stripes, facecolor=colors, edgecolor="none", clip_on=False)
     axes.add_collection(patches, autolim=False)
-    # If joint groups interleave, the lines between them would hide the coefficients.
+    # If joint groups interleave, a hundred lines and more would hide the coefficients.
     if len(lines) <= 100:
         axes.add_collection(LineCollection(lines, colors=MUTED, linewidths=0.35), autolim=False)
     axes.tick_params(axis="y", pad=9)
@@ -124,7 +125,7 @@ def _draw_regrouped(axes: Axes, facts: Facts, pixels: tuple[int, int]) -> None:
     )
     axes.set_xlabel("controls that the group reads", labelpad=6)
     axes.set_ylabel("rows, group after group", labelpad=6)
-    # The outline has the region's colour and shows how far the zeros at the rim extend.
+    # The outlines show the extent of blocks whose rim consists of zeros.
     frames = PatchCollection(
         [Rectangle((0, block.top), block.columns, block.rows) for block in blocks],
         facecolor="none",
@@ -143,7 +144,7 @@ def _darker(region: str) -> tuple[float, float, float]:
 def _draw_regions(
     axes: Axes, facts: Facts, blocks: list[matrix.Block], shape: tuple[int, int]
 ) -> None:
-    """To the right of the blocks: the name, the groups and the share of each region."""
+    """Writes name, number of groups and share of coefficients of each region beside the blocks."""
     rows, _ = shape
     stored = facts.stored
     spans = []
@@ -153,7 +154,7 @@ def _draw_regions(
             top, bottom = own[0].top, own[-1].top + own[-1].rows
             share = sum(block.rows * block.columns for block in own) / stored
             spans.append((region, top / rows, bottom / rows, len(own), share))
-    line = 0.052  # the height of two lines of text relative to the panel
+    line = 0.052  # height of two lines of text as a fraction of the panel
     wanted = [(top + bottom) / 2 for _, top, bottom, _, _ in spans]
     for (region, begin, end, count, share), y in zip(spans, _apart(wanted, line), strict=True):
         color = COLORS[region]
@@ -172,7 +173,7 @@ def _draw_regions(
 
 
 def _apart(places: list[float], gap: float) -> list[float]:
-    """Ascending places in 0..1, moved as little as needed to be `gap` apart."""
+    """Ascending positions from 0 to 1, moved as little as needed to be `gap` apart."""
     moved: list[float] = []
     for y in places:
         moved.append(max(y, moved[-1] + gap) if moved else max(y, gap / 2))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sizes: a bar for each layer of the file, optionally with the counts."""
+"""Draws a bar for the size of each layer of the file, optionally with the counts."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .paper import ACCENT, INK, MUTED, RULE, Canvas, heading
 
 
 def draw(canvas: Canvas, facts: Facts, with_counts: bool) -> None:
-    """Bars of bytes.
+    """Draws the bars, and the counts if requested.
 
     Args:
-        canvas: the canvas.
+        canvas: receives the drawing.
         facts: facts of the face.
-        with_counts: also draw the counts, if there is no table beside the picture.
+        with_counts: whether to draw the counts, which the HTML page has in a table.
     """
     high, counted = canvas.height - 0.7, 3.1 if with_counts else 0.0
     _draw_bars(canvas.place(2.35, 0.2, canvas.width - 2.7 - counted, high), facts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The style of all drawings; Matplotlib's global settings are restored afterwards."""
+"""The style of all drawings, and a canvas with sizes in inches."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from matplotlib.figure import FigureBase
 
 from ..content.regions import COLORS
 
-# The page finds these exact values in the SVG text and replaces them with its theme's variables.
+# page.py replaces these exact values in the SVG text by variables of its theme.
 INK = "#1d232b"
 MUTED = "#66707d"
 RULE = "#d4dae1"
@@ -43,21 +43,21 @@ _SETTINGS: dict[Any, Any] = {
     "figure.facecolor": "none",
     "savefig.facecolor": "none",
     "svg.fonttype": "path",
-    "svg.hashsalt": "risorius",  # the same rig gives the same page
+    "svg.hashsalt": "risorius",  # makes the SVG of a rig reproducible
     "image.composite_image": False,
-    "text.parse_math": False,  # names from files may hold dollar signs
+    "text.parse_math": False,  # names from files may contain dollar signs
 }
 
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """Apply our style inside the context and restore the caller's settings afterwards."""
+    """Applies the style inside the context, and restores the caller's settings afterwards."""
     log = logging.getLogger("matplotlib.font_manager")
     level = log.level
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
-        # A name may have letters that the font lacks: a box is drawn without a warning.
+        # For letters that the font lacks a box is drawn, without a warning.
         warnings.filterwarnings("ignore", "Glyph")
         log.setLevel(logging.ERROR)
         try:
@@ -67,24 +67,24 @@ def settings() -> Iterator[None]:
 
 
 def rgb(region: str) -> npt.NDArray[np.float64]:
-    """The colour of a region: float64[3] in 0..1."""
+    """float64[3] in 0..1: the colour of a region."""
     return np.array(to_rgb(COLORS[region]))
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """A figure, or a part of one, with a size in inches, so that text keeps its distances."""
+    """A figure, or a part of one, and its size in inches, in which drawings measure distances."""
 
     figure: FigureBase
     width: float
     height: float
 
     def place(self, left: float, bottom: float, width: float, height: float) -> Axes:
-        """Axes with only the lower and the left line.
+        """Adds axes that show only their lower and left line.
 
         Args:
-            left, bottom: of the axes, inches from the lower left of the canvas.
-            width, height: inches.
+            left, bottom: lower left corner of the axes, in inches from that of the canvas.
+            width, height: size of the axes in inches.
         """
         part = (left / self.width, bottom / self.height, width / self.width, height / self.height)
         axes = self.figure.add_axes(part)
@@ -92,17 +92,17 @@ class Canvas:
         return axes
 
     def say(self, sentence: str) -> None:
-        """A sentence in place of a drawing."""
+        """Writes a sentence in place of a drawing."""
         self.figure.text(0.5, 0.5, sentence, ha="center", va="center", color=MUTED, fontsize=12)
 
 
 def heading(axes: Axes, text: str, under: str = "") -> None:
-    """The name of a panel, left-aligned above it.
+    """Writes the name of a panel, left-aligned above it.
 
     Args:
         axes: axes of the panel.
-        text: the name.
-        under: a line of numbers under the name.
+        text: the name of the panel.
+        under: a line of numbers below the name, or "".
     """
     lift = 22 if under else 8
     axes.annotate(
@@ -117,7 +117,7 @@ def heading(axes: Axes, text: str, under: str = "") -> None:
 
 
 def compact(value: float) -> str:
-    """A count with few digits: 940, 5.2k, 1.08M."""
+    """A count as text with few digits: 940, 5.2k, 1.08M."""
     if value < 1000:
         return f"{value:.0f}"
     if value < 100_000:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Renders softly lit meshes: a small depth-buffer renderer in NumPy.
 
-Triangles are cut into rows of pixels, all at once, so that the work grows with the covered pixels:
-a head of 50,000 triangles takes about a second without any simplification.
+Triangles are split into rows of pixels, all at once, so the duration depends on the number of
+covered pixels: a head of 50,000 triangles takes about a second.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 _KEY = np.array([-0.35, 0.55, 0.76])  # light from above and a little from the left
-_FILL = np.array([0.8, 0.1, 0.6])
-_BATCH = 1 << 20  # pixels at a time, which limits the memory to about 150 MB
+_FILL = np.array([0.8, 0.1, 0.6])  # light from the right
+_BATCH = 1 << 20  # pixels per batch, which limits the memory to about 150 MB
 
 
 @dataclass(frozen=True)
 class Surface:
-    """float64[V, 3] points and normals in view axes, int64[F, 3] triangles, and the paint of the
-    vertices: float64[V], lightness of clay, or float64[V, 3], a colour that multiplies clay."""
+    """Triangles with points and normals in view axes. paint: float64[V], a lightness with 1 for
+    clay, or float64[V, 3], a colour; both are multiplied by the clay's colour."""
 
     points: Floats
     normals: Floats
@@ -36,12 +36,12 @@ class Surface:
 
 
 def triangles_of(mesh: risorius.Mesh) -> Ints:
-    """The faces of a mesh as fans of triangles: int64[F, 3] of position indices."""
+    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of positions."""
     return np.asarray(mesh.layout_positions, np.int64)[corners_of(mesh)]
 
 
 def corners_of(mesh: risorius.Mesh) -> Ints:
-    """The faces of a mesh as fans of triangles: int64[F, 3] of layouts."""
+    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of layouts."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.face_layouts, np.int64)
     if len(offsets) < 2:
@@ -53,13 +53,12 @@ def corners_of(mesh: risorius.Mesh) -> Ints:
 
 
 def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> Surface:
-    """Several meshes as one surface in view axes.
+    """Combines meshes to one surface in view axes.
 
     Args:
         meshes: the meshes.
-        paints: for each mesh float64[V], lightness of its vertices, 1 is clay; or for all meshes
-            float64[V, 3], a colour that multiplies clay.
-        axes: float64[3, 3] from file axes to right, up, front.
+        paints: paint of each mesh, see Surface.
+        axes: float64[3, 3], maps file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
     for mesh, tone in zip(meshes, paints, strict=True):
@@ -75,7 +74,7 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
 
 
 def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """Area-weighted vertex normals, because the file's may be missing or split along seams.
+    """Area-weighted vertex normals; the file's normals may be missing or split along seams.
 
     Args:
         points: float64[V, 3].
@@ -99,16 +98,16 @@ def vertex_normals(points: Floats, triangles: Ints) -> Floats:
 def render(
     shape: Surface, frame: tuple[float, float, float, float], height: int, smooth: int = 2
 ) -> npt.NDArray[np.uint8]:
-    """The surface seen along -z.
+    """Renders a surface that is seen along -z.
 
     Args:
-        shape: x to the right, y up, z towards the viewer.
+        shape: the surface: x to the right, y up, z towards the viewer.
         frame: left, right, bottom, top of the picture in the surface's units.
         height: height of the picture in pixels; the width follows from the frame.
-        smooth: samples per pixel in each direction, which are averaged for soft edges.
+        smooth: samples per pixel in each direction, which are averaged.
 
     Returns:
-        uint8[h, w, 4], RGBA, transparent outside of the surface.
+        uint8[h, w, 4], RGBA, transparent outside the surface.
     """
     left, right, bottom, top = frame
     scale = height * smooth / (top - bottom)
@@ -158,7 +157,7 @@ def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tupl
 
 
 def _slopes(corners: Floats) -> Floats:
-    """The weight of each corner as a plane a x + b y + c: float64[F, 3, 3]; NaN for slivers."""
+    """float64[F, 3, 3]: a, b, c of each corner's weight a x + b y + c; NaN for slivers."""
     ahead, behind = np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
     along = ahead[:, :, 1] - behind[:, :, 1]
     across = behind[:, :, 0] - ahead[:, :, 0]
@@ -171,7 +170,7 @@ def _slopes(corners: Floats) -> Floats:
 def _rows(
     screen: Floats, triangles: Ints, slopes: Floats, size: tuple[int, int]
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """Each row of pixels of each triangle: triangle, y, first x, number of pixels."""
+    """The rows of pixels of all triangles: triangle, y, first x, number of pixels of each."""
     high, wide = size
     y = screen[triangles, 1]
     first = np.clip(np.ceil(y.min(axis=1, initial=high)), 0, high).astype(np.int64)
@@ -188,7 +187,7 @@ def _rows(
         low = np.where(along > 0, np.maximum(low, edge), low)
         end = np.where(along < 0, np.minimum(end, edge), end)
         end = np.where((along == 0) & (rest < -1e-9), -1.0, end)
-    # Extends slightly over the edge, so that no gap opens between adjacent triangles.
+    # Extends slightly beyond the edge, so that no gap opens between adjacent triangles.
     low = np.ceil(np.minimum(low, wide) - 1e-6).astype(np.int64)
     pixels = np.floor(np.maximum(end, -1) + 1e-6).astype(np.int64) - low + 1
     kept = pixels > 0
@@ -198,7 +197,7 @@ def _rows(
 def _batches(
     owner: Ints, row: Ints, low: Ints, count: Ints
 ) -> Iterator[tuple[Ints, Ints, Ints, Ints]]:
-    """The rows in batches of a limited number of pixels."""
+    """Splits the rows into batches with a limited number of pixels."""
     runs = np.cumsum(count) // _BATCH
     edges = [0, *(np.flatnonzero(np.diff(runs)) + 1).tolist(), len(owner)]
     for first, last in pairwise(edges):
@@ -207,7 +206,7 @@ def _batches(
 
 
 def _lit(normals: Floats, paint: Floats) -> Floats:
-    """Clay under two soft lights: float64[N, 3]. Faces are lit on both sides."""
+    """float64[N, 3]: colours of clay under two soft lights, on both sides of a surface."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0, length, 1)
     normals = normals * np.where(normals[:, 2:] < 0, -1, 1)
@@ -221,7 +220,7 @@ def _lit(normals: Floats, paint: Floats) -> Floats:
 
 
 def _averaged(picture: Floats, smooth: int) -> npt.NDArray[np.uint8]:
-    """Average blocks of samples to pixels; the colour is the mean of covered samples only."""
+    """Averages blocks of samples to pixels; only covered samples count for the colour."""
     high, wide = picture.shape[0] // smooth, picture.shape[1] // smooth
     blocks = picture.reshape(high, smooth, wide, smooth, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))

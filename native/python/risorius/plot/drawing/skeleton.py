@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Joint positions in the neutral pose, and the file's axes turned so that the face looks at the
-viewer.
+"""Computes joint positions in the neutral pose, and axes in which the face looks at the viewer.
 
-Row vectors, as everywhere in DNA files: v' = v * M.
+Vectors are rows, as everywhere in DNA files: v' = v * M.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from risorius.rigs.rotation import Convention
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# right, up, front: x to the viewer's right, y up, z out of the picture.
+# File axis -> (right, up, front): x to the viewer's right, y up, z towards the viewer.
 _DIRECTIONS = {
     "left": (-1, 0, 0),
     "right": (1, 0, 0),
@@ -28,14 +27,14 @@ _DIRECTIONS = {
 
 
 def view_axes(dna: risorius.Dna) -> Floats:
-    """The matrix from file axes to (right, up, front): float64[3, 3], a point is p @ matrix."""
+    """float64[3, 3]: maps file axes to (right, up, front), as point @ matrix."""
     matrix = np.array([_DIRECTIONS.get(a, (0, 0, 0)) for a in dna.coordinate_system], float)
-    # Dependent axes give no frame; the usual y up is then the best guess.
+    # If the file's axes are not independent, x right, y up, z front is the best guess.
     return matrix if abs(np.linalg.det(matrix)) > 0.5 else np.eye(3)
 
 
 def rotations(dna: risorius.Dna) -> Floats:
-    """The neutral rotation of each joint relative to its parent: float64[J, 3, 3], row vectors."""
+    """float64[J, 3, 3]: neutral rotation of each joint relative to its parent, for row vectors."""
     convention = Convention.of(dna)
     angles = _rows(dna.neutral_joint_rotations, len(dna.joint_names))
     angles = angles * convention.radians * convention.signs
@@ -46,7 +45,7 @@ def rotations(dna: risorius.Dna) -> Floats:
 
 
 def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
-    """float64[count, 3], zero for missing rows."""
+    """float64[count, 3]: finite values, 0 for missing rows."""
     rows = np.zeros((count, 3))
     given = np.asarray(values, float).reshape(-1, 3)[:count]
     rows[: len(given)] = np.nan_to_num(given, posinf=0.0, neginf=0.0)
@@ -54,7 +53,7 @@ def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
 
 
 def _about(axis: int, angles: Floats) -> Floats:
-    """Rotations about one axis by angles in radians: float64[J, 3, 3]."""
+    """float64[J, 3, 3]: rotations about one axis by angles in radians."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     turn = np.zeros((len(angles), 3, 3))
     turn[:, axis, axis] = 1
@@ -64,7 +63,7 @@ def _about(axis: int, angles: Floats) -> Floats:
 
 
 def parents(dna: risorius.Dna) -> Ints:
-    """int64[J]; a joint without a valid parent is its own parent, like a root."""
+    """int64[J]: parents; a joint without a valid parent is its own parent, like a root."""
     count = len(dna.joint_names)
     own = np.arange(count)
     found = np.asarray(dna.joint_parents, np.int64)[:count]
@@ -74,18 +73,15 @@ def parents(dna: risorius.Dna) -> Ints:
 
 
 def world_positions(dna: risorius.Dna) -> Floats:
-    """Joint positions in the neutral pose: float64[J, 3], file units and file axes.
-
-    From: neutral translations and rotations, composed from the roots down.
-    """
+    """float64[J, 3]: joint positions in the neutral pose, in file units and file axes."""
     above = parents(dna)
     positions, turns = _rows(dna.neutral_joint_translations, len(above)), rotations(dna)
     done = above == np.arange(len(above))
     while not done.all():
-        # One generation at a time, because a face's hierarchy is wide and shallow.
+        # All joints of one generation together, because a face's hierarchy is wide and shallow.
         ready = ~done & done[above]
         if not ready.any():
-            break  # parents in a cycle: their joints keep local positions
+            break  # parents form a cycle: their joints keep local positions
         up = above[ready]
         positions[ready] = np.einsum("ni,nij->nj", positions[ready], turns[up]) + positions[up]
         turns[ready] = turns[ready] @ turns[up]

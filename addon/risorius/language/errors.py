@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Translates error messages of the package `risorius`.
+
+The package knows no languages: its messages are finished English sentences. errors_<language>.toml
+has a row for each message, with {names} for the values in it. A message is compared with the rows,
+and its values are put into the translation.
+
+A row of little text, such as "{range} was expected, found {found}", matches many messages, and a
+message can have places before it: "take.csv, line 3: a number was expected". So all rows that match
+the message, or its end after places, are tried, and the one that translates most letters is taken.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache, lru_cache
+from typing import NamedTuple
+
+from . import tables
+
+_SLOT = re.compile(r"\{(\w+)\}")
+_DEEPEST = 4  # messages inside a message: a file, a row, a cell, a reason
+_MOST_PLACES = 5  # before a message
+_LONGEST = 1000  # letters of a message; the time grows faster than its length
+
+
+class _Row(NamedTuple):
+    pattern: re.Pattern[str]
+    piece: str
+    """The longest text between its values; a message without it does not match."""
+    letters: int
+    """Letters beside the values."""
+    translation: str
+
+
+class _Found(NamedTuple):
+    text: str
+    letters: int = 0
+    """English letters that were translated."""
+
+
+def local(message: str, language: str) -> str:
+    """A message of the package in a language; what has no row stays English.
+
+    Args:
+        message: the English message.
+        language: a language of `tables.languages`, or "" for English.
+    """
+    return best(message, language, 0).text if language else message
+
+
+@lru_cache(maxsize=512)  # panels show the same message at each redraw
+def best(message: str, language: str, depth: int) -> _Found:
+    """The translation of most letters; one word, which is a name or a number, has none.
+
+    Args:
+        message: as of `local`.
+        language: as of `local`, not "".
+        depth: number of messages around this one.
+    """
+    found = _Found(message)
+    if " " not in message or len(message) > _LONGEST or depth > _DEEPEST:
+        return found
+    parts = message.split(": ")
+    for places in range(min(len(parts), _MOST_PLACES + 1)):
+        rest = ": ".join(parts[places:])
+        for row in rows(language):
+            match = row.piece in rest and row.pattern.fullmatch(rest)
+            if match:
+                inside = {k: best(v, language, depth + 1) for k, v in match.groupdict().items()}
+                before = [best(place, language, depth + 1) for place in parts[:places]]
+                letters = row.letters + sum(f.letters for f in (*inside.values(), *before))
+                if letters > found.letters:
+                    text = row.translation.format(**{k: f.text for k, f in inside.items()})
+                    found = _Found(": ".join([*(f.text for f in before), text]), letters)
+    return found
+
+
+@cache
+def rows(language: str) -> list[_Row]:
+    """The rows of a language. Args: language: as of `local`, not ""."""
+    return [_row(*row) for row in tables.error_rows(language).items()]
+
+
+def _row(english: str, translation: str) -> _Row:
+    parts = _SLOT.split(english)
+    names = [f"(?P<{part}>.+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts)]
+    return _Row(
+        re.compile("".join(names), re.DOTALL),
+        max(parts[::2], key=len),
+        sum(letter.isalpha() for part in parts[::2] for letter in part),
+        translation,
+    )
