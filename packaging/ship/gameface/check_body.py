@@ -86,7 +86,8 @@ async def main(folder: Path, face: Path, body: Path | None) -> None:
     if body is None:
         from body_maker import BodyFile
 
-        body = folder / "body.glb"
+        body = folder / "bodies" / "body.glb"  # not one of the files that the validator reads
+        body.parent.mkdir(exist_ok=True)
         body.write_bytes(BodyFile(prefix="mixamorig").data())
     dna = long_haired(face)
     rig = risorius.Rig(dna)

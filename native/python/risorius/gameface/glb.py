@@ -22,11 +22,13 @@ _VERTICES, _CORNERS = 34962, 34963
 
 
 class Glb:
-    """Attributes:
-    table: the JSON; whoever writes nodes and meshes adds to its lists.
-    pictures: name of a picture of the face -> its texture.
-    packs: lists of vertices and corners are packed by meshoptimizer.
-    sparse: lists that hold zeros for the most part are kept by their other rows.
+    """The JSON table and the binary buffer of a GLB file under construction.
+
+    Attributes:
+        table: the JSON; callers append nodes and meshes to its lists.
+        packs: whether vertices and triangles are packed with meshoptimizer.
+        sparse: whether an accessor of mostly zero rows stores only its other rows.
+        pictures: name of a picture of the face -> its texture.
     """
 
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:

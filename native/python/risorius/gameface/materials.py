@@ -33,7 +33,7 @@ _PLAIN = {
 }  # fmt: skip
 _WET = 0.06  # opacity of tears and corneas
 _SMOOTH = {"magFilter": 9729, "minFilter": 9987}  # a sampler
-_CUT = 0.35  # opacity below which hair is not there
+_CUT = 0.35  # opacity below which hair is cut away
 
 
 class Materials:

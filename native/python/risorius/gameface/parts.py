@@ -26,7 +26,7 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
-_FARTHEST = 1e4  # metres
+_FARTHEST = 1e4  # metres: a vertex farther away is an error
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,14 @@ class Points:
         self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles,
         move: Doubles | None = None,
     ) -> None:  # fmt: skip
-        """Of a level.
+        """Prepares the vertices of a LOD.
 
         Args:
-            dna: with geometry.
-            rig: of it.
-            lod: of the file.
-            skeleton: of its joints.
-            axes: as axes_of gives them.
+            dna: face with geometry.
+            rig: compiled from it.
+            lod: number of the LOD.
+            skeleton: joints of the exported file.
+            axes: from axes_of.
             move: float64[3], metres that the face moves to the body that it hangs on.
         """
         surface = Surface(dna, rig, lod)

@@ -16,20 +16,20 @@ class Wishes:
     """Options of the glTF export.
 
     Attributes:
-        shapes: groups of targets, of GROUPS.
-        lod: the level of detail.
-        skeleton: root, neck, head, jaw and eyes are joints.
-        sparse, quantize, meshopt: how lists are kept.
-        normals: targets change normals too.
-        textures: pixels of the longer side of a picture at most.
-        mb: megabytes that the file may have, None: any number.
-        most: targets that the client takes, None: any number.
-        within: millimetres that sums of two may deviate; the driver adds what is missing. None: no
-            driver.
-        frames: of typical captures, unit of ARKit -> weight: combinations are fitted to them too.
-        humanoid: of avatar.humanoid.KINDS: missing bones are made up; "": none.
-        vrm: 1.0 or 0.x, "": a glTF that is no VRM.
-        licence: fields of a VRM, as avatar.licence asks for them.
+        shapes: groups of targets, some of GROUPS.
+        lod: number of the LOD.
+        skeleton: whether to write joints of root, neck, head, jaw and eyes.
+        sparse, quantize, meshopt: storage of accessors, see Glb and the two glTF extensions.
+        normals: whether targets change normals too.
+        textures: largest number of pixels of a picture's longer side.
+        mb: size limit of the file in MB, None for no limit.
+        most: largest number of targets that the client takes, None for no limit.
+        within: allowed deviation of sums of two targets in mm; combinations correct larger ones.
+            None: no combinations.
+        frames: typical captured frames, ARKit unit -> weight: combinations are fitted to them too.
+        humanoid: one of avatar.humanoid.KINDS, which adds missing bones; "": none.
+        vrm: version "1.0" or "0.x"; "": plain glTF.
+        licence: licence fields of a VRM, checked by avatar.licence.
         body: a character in glTF or VRM that the face is hung on; None: the face alone.
         body_scale: metres of a unit of the body; None: found by its height.
         without: names of meshes of the body, or of the face, that are left out.

@@ -66,12 +66,12 @@ def write(
     """Writes the glTF file.
 
     Args:
-        points: of the level.
-        skeleton: of the face, written where wished.
-        materials: of the face.
-        changes: the targets in the order in which meshes have them.
-        wishes: how lists are kept.
-        manner: of the face, for a VRM.
+        points: vertices of the LOD.
+        skeleton: joints of the face, written if wishes.skeleton is set.
+        materials: materials of the face.
+        changes: morph targets in the order of the file.
+        wishes: export options.
+        manner: measured VRM values of the face.
         body: that the skeleton hangs on; None: the face alone.
         chains: joints of the skeleton that swing.
     """
@@ -107,7 +107,7 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = self._joints(nodes) if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
+        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))

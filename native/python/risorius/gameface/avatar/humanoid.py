@@ -125,7 +125,7 @@ def bone_of(joint: str) -> str:
 
 
 def _plain(joint: str) -> tuple[str, str]:
-    """A joint's name without separators, and its side."""
+    """A joint's name without separators and side, and its side."""
     # Loaders drop the colon of mixamorig:Hips.
     name = re.sub(r"^(mixamorig\d*_?|j_(bip|adj)_(c_)?)", "", re.sub(r"^.*:", "", joint.lower()))
     for side in _SIDES:

@@ -71,12 +71,12 @@ class Avatar:
     """Input of the VRM tables.
 
     Attributes:
-        bones: VRM's name of a bone -> node.
-        eyes: metres from the head's joint to the middle of the eyes.
-        meshes: those of the file.
-        own: names of targets that are expressions by their own name.
-        said: the licence.
-        manner: what was measured.
+        bones: VRM name of a bone -> number of its node.
+        eyes: offset in metres from the head's joint to the midpoint of the eyes.
+        meshes: the meshes of the file.
+        own: names of targets that become custom expressions.
+        said: the licence fields.
+        manner: the measured values.
         plain: number of a material -> what VRM 0.x says of it, where a body has said so.
         springs: chains that swing.
     """

@@ -160,7 +160,8 @@ class _Reader:
         for group in found if isinstance(found, list) else []:
             if not isinstance(group, int) or not 0 <= group < len(groups):
                 raise self._body.document.fail(
-                    f"{place}.colliderGroups", f"groups below {len(groups)}, found {shown(group)}"
+                    f"{place}.colliderGroups",
+                    f"groups below {len(groups)} were expected, found {shown(group)}",
                 )
             out += groups[group]
         if any(not isinstance(c, int) or not 0 <= c < count for c in out):

@@ -24,7 +24,7 @@ _FLIP = np.array([-1.0, 1.0, -1.0])
 
 @dataclass
 class Put:
-    """What a body has become in a file.
+    """The meshes, materials and springs of a body in a file.
 
     Attributes:
         meshes: with the numbers of their nodes and meshes.

@@ -27,7 +27,7 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     more than 3 cm. The root of the face becomes the node below the body's neck.
 
     Args:
-        skeleton: of the face, as it has it.
+        skeleton: of the face alone.
         body: with its bones.
 
     Raises:

@@ -33,14 +33,16 @@ ROOT = {"mixamo": "Armature"}  # TalkingHead looks for this name
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Attributes:
-    names: of its joints, the root first; each stands behind its parent.
-    parents: -1 for the root.
-    places: float64[n, 3], metres, in the axes of glTF.
-    of_joint: int64[joints of the file], which of these each hangs on.
-    head: the joint that takes what hangs on none.
-    turns: float64[n, 3, 3], from each joint's axes to those of glTF.
-    bones: VRM's name of a bone -> its joint here.
+    """The joints of the exported file.
+
+    Attributes:
+    names: names of the joints, the root first, parents before children.
+    parents: index of each parent, -1 for the root.
+    places: float64[n, 3], positions in metres in glTF's axes.
+    of_joint: int64[joints of the DNA file], the joint here that each one follows.
+    head: index of the head's joint, which also takes vertices without a joint.
+    turns: float64[n, 3, 3], rotation from each joint's axes to glTF's.
+    bones: VRM name of a bone -> index of its joint here.
     hooks: joint -> node of a body that it hangs on; the root is that node itself.
     """
 
@@ -107,7 +109,7 @@ def find_skeleton(
 
 
 def facing_back(skeleton: Skeleton) -> Skeleton:
-    """The same, turned about the vertical: VRM 0.x looks against z. Args: skeleton: upright."""
+    """A skeleton rotated by 180° about y, for VRM 0.x. Args: skeleton: facing +z."""
     turns = np.tile(np.eye(3), (len(skeleton.names), 1, 1))  # VRM 0.x turns no bone
     return replace(skeleton, places=skeleton.places * [-1.0, 1.0, -1.0], turns=turns)
 
