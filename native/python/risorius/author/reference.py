@@ -221,7 +221,9 @@ def refit(
         if dna.mesh_names[m] in reference.weights
     }
     if sorted(weights) != sorted(shaped):
-        raise ArgumentError("meshes move that the face whose joints it is to have leaves still")
+        raise ArgumentError(
+            "meshes move that do not move in the face (like) whose joints it is to have"
+        )
     used = given(work)
     own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])
     edges, begin = [], 0

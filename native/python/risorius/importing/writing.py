@@ -80,7 +80,9 @@ def curve_table_text(clip: Clip, *, is_json: bool) -> str:
     _check_finite(clip, "a curve table")
     names = [_UNREAL.sub("_", name) for name in clip.names]
     if twice := [name for name in names if names.count(name) > 1]:
-        raise ArgumentError(f"{twice[0]}: curves of other names were expected, several get this")
+        raise ArgumentError(
+            f"{twice[0]}: each curve needs a name of its own, but several curves get this name"
+        )
     times = [f"{time:.6f}".rstrip("0").rstrip(".") for time in clip.frame_times().tolist()]
     rows = [list(map(_shortest, curve)) for curve in clip.curves]
     if is_json:

@@ -54,7 +54,7 @@ def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
         yield _message(data)
         return
     if depth == _DEEPEST:
-        raise LiveError("bundles inside bundles, too deep")
+        raise LiveError("OSC bundles are nested too deep")
     place = 16
     while place < len(data):
         if len(data) < place + 4:

@@ -83,7 +83,7 @@ def transfer(
     lying = Surface(points, face.surface.triangles)
     spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
     if not (spreading.known > 0.1).any():
-        raise AnyHeadError("the template lies on no part of the head: landmarks may be wrong")
+        raise AnyHeadError("the fitted template touches no part of the head: check the landmarks")
     _tell(progress, 0.2)
     out: dict[Pose, Floats] = {}
     poses = list(ways)

@@ -73,7 +73,7 @@ def find_skeleton(
     """
     found = _own(dna, is_body=is_body or bool(kind))
     if kind and "head" not in found:
-        raise GameFaceError("a joint called head was expected, which a humanoid hangs on")
+        raise GameFaceError("a joint called head was expected, because the humanoid bones need it")
     parents = np.asarray(dna.joint_parents, np.int64)
     world = world_matrices(dna, np.zeros((len(parents), 9)))[:, :3, 3] @ axes.T
     # A file may list parents before or after their children: each chain is followed to the root.
