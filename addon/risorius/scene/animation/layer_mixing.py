@@ -381,7 +381,7 @@ def _action_source(
     frames = logic.sample_frames(span, keys, any(clip_actions.is_bent(c) for c in curves))
     clip = clip_actions.clip_of_action(controls, live, action, frames, rate)
     if not clip.names:
-        raise FaceError(told("{action} has no keys of a control of this face", action=action.name))
+        raise FaceError(told("{action} has no keys for controls of this face", action=action.name))
     if clip.frame_count < 2:
         return clip, _still_times(layer, rate)
     return clip, _span_times(span, rate)

@@ -52,15 +52,23 @@ def _still(
 class RISORIUS_PG_warp(bpy.types.PropertyGroup):
     """A frame of the scene and the frame of the source that is shown there."""
 
-    frame: _still(bpy.props.FloatProperty, name="Frame", description="Of the scene")
-    source: _still(bpy.props.FloatProperty, name="Shows", description="Frame of the source")
+    frame: _still(
+        bpy.props.FloatProperty,
+        name="Frame",
+        description="Frame of the scene at which the layer shows the other frame",
+    )
+    source: _still(
+        bpy.props.FloatProperty, name="Shows", description="Frame of the layer's own animation"
+    )
 
 
 class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
     """A reaction that is fired at a frame."""
 
     name: _still(bpy.props.StringProperty, name="Reaction")
-    frame: _still(bpy.props.FloatProperty, name="Frame", description="Frame of the reaction")
+    frame: _still(
+        bpy.props.FloatProperty, name="Frame", description="Frame at which the reaction begins"
+    )
     strength: _still(
         bpy.props.FloatProperty, name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
     )
@@ -136,7 +144,11 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     fade_in: _still(bpy.props.FloatProperty, name="Fade In", description="Frames", min=0.0)
     fade_out: _still(bpy.props.FloatProperty, name="Fade Out", description="Frames", min=0.0)
     mute: _still(bpy.props.BoolProperty, name="Mute")
-    solo: _still(bpy.props.BoolProperty, name="Solo", description="Only this and other solo layers")
+    solo: _still(
+        bpy.props.BoolProperty,
+        name="Solo",
+        description="Play only this layer and other solo layers",
+    )
     # Keys and drivers name a layer by its index in the collection. So the index must not change,
     # and order and removal are stored as properties.
     rank: _still(bpy.props.IntProperty, options={"HIDDEN"})

@@ -227,7 +227,9 @@ def _back_up(
     if bound:
         change.report.append(
             told(
-                "{name} has new faces: bind {bound} again.", name=item.name, bound=", ".join(bound)
+                "{name} has new polygons: bind {bound} again.",
+                name=item.name,
+                bound=", ".join(bound),
             )
         )
     if not things:
@@ -237,8 +239,10 @@ def _back_up(
     copy.use_fake_user = True
     change.report.append(
         told(
-            "{name} has new faces: {things} were carried over by the nearest point as far as "
-            "that goes; the mesh {copy} keeps them as they were.",
+            (
+                "{name} has new polygons: {things} were transferred from the nearest "
+                "points where possible; the mesh {copy} keeps the originals."
+            ),
             name=item.name,
             things=", ".join(things),
             copy=copy.name,

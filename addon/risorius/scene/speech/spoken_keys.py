@@ -233,14 +233,22 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
         )
     if action.library is not None:
         raise SpokenError(
-            told("{action} is of another file: make it local to correct it", action=action.name)
+            told(
+                (
+                    "{action} is linked from another file: make the action local to correct "
+                    "its sounds"
+                ),
+                action=action.name,
+            )
         )
     curves = {c.data_path: c for c in compat.curves_of(action)}
     if not any(parts.property_path(name) in curves for name in _Mouth(action).names()):
         raise SpokenError(
             told(
-                "{action} moves no slider of the mouth: where the board leads, its handles have "
-                "the voice's keys",
+                (
+                    "{action} moves no slider of the mouth: if the face board moves the "
+                    "face, the keys of the voice are on the handles of the board"
+                ),
                 action=action.name,
             )
         )

@@ -95,7 +95,7 @@ def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
 
 
 class RISORIUS_OT_self_test(Operator):
-    """Load, evaluate, write, read and time on this machine; the report goes to the clipboard"""
+    """Test and time on this machine how faces load, move and are written; copy a report"""
 
     bl_idname = "risorius.self_test"
     bl_label = "Self-Test"

@@ -179,10 +179,12 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         description=("Use the face of some samples of the file as the neutral face"),
     )
     neutral_first: bpy.props.IntProperty(
-        name="Neutral From", description="Sample of the file, from 0", min=0
+        name="Neutral From",
+        description="Number of the first neutral sample, from 0",
+        min=0,
     )
     neutral_last: bpy.props.IntProperty(
-        name="Neutral To", description="Last of these samples", min=0
+        name="Neutral To", description="Number of the last neutral sample, from 0", min=0
     )
     use_eyes: bpy.props.BoolProperty(
         name="Turn Eye Bones",
@@ -383,7 +385,8 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
     bl_label = "From ARKit Rig"
 
     start: bpy.props.FloatProperty(
-        name="Start Frame", description="Where frame 0 of the other rig's animation lies"
+        name="Start Frame",
+        description="Frame of the scene for frame 0 of the other rig's animation",
     )
     source: bpy.props.StringProperty(
         name="Object",

@@ -37,7 +37,9 @@ class PlacesClip(FaceOperator):
     """Properties and methods of all operators that place a clip on the active face."""
 
     target: bpy.props.EnumProperty(
-        name="As", description="How the animation is played", items=TARGETS
+        name="As",
+        description="Where the animation is stored: an action, an NLA strip or a layer",
+        items=TARGETS,
     )
     start: bpy.props.FloatProperty(
         name="Start Frame",
@@ -47,7 +49,9 @@ class PlacesClip(FaceOperator):
         default=1.0,
     )
     scene_range: bpy.props.EnumProperty(
-        name="Scene Range", description="First and last frame of the scene", items=RANGES
+        name="Scene Range",
+        description="Change of the first and last frame of the scene",
+        items=RANGES,
     )
 
     use_rest: bpy.props.BoolProperty(

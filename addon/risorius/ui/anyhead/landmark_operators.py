@@ -142,7 +142,9 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
     bl_label = "Place Landmark"
 
     landmark: bpy.props.StringProperty(
-        name="Landmark", description="Its name, as eye_inner_L", options={"SKIP_SAVE"}
+        name="Landmark",
+        description="Name of the landmark, such as eye_inner_L",
+        options={"SKIP_SAVE"},
     )
     way: bpy.props.EnumProperty(
         name="Where",
@@ -237,7 +239,7 @@ class _OfLandmarks(OfHead):
 
 
 class RISORIUS_OT_clear_landmarks(_OfLandmarks, Operator):
-    """Take the landmarks of this head away, also those that you placed"""
+    """Remove all landmarks of this head, including landmarks that you placed"""
 
     bl_idname = "risorius.clear_landmarks"
     bl_label = "Remove Landmarks"
@@ -293,7 +295,7 @@ class RISORIUS_OT_save_landmarks(_OfLandmarks, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_landmarks(OfHead, Operator, ImportHelper):
-    """Take the landmarks of this head from a file; what you placed before gives way"""
+    """Load the landmarks of this head from a file; they replace the landmarks that you placed"""
 
     bl_idname = "risorius.load_landmarks"
     bl_label = "Load Landmarks"

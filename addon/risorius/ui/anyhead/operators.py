@@ -106,20 +106,22 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
 
 
 class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
-    """Make a face of the selected head, which needs no expressions: it takes those of another"""
+    """Make a face of the selected head, which needs no expressions: another face lends its own"""
 
     bl_idname = "risorius.make_rig_from_head"
     bl_label = "Make Rig from Head"
 
     template: bpy.props.EnumProperty(
-        name="Expressions of", description="Who lends the expressions", items=TEMPLATES
+        name="Expressions of",
+        description="Face that lends its expressions to the head",
+        items=TEMPLATES,
     )
     template_file: bpy.props.StringProperty(
         name="File", description="A DNA file with expressions", subtype="FILE_PATH"
     )
     strength: bpy.props.FloatProperty(
         name="Strength",
-        description="How strong expressions are: 1 as on the other face",
+        description="Strength of the expressions; 1: as strong as on the face that lends them",
         default=1.0,
         min=0.0,
         max=1.5,
@@ -190,7 +192,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
 
 
 class RISORIUS_OT_conform_face(_Makes, Operator):
-    """Let a face take the form of the selected head; its topology, names and controls stay"""
+    """Give a face the form of the selected head; its own topology, names and controls stay"""
 
     bl_idname = "risorius.conform_face"
     bl_label = "Conform Face to Head"
@@ -231,7 +233,12 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
         layout.use_property_decorate = False
         rig = heads.face_of(context)
         if rig is not None:
-            words.write(layout, words.say("{name} takes its form.", name=parts.title_of(rig)))
+            words.write(
+                layout,
+                words.say(
+                    "The face {name} takes the form of the selected head.", name=parts.title_of(rig)
+                ),
+            )
         layout.prop(self, "use_family")
 
 

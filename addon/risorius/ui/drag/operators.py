@@ -60,7 +60,10 @@ class RISORIUS_OT_drag(Operator):
         options={"SKIP_SAVE"},
     )
     choice: bpy.props.IntProperty(
-        name="Which", description="0 is the best, 1 the next", min=0, options={"SKIP_SAVE"}
+        name="Which",
+        description="Rank of the slider that is moved: 0 is the best slider, 1 the next",
+        min=0,
+        options={"SKIP_SAVE"},
     )
     with_selected: bpy.props.BoolProperty(
         name="Selected Handles",

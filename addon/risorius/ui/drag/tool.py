@@ -105,7 +105,7 @@ class RISORIUS_OT_drag_tool(Operator):
 
 
 class RISORIUS_OT_drag_hover(Operator):
-    """Show the point that a press would take"""
+    """Show the point of the skin that a click would drag"""
 
     bl_idname = "risorius.drag_hover"
     bl_label = "Drag the Face"

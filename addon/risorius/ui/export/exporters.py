@@ -166,5 +166,5 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
         raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))
     if whole_files.is_cut(path):
         raise FaceError(
-            told("Blender's exporter wrote only a part: see that the disk has room for the file")
+            told("Blender's exporter wrote only a part of the file: free some space on the disk")
         )

@@ -55,7 +55,7 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     )
     body: bpy.props.EnumProperty(
         name="Body",
-        description="Bones of a body that the face lacks, without meshes",
+        description="Bones to add for a body, without meshes",
         items=(
             ("NONE", "None", "The joints that the face has"),
             ("minimal", "Minimal", "The bones that a VRM needs"),
@@ -85,8 +85,8 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     use_combinations: bpy.props.BoolProperty(
         name="Combinations",
         description=(
-            "Add targets that correct combinations of others, and a script "
-            "that drives them in a browser"
+            "Add morph targets that correct combinations of other targets, and a "
+            "script that drives them in a browser"
         ),
     )
 

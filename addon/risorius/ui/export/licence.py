@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import bpy
 
-_UNSAID = ("UNSAID", "Not Said", "VRM asks for this: choose")
+_UNSAID = ("UNSAID", "Not Said", "Not chosen yet; a VRM file must state this")
 _YES, _NO = "ALLOWED", "FORBIDDEN"
 
 
@@ -31,8 +31,10 @@ class LicenceForm:
             ("0.x", "VRM 0.x", "What older programs read"),
         ),
     )
-    title: bpy.props.StringProperty(name="Name", description="Of the character")
-    authors: bpy.props.StringProperty(name="Authors", description="With commas between")
+    title: bpy.props.StringProperty(name="Name", description="Name of the character")
+    authors: bpy.props.StringProperty(
+        name="Authors", description="Names of the authors, separated by commas"
+    )
     avatar: _choice(
         "Who May Use It",
         ("onlyAuthor", "The Author", ""),

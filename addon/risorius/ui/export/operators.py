@@ -89,8 +89,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     bake_materials: bpy.props.BoolProperty(
         name="Bake Materials",
-        description="Give the file plain materials with one image each for colour, roughness and "
-        "normals: other programs do not read node trees. Animated maps rest",
+        description=(
+            "Give the file plain materials with one image each for colour, "
+            "roughness and normals: other programs do not read node trees. Animated "
+            "maps stay neutral in the file"
+        ),
         default=True,
     )
     texture_size: bpy.props.IntProperty(

@@ -157,10 +157,14 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
     bl_label = "Save Expression"
 
     label: bpy.props.StringProperty(
-        name="Name", description="Empty: the panel's, else a number", options={"SKIP_SAVE"}
+        name="Name",
+        description="Name of the expression; empty: the name in the panel, or else a number",
+        options={"SKIP_SAVE"},
     )
     group: bpy.props.StringProperty(
-        name="Category", description="Empty: the panel's", options={"SKIP_SAVE"}
+        name="Category",
+        description="Category of the expression; empty: the category in the panel",
+        options={"SKIP_SAVE"},
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
@@ -170,7 +174,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
     )
     shared: bpy.props.EnumProperty(
         name="Shared Library",
-        description="Save it in the library for all files too",
+        description="Also save the expression in the library for all files",
         items=(
             ("PANEL", "As in the Panel", ""),
             ("YES", "In the Library", ""),

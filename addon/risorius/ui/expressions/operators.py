@@ -42,7 +42,7 @@ class Mixes(HandOperator):
         items=region_items,
         options={"ENUM_FLAG"},
     )
-    key: bpy.props.BoolProperty(name="Key", description="At the current frame")
+    key: bpy.props.BoolProperty(name="Key", description="Insert keys at the current frame")
 
     def way(self) -> expression_mix.Way:
         return expression_mix.Way(

@@ -97,7 +97,7 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
     )
     to_library: bpy.props.BoolProperty(
         name="Shared Library",
-        description="Save it for all files too, in the folder of the preferences",
+        description="Also save the expression for all files, in the folder set in the preferences",
         default=True,
     )
 

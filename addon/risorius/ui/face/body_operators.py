@@ -47,7 +47,10 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
             (
                 "SCALE",
                 "On the Head, to Size",
-                ("The same, and scale the face to the length of the body's neck"),
+                (
+                    "Move the face to the head bone of the body, and scale the face to the "
+                    "length of the body's neck"
+                ),
             ),
             ("NONE", "Where It Is", "Keep the place of the face"),
         ),

@@ -69,7 +69,9 @@ class RISORIUS_OT_test_channel(FaceOperator, Operator):
         soft_max=1.0,
     )
     end: bpy.props.BoolProperty(
-        name="End", description="End the test instead", options={"SKIP_SAVE", "HIDDEN"}
+        name="End",
+        description="End the running test instead of beginning a test",
+        options={"SKIP_SAVE", "HIDDEN"},
     )
 
     def execute(self, context: Context) -> Result:

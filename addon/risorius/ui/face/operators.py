@@ -37,7 +37,9 @@ class RISORIUS_OT_reset(HandOperator, Operator):
     bl_label = "Reset"
 
     region: bpy.props.StringProperty(
-        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+        name="Region",
+        description="Limit this to a region; empty: all regions",
+        options={"SKIP_SAVE"},
     )
 
     def move(self, context: Context) -> Collection[str]:
@@ -66,7 +68,9 @@ class RISORIUS_OT_key(FaceOperator, Operator):
     bl_label = "Key"
 
     region: bpy.props.StringProperty(
-        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+        name="Region",
+        description="Limit this to a region; empty: all regions",
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: Context) -> Result:
@@ -129,7 +133,10 @@ class RISORIUS_OT_prepare_for_export(FaceOperator, Operator):
     bl_label = "Prepare for Export"
 
     enable: bpy.props.BoolProperty(
-        name="Prepare", description="Off: back to Direct mode", default=True, options={"SKIP_SAVE"}
+        name="Prepare",
+        description="On: pose the joints. Off: return to Direct mode",
+        default=True,
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: Context) -> Result:

@@ -23,7 +23,9 @@ _copied: dict[str, float] = session.table("side_operators.copied", ("unregister"
 
 def _only_region() -> object:
     return bpy.props.StringProperty(
-        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+        name="Region",
+        description="Limit this to a region; empty: all regions",
+        options={"SKIP_SAVE"},
     )
 
 

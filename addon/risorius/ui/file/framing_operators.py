@@ -19,7 +19,7 @@ _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = session.keep(
 
 
 class RISORIUS_OT_frame_face(FaceOperator, Operator):
-    """Show the whole head in the view; outlines and the face board do not count"""
+    """Fit the whole head into the view, without its outlines and face board"""
 
     bl_idname = "risorius.frame_face"
     bl_label = "Frame Face"
@@ -29,7 +29,7 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
     instead: bpy.props.BoolProperty(
         name="Instead of Frame Selected",
-        description="Only if nothing but outlines of a face is selected",
+        description="Frame the face only if nothing except outlines of the face is selected",
         options={"SKIP_SAVE"},
     )
 

@@ -23,8 +23,10 @@ from .studio_operators import SCENE_CAMERA, add_studio
 
 FRAME_VIEW = bpy.props.BoolProperty(
     name="Frame the View",
-    description="Move the 3D views of this window to the face, and let Solid show its textures; "
-    "not where several are imported, and not a view through a camera",
+    description=(
+        "Turn the 3D views of this window to the face, and show its textures in "
+        "Solid; not if several faces are imported, and not in a camera view"
+    ),
     default=True,
 )
 

@@ -123,11 +123,13 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_shapes: bpy.props.BoolProperty(
         name="Shape Keys",
-        description="Write edited shapes of the file; keys of your own are never written",
+        description="Write edited shapes of the file; shape keys that you added are never written",
         default=True,
     )
     use_neutral: bpy.props.BoolProperty(
-        name="Neutral Mesh", description="Write vertices moved in the basis", default=True
+        name="Neutral Mesh",
+        description="Write vertices that were moved in the shape key Basis",
+        default=True,
     )
     use_joints: bpy.props.BoolProperty(
         name="Neutral Joints",

@@ -149,13 +149,15 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             return
         taken = shape_key_head.taken_with(context, head)
         column = self.layout.column()
-        words.write(column, words.say("Made of {names}", names=names.listed(_named(taken))))
+        words.write(
+            column, words.say("The face is made of {names}", names=names.listed(_named(taken)))
+        )
         family = shape_key_head.relatives_of(context, taken)
         if family:
             column.prop(self, "use_family")
             also = column.column()
             also.active = self.use_family
-            words.write(also, words.say("And of {names}", names=names.listed(_named(family))))
+            words.write(also, words.say("Also made of {names}", names=names.listed(_named(family))))
 
 
 def _named(items: Sequence[MeshObject]) -> list[str]:
@@ -214,7 +216,7 @@ def show_made(
     operator.report(
         {"INFO"},
         words.say(
-            "{count} joints; deltas {before} -> {after}; no vertex further off than {mm} mm",
+            "{count} joints; shape-key deltas {before} -> {after}; largest vertex error {mm} mm",
             count=len(rig.new_joints),
             before=rig.deltas_before,
             after=rig.deltas_after,

@@ -20,7 +20,7 @@ from .base import MOMENTS
 TARGETS = (
     ("HEAD", "Head", "The target turns with the head"),
     ("WORLD", "World", "The target stays where it is while the head turns"),
-    ("OBJECT", "Object", "The eyes look at an object, as the camera"),
+    ("OBJECT", "Object", "Let the eyes look at an object, such as the camera"),
 )
 
 
@@ -109,7 +109,10 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
     )
     offset: bpy.props.FloatProperty(
         name="Right Eye Later",
-        description="Frames by which the character's right eye follows its left; negative: leads",
+        description=(
+            "Delay of the character's right eye after the left eye in frames; "
+            "negative: the right eye moves first"
+        ),
     )
     sides: bpy.props.EnumProperty(
         name="Eyes",

@@ -42,13 +42,20 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
     baked_too = True
 
     forward: bpy.props.BoolProperty(
-        name="Forward", description="Off: the key before", default=True, options={"SKIP_SAVE"}
+        name="Forward",
+        description="On: go to the next key. Off: go to the previous key",
+        default=True,
+        options={"SKIP_SAVE"},
     )
     control: bpy.props.StringProperty(
-        name="Control", description="Empty: all of the region", options={"SKIP_SAVE"}
+        name="Control",
+        description="Control whose next key is found; empty: all controls of the region",
+        options={"SKIP_SAVE"},
     )
     region: bpy.props.StringProperty(
-        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+        name="Region",
+        description="Limit this to a region; empty: all regions",
+        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -88,8 +95,15 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         name="Towards",
         items=(
             ("BREAKDOWN", "Breakdown", "Between the pose before (0) and the pose after (1)"),
-            ("NEIGHBOURS", "Relax", "Nearer to the line between both; below 0: pushed away"),
-            ("REST", "Rest", "Nearer to rest; below 0: further away"),
+            (
+                "NEIGHBOURS",
+                "Relax",
+                (
+                    "Move the pose towards the line between the poses before and after; "
+                    "below 0: away from the line"
+                ),
+            ),
+            ("REST", "Rest", "Move the pose towards rest; below 0: away from rest"),
         ),
     )
     factor: bpy.props.FloatProperty(
@@ -106,7 +120,9 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         options={"SKIP_SAVE"},
     )
     region: bpy.props.StringProperty(
-        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+        name="Region",
+        description="Limit this to a region; empty: all regions",
+        options={"SKIP_SAVE"},
     )
 
     def stand_at(self, frame: float) -> None:
@@ -216,7 +232,10 @@ class RISORIUS_OT_tweak(FaceOperator, Operator):
     first: bpy.props.IntProperty(name="First Frame", default=1)
     last: bpy.props.IntProperty(name="Last Frame", default=25)
     fade: bpy.props.FloatProperty(
-        name="Fade", description="Frames at each end", default=5.0, min=0.0
+        name="Fade",
+        description="Number of frames in which the tweak fades in and out",
+        default=5.0,
+        min=0.0,
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:

@@ -48,7 +48,7 @@ def _is_ours(item: bpy.types.KeyMapItem) -> bool:
 
 
 class RISORIUS_OT_shortcut(Operator):
-    """Give the pie menu of the face a key in the 3D view, which can be changed here; again: none"""
+    """Add a shortcut for the pie menu of the face, changeable here, or remove the shortcut"""
 
     bl_idname = "risorius.shortcut"
     bl_label = "Key for the Pie Menu"

@@ -33,7 +33,10 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     """The user's settings, stored with the window."""
 
     source: bpy.props.EnumProperty(
-        name="Source", description="App that sends", items=SOURCES, update=_source_changed
+        name="Source",
+        description="App that sends the capture",
+        items=SOURCES,
+        update=_source_changed,
     )
     port: bpy.props.IntProperty(
         name="Port",
@@ -70,7 +73,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     gain: bpy.props.FloatProperty(
         name="Gain",
-        description="Factor on all units of the face",
+        description="Factor of all received values of the face",
         default=1.0,
         min=0.0,
         max=3.0,

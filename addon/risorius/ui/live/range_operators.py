@@ -67,8 +67,11 @@ class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
     filter_glob: bpy.props.StringProperty(default="*.csv;*.json;*.rzc", options={"HIDDEN"})
     performance: bpy.props.BoolProperty(
         name="Performance",
-        description="The take shows acting: only blinks, and peaks that stop at one height again "
-        "and again, count as extremes. Off: it goes to all extremes one after another",
+        description=(
+            "The take shows acting: only blinks, and peaks that stop at one height "
+            "again and again, count as extremes. Off: the take goes to all extremes "
+            "one after another"
+        ),
     )
 
     def execute(self, context: Context) -> Result:

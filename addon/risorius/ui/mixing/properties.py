@@ -20,7 +20,7 @@ def _changed(_self: bpy.types.PropertyGroup, given: bpy.types.Context) -> None:
 
 
 _SHARE = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "update": _changed}
-_HERE = "Share of this face in this region; the rest follows the whole mix"
+_HERE = "Share of this face in this region; the rest of the region follows the whole mix"
 
 
 class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):

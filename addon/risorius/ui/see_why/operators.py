@@ -41,7 +41,9 @@ class RISORIUS_OT_solo(FaceOperator, Operator):
         options={"HIDDEN", "SKIP_SAVE"},
     )
     extend: bpy.props.BoolProperty(
-        name="Extend", description="Add to the shown controls", options={"SKIP_SAVE"}
+        name="Extend",
+        description="Show this control in addition to the controls that are shown now",
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: Context) -> Result:

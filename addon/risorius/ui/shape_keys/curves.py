@@ -67,7 +67,7 @@ class RISORIUS_OT_assign_curve(_OfCurves, Operator):
 
 
 class RISORIUS_OT_choose_curve(_OfCurves, Operator):
-    """Search the control or expression for a curve of the imported file"""
+    """Find a control or expression to assign to a curve of the imported file"""
 
     bl_idname = "risorius.choose_curve"
     bl_label = "Choose for a Curve"

@@ -31,7 +31,7 @@ from ..expressions.library_operators import redraw
 from . import shown
 
 WAYS = (
-    ("CHOSEN", "Control or Expression", "What is chosen"),
+    ("CHOSEN", "Control or Expression", "Assign the chosen control or expression"),
     ("NAME", "By Its Name", "Guess from the name of the key"),
     ("OWN", "Control of Its Own", "A new control with the name of the key"),
     ("NOTHING", "Leave Out", "Leave the key out of the rig"),
@@ -71,7 +71,9 @@ class Says(OfHead):
     """Base of operators that assign a shape key."""
 
     key: bpy.props.StringProperty(
-        name="Shape Key", description="Empty: the active one", options={"SKIP_SAVE"}
+        name="Shape Key",
+        description="Name of the shape key; empty: the active shape key",
+        options={"SKIP_SAVE"},
     )
 
     @classmethod
@@ -79,7 +81,9 @@ class Says(OfHead):
         if not super().poll(context):
             return False
         if not assigned.is_editable(head_of(context)):
-            cls.poll_message_set(words.say("This mesh is of another file: make it local first."))
+            cls.poll_message_set(
+                words.say("This mesh is linked from another file: make it local first.")
+            )
             return False
         return True
 
@@ -150,7 +154,7 @@ def fill_choices() -> None:
 
 
 class RISORIUS_OT_choose_shape_key(Says, Operator):
-    """Search the control or expression for this shape key by name"""
+    """Find a control or expression by name, and assign it to this shape key"""
 
     bl_idname = "risorius.choose_shape_key"
     bl_label = "Choose a Control or Expression"
@@ -243,7 +247,7 @@ class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
         assigned.put(item, fits)
         self.report({"INFO"}, words.say("{count} shape keys", count=len(fits)))
         if len(fits) < len(table):
-            text = "{count} names of the file are of no shape key here."
+            text = "{count} names in the file match no shape key of this head."
             self.report({"INFO"}, words.say(text, count=len(table) - len(fits)))
         return {"FINISHED"}
 
@@ -304,7 +308,7 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         )
 
     def cancelled_text(self) -> str:
-        return words.say("Pictures that are done stay.")
+        return words.say("Finished pictures are kept.")
 
 
 CLASSES = (

@@ -54,13 +54,19 @@ def becomes(row: assigned.Row) -> str:
 def who_knows(row: assigned.Row) -> str:
     """A sentence about the source of an assignment. Args: row  from assigned.of."""
     if row.holder:
-        return words.say("{name} is that already: a control has one key.", name=row.holder)
+        return words.say(
+            (
+                "This name means a control that the shape key {name} has already; each "
+                "control has one key."
+            ),
+            name=row.holder,
+        )
     if row.is_said:
-        return words.say("You said what this key is.")
+        return words.say("You assigned this shape key.")
     if not row.by:
         return words.say("No vocabulary knows this name.")
     name = words.say("Words") if row.by == assigned.WORDS else row.by
-    return words.say("Known by: {name}", name=name)
+    return words.say("Name found in the vocabulary {name}", name=name)
 
 
 def words_of_controls(controls: tuple[str, ...]) -> str:

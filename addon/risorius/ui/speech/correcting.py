@@ -76,7 +76,7 @@ class _CorrectsSound(_Corrects):
 
     place: bpy.props.IntProperty(
         name="Place",
-        description="Its number in the list, from 0; -1: the chosen one",
+        description="Number of the sound in the list, from 0; -1: the chosen sound",
         default=-1,
         min=-1,
         options={"SKIP_SAVE"},

@@ -105,7 +105,9 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         self.filepath = system_path(self.filepath)
         text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
         if self.transcript_text and text is None:
-            self.report({"ERROR"}, words.say("There is no text {name}.", name=self.transcript_text))
+            self.report(
+                {"ERROR"}, words.say("There is no text block {name}.", name=self.transcript_text)
+            )
             return {"CANCELLED"}
         rig = face_rig(context)
         found = visemes.of(rig, library.folder(context)) if self.use_own_visemes else None
@@ -142,7 +144,10 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             if task.result is None:
                 raise task.error or FaceError("nothing was heard")
             if not type(self).poll(context) or face_rig(context).session_uid != self._face:
-                text = "The face that was to speak is no longer the active one: speak again."
+                text = (
+                    "Nothing was spoken, as the face is no longer active: select it, then "
+                    "use Speak from Audio again."
+                )
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
             notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
@@ -157,7 +162,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         if self._own:
-            text = "It speaks by {count} visemes of its own."
+            text = "The face speaks with {count} visemes of its own."
             self.report({"INFO"}, words.say(text, count=len(self._own)))
         self._add_sound(context)
         return {"FINISHED"}

@@ -17,7 +17,14 @@ from ..words import of_error, say
 
 _NOT_LINKED = "Select a linked face first."
 SHAPES = (
-    ("DRIVEN", "Driven Keys", "The library's shape keys, moved by drivers: follows its edits"),
+    (
+        "DRIVEN",
+        "Driven Keys",
+        (
+            "Use the shape keys of the library, moved by drivers; later edits of "
+            "the library are shown"
+        ),
+    ),
     ("LOCAL", "Local Meshes", "Meshes copied into this file: live sum and edits are possible"),
 )
 
@@ -36,7 +43,9 @@ class RISORIUS_OT_make_override(Operator):
     bl_label = "Make Override"
     bl_options = {"REGISTER", "UNDO"}
 
-    shapes: bpy.props.EnumProperty(name="Shapes", description="Mode of its shapes", items=SHAPES)
+    shapes: bpy.props.EnumProperty(
+        name="Shapes", description="Mode of the face's shapes", items=SHAPES
+    )
 
     @classmethod
     def poll(cls, context: Context) -> bool:
