@@ -32,8 +32,8 @@ void activate(const MlLayer& layer, float* values, std::uint32_t count) noexcept
   }
 }
 
-// Runs one layer with the kernel of the joint matrices: the biases are an extra column whose input is 1, and
-// inputs at 0 are skipped.
+// Runs one layer with the kernel of the joint matrices: the biases are an extra column whose input
+// is 1, and inputs at 0 are skipped.
 void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const float* in,
                std::uint32_t inputs, Workspace& work, float* out) noexcept {
   std::size_t n = 0;
