@@ -71,7 +71,9 @@ def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
         for mesh in dna.lod_mesh_mapping[lod]:
             if len(dna.meshes[mesh].positions) == count:
                 return lod, int(mesh)
-    raise ClipError(told("{name} has the vertices of no mesh of this face.", name=item.name))
+    raise ClipError(
+        told("{name}: no mesh of this face has the same number of vertices.", name=item.name)
+    )
 
 
 def recorded(

@@ -290,8 +290,8 @@ def _bone_rows(
             share = 100.0 * weight
             raise FaceError(
                 told(
-                    "The tweak shows only {share:.0f} % here, too little for a turn this far: go "
-                    "nearer to its middle.",
+                    "The tweak has only {share:.0f} % strength here, too little for "
+                    "such a large rotation: go nearer to the middle of the tweak.",
                     share=share,
                 )
             )

@@ -330,7 +330,7 @@ class Stroke:
         return at
 
 
-_REFUSED = told("Blender lets nobody write to this override: make it fully editable first.")
+_REFUSED = told("This library override cannot be edited: make it fully editable first.")
 
 
 def begin(context: Context, rig: ArmatureObject, point: Point, options: Options) -> Stroke:
@@ -385,9 +385,11 @@ def _usable(context: Context, rig: ArmatureObject) -> runtime.Runtime:
     if parts.controls_of(rig) is None or runtime.of(rig) is None:
         raise FaceError(told("This face has lost its controls or its DNA."))
     if context.screen is not None and context.screen.is_animation_playing:
-        raise FaceError(told("Stop the animation first: a face is dragged on a frame that stays."))
+        raise FaceError(
+            told("Stop playback first: you can drag a face only while the frame stays the same.")
+        )
     if sessions.of(parts.controls_of(rig)) is not None:
-        raise FaceError(told("This face follows a live capture: stop that first."))
+        raise FaceError(told("Stop live capture first: it moves this face."))
     depsgraph = context.evaluated_depsgraph_get()
     if not parts.controls_there(rig).evaluated_get(depsgraph).is_evaluated:
         raise FaceError(told("{name} is hidden: show it first.", name=name))

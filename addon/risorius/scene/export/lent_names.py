@@ -61,7 +61,8 @@ def images_as_files() -> Iterator[None]:
         if image.library is not None:
             raise FaceError(
                 told(
-                    "the linked image {name} needs a name without / or other signs that paths have",
+                    "rename the linked image {name} in its file: the name must not "
+                    "contain / or other characters of paths",
                     name=printable(image.name),
                 )
             )

@@ -478,7 +478,11 @@ def _pack(image: bpy.types.Image) -> None:
     except RuntimeError as error:
         name = PurePath(image.filepath_raw).name
         raise FaceError(
-            told("the file {name} of an image is gone: find it, or take it out", name=name)
+            told(
+                "the image file {name} is missing: restore the file, or remove the image "
+                "from its material",
+                name=name,
+            )
         ) from error
 
 

@@ -277,13 +277,16 @@ def check_own(item: Item) -> None:
     if item.source == RISORIUS:
         raise LibraryError(
             told(
-                "{label} came with Risorius: only expressions of your own can be changed.",
+                "{label} came with Risorius: you can change only your own expressions.",
                 label=item.expression.label,
             )
         )
     if item.path is not None and len(native.part("expressions").load(item.path)) > 1:
         raise LibraryError(
-            told("{file} holds several expressions: edit it as a text.", file=item.path.name)
+            told(
+                "{file} holds several expressions: edit the file in a text editor.",
+                file=item.path.name,
+            )
         )
 
 
@@ -319,7 +322,7 @@ def read_all(where: Path) -> list[native.Expression]:
     if troubles:
         raise LibraryError(troubles[0])
     if not found:
-        raise LibraryError(told("{folder}: it holds no expressions.", folder=where.name))
+        raise LibraryError(told("The folder {folder} holds no expressions.", folder=where.name))
     names = [expression.name for _, expression in found]
     for number, name in enumerate(names):
         if name in names[:number]:

@@ -94,7 +94,12 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
         else:
             _take_off(item)
     if not coloured:
-        raise FaceError(told("No mesh of {name} has the vertices of its file.", name=rig.name))
+        raise FaceError(
+            told(
+                "No mesh of {name} has the number of vertices that the DNA file says.",
+                name=rig.name,
+            )
+        )
     heat = Heat(kind, what, most)
     rig[parts.HEAT] = "\n".join((kind, repr(most), what))
     _shown[rig.session_uid] = _state(now, kind)

@@ -371,7 +371,7 @@ def _whole_face(rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence
         yield told("Joints of {rig} have constraints.", rig=rig.name)
     for item in parts.meshes_of(rig):
         if _has_real_keys(item, live):
-            yield told("{mesh} has real shape keys.", mesh=item.name)
+            yield told("{mesh} has ordinary shape keys instead of the live key.", mesh=item.name)
     changed = _changed_bone(rig, live)
     if changed:
         yield told("The settings of the joint {bone} were changed.", bone=changed)
@@ -428,13 +428,16 @@ def _mesh(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> Itera
         yield told("{mesh} shares its data with another object.", mesh=item.name)
     number = runtime.mesh_number(live, item)
     if number is None or len(data.vertices) != live.vertex_count(number):
-        yield told("{mesh} has not the vertices of its file.", mesh=item.name)
+        yield told("The number of vertices of {mesh} differs from the DNA file.", mesh=item.name)
         return
     yield from _standing(item, rig)
     yield from _modifiers(item, rig)
     yield from _keys(item, rig, live, number)
     if live_keys.bears_simulation(item):
-        yield told("{mesh} bears a simulation, whose cache an edit would reset.", mesh=item.name)
+        yield told(
+            "{mesh} has a simulation: an edit of the mesh would reset the simulation cache.",
+            mesh=item.name,
+        )
 
 
 def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
@@ -515,18 +518,18 @@ def _keys(
     key, block = item.data.shape_keys, meshes.live_block(item)
     if key is None or block is None:
         if key is not None:
-            yield told("{mesh} has shape keys of its own that are in use.", mesh=item.name)
+            yield told("{mesh} uses other shape keys than the live key.", mesh=item.name)
         return
     others = (b for b in key.key_blocks if b not in (block, key.reference_key))
     used = [b for b in others if b.value and not b.mute]
     pinned = item.show_only_shape_key or not key.use_relative
     if used or pinned or parts.REAL in key or next(_curves(key), None) is not None:
-        yield told("{mesh} has shape keys of its own that are in use.", mesh=item.name)
+        yield told("{mesh} uses other shape keys than the live key.", mesh=item.name)
     plain = block.value == 1.0 and not block.mute and not block.vertex_group
     if not plain or block.relative_key != key.reference_key:
         yield told("The live key of {mesh} was changed.", mesh=item.name)
     if len(block.points) != len(item.data.vertices):
-        yield told("{mesh} has not the vertices of its file.", mesh=item.name)
+        yield told("The number of vertices of {mesh} differs from the DNA file.", mesh=item.name)
 
 
 def _readers(rig: ArmatureObject) -> Iterator[Sentence]:

@@ -66,7 +66,10 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
             return False
         if not mesh_curves.sources(context, face_rig(context)):
             cls.poll_message_set(
-                words.say("No other mesh of this scene has as many vertices as one of the face.")
+                words.say(
+                    "No other mesh of this scene has the same number of vertices as a mesh "
+                    "of the face."
+                )
             )
             return False
         return True
@@ -84,7 +87,9 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         rig = face_rig(context)
         item = self._item(context)
         if item is None:
-            self.report({"ERROR"}, words.say("Select the mesh that moves."))
+            self.report(
+                {"ERROR"}, words.say("Select the moving mesh from which to take the animation.")
+            )
             return {"CANCELLED"}
         self._name, self._face = item.name, rig.session_uid
         try:
@@ -125,7 +130,9 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
                 raise task.error or FaceError("nothing was solved")
             rig = parts.active_rig(context)
             if rig is None or rig.session_uid != self._face:
-                text = "The face that was solved for is no longer the active one: solve again."
+                text = (
+                    "The solved face is no longer the active face: make it active and solve again."
+                )
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
             self.start = float(self.first)
@@ -154,7 +161,9 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         residual = solved.vertex_residual[self._task.mesh] * self._task.mm
         hottest = mesh_curves.show_residual(face_rig(context), self._task.mesh, residual)
         if hottest:
-            text = words.say("The hottest colour is {mm} mm.", mm=f"{hottest:.2f}")
+            text = words.say(
+                "The hottest colour marks a remaining distance of {mm} mm.", mm=f"{hottest:.2f}"
+            )
             self.report({"INFO"}, text)
 
     def draw(self, context: Context) -> None:

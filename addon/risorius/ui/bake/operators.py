@@ -119,7 +119,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC":
             self._job.close()
-            self.report({"INFO"}, words.say("Baking was ended; nothing was changed."))
+            self.report({"INFO"}, words.say("Baking was cancelled; nothing was changed."))
             self._result = {"CANCELLED"}
         elif event.type != "TIMER" or not self._step(context, self._job, _SLICE):
             return {"RUNNING_MODAL"}
@@ -158,9 +158,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
             traceback.print_exc()
             self.report(
                 {"ERROR"},
-                words.say(
-                    "Baking failed, and the faces are as before: {error}.", error=repr(error)
-                ),
+                words.say("Baking failed; the faces were not changed: {error}.", error=repr(error)),
             )
             self._result = {"CANCELLED"}
             return True
@@ -192,7 +190,7 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
         faces = selected_rigs(context, self.every)
         back = [rig for rig in faces if bake_face.unbake(context, rig)]
         if not back:
-            self.report({"WARNING"}, words.say("Nothing of the selected faces is baked."))
+            self.report({"WARNING"}, words.say("None of the selected faces is baked."))
             return {"CANCELLED"}
         return {"FINISHED"}
 

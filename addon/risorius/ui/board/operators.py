@@ -71,7 +71,9 @@ class _OwnArmature(_Leading):
         data = face_controls(context).data
         if data.library is not None or data.override_library is not None:
             cls.poll_message_set(
-                say("The controls are linked: give the face its board in their own file.")
+                say(
+                    "The controls are linked: add the board in the file that contains the controls."
+                )
             )
             return False
         return True
@@ -85,7 +87,7 @@ class _OnBoard(HandOperator):
         if not super().poll(context):
             return False
         if not board.leads_face(face_rig(context)):
-            cls.poll_message_set(say("The face board does not lead this face."))
+            cls.poll_message_set(say("The face board does not move this face: choose Board first."))
             return False
         return True
 
@@ -119,7 +121,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         kind = self.kind if self.properties.is_property_set("kind") or old is None else old
         if kind == runtime.PRIMARY and not runtime.there(rig, kind).handles:
             kind = runtime.COMPLETE
-            self.report({"INFO"}, say("No control has a name of the primary board's: complete."))
+            self.report(
+                {"INFO"},
+                say("No control has a name from the primary board: the complete board is used."),
+            )
         if kind == runtime.COMPLETE and not runtime.there(rig, kind).handles:
             self.report({"ERROR"}, say("This file has no control that a board could move."))
             return {"CANCELLED"}
@@ -149,7 +154,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         if board_keys.animates_sliders(rig):
             self.report(
                 {"INFO"},
-                say("The sliders have keys and go on leading: choose Board to convert them."),
+                say(
+                    "The sliders have keys and still move the face: choose Board to convert"
+                    " the keys."
+                ),
             )
             return
         lost = board_keys.lost(board_keys.switch(rig, by_board=True, with_keys=False).loss)
@@ -257,7 +265,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
             self.report(
                 {"INFO"},
                 say(
-                    "{curves} curves were converted; the action {action} was kept.",
+                    "{curves} curves were converted; the unconverted action {action} was kept.",
                     curves=done.curves,
                     action=done.kept.name,
                 ),
@@ -266,7 +274,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
             self.report(
                 {"WARNING"},
                 say(
-                    "Keys that move nothing while this leads: {actions}.",
+                    "The keys of these actions have no effect now: {actions}.",
                     actions=names.listed(done.idle),
                 ),
             )

@@ -61,7 +61,9 @@ class RISORIUS_PT_board(FaceOnlyPanel, Panel):
         led = draw_lead(layout, controls, live)
         gone = board.missing(controls, live)
         if gone:
-            words.write(layout, words.say("{count} of its sliders are gone.", count=len(gone)))
+            words.write(
+                layout, words.say("{count} sliders of the board are missing.", count=len(gone))
+            )
             back = layout.operator("risorius.add_board", text="Bring Back", icon="LOOP_BACK")
             back.kind = live.board
         if led:

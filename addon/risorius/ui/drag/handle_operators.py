@@ -58,7 +58,7 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
         rig = face_rig(context)
         counts = pointing.counts_of(runtime.there(rig))
         if self.mesh >= len(counts) or not 0 <= self.vertex < counts[self.mesh]:
-            self.report({"ERROR"}, say("This face has no such vertex."))
+            self.report({"ERROR"}, say("This face has no vertex with this number."))
             return {"CANCELLED"}
         kept_points.toggle(rig, kept_points.PINS, (self.mesh, self.vertex), counts)
         return {"FINISHED"}
@@ -105,7 +105,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
         rig, point = face_rig(context), (self.mesh, self.vertex)
         surface = pointing.skin_of(context, rig).surface
         if self.vertex >= 0 and point not in handles.offered(rig, surface):
-            self.report({"ERROR"}, say("This face has no such handle."))
+            self.report({"ERROR"}, say("This face has no handle at this vertex."))
             return {"CANCELLED"}
         if self.extend and self.vertex >= 0:
             kept_points.toggle(rig, kept_points.SELECTED, point, surface.vertex_counts)

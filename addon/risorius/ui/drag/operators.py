@@ -87,7 +87,7 @@ class RISORIUS_OT_drag(Operator):
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         if not moved:
-            self.report({"INFO"}, say("No slider brings this point nearer to there."))
+            self.report({"INFO"}, say("No slider moves this point nearer to the target."))
         return {"FINISHED"}
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -207,8 +207,8 @@ class RISORIUS_OT_drag(Operator):
             shown.triangles = self._triangles
         drawing.show(context, shown)
         context.workspace.status_text_set(
-            say("Drag  |  Ctrl: one slider, Tab: the next  |  X: symmetric  |  R: region only  |  "
-                "Esc, right click: as before")
+            say("Drag  |  Ctrl: one slider, Tab: next slider  |  X: symmetric  |  R: region"
+                " only  |  Esc, right click: cancel")
         )  # fmt: skip
 
     def _lines(self, context: Context) -> list[str]:
@@ -218,7 +218,7 @@ class RISORIUS_OT_drag(Operator):
             for name, change in self._held.moved(1 if self.single else 3)
         ]
         if self.single and not lines:
-            lines.append(say("No slider alone does it better."))
+            lines.append(say("No single slider moves this point nearer."))
         return lines
 
 

@@ -60,7 +60,9 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
         sitter = thumbnails.sitter_of(rig) if missing else None
         if sitter is None:
             text = (
-                "This face has no mesh that can be drawn." if missing else "All pictures are there."
+                "This face has no mesh that can be drawn."
+                if missing
+                else "All expressions already have pictures."
             )
             self.report({"INFO"}, say(text))
             return {"FINISHED"}
@@ -99,14 +101,14 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
             self._redrawn = done
             redraw(current_context())
         return say(
-            "Pictures of expressions: {done} of {count}. Esc ends it.",
+            "Drawing pictures of expressions: {done} of {count}. Esc cancels.",
             done=done,
             count=self._count,
         )
 
     def cancelled_text(self) -> str:
         redraw(current_context())
-        return say("Pictures are left out.")
+        return say("Drawing was cancelled; some pictures are missing.")
 
 
 class _LibraryOperator(FaceOperator):
@@ -192,7 +194,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
             label = library.free_label(items, say("Expression"))
         name = library.name_for(label)
         if not name:
-            raise library.LibraryError(told("A name with a letter in it is needed."))
+            raise library.LibraryError(told("Enter a name with at least one letter."))
         if name in items:
             raise library.LibraryError(
                 told("There is an expression {label} already.", label=items[name].expression.label)
@@ -326,7 +328,7 @@ class _OfFolder(_LibraryOperator, OperatorBase):
             return context.window_manager.invoke_confirm(
                 self,
                 event,
-                title=say("Replace expressions of yours?"),
+                title=say("Replace your own expressions?"),
                 message=self.asked,
                 confirm_text=say("Replace"),
                 icon="WARNING",
@@ -364,7 +366,7 @@ class RISORIUS_OT_export_expressions(_OfFolder, Operator):
         items, _ = library.all_items(library.folder(context))
         own = [item.expression for item in items.values() if item.source != library.RISORIUS]
         if not own:
-            raise library.LibraryError(told("There are no expressions of your own."))
+            raise library.LibraryError(told("You have no expressions of your own yet."))
         pictures = [assets.picture_of(rig, expression) for expression in own]
         held = [p.read_bytes() if p.is_file() else b"" for p in pictures]
         entries = [library.Entry(*pair) for pair in zip(own, held, strict=True)]

@@ -157,8 +157,8 @@ class Blends(Mixes):
         evaluate.bring_up(context, rig)
         context.workspace.status_text_set(
             say(
-                "{label} {share} %    Ctrl: flip, A: additive, Tab: what was before, Shift: fine, "
-                "click: keep, Esc: cancel",
+                "{label} {share} %    Ctrl: flip, A: additive, Tab: compare with the "
+                "face before, Shift: fine steps, click: keep, Esc: cancel",
                 label=self._item.expression.label,
                 share=round(self.strength * 100),
             )

@@ -39,7 +39,7 @@ class RISORIUS_PT_expressions(FaceOnlyPanel, Panel):
         icons = [previews.icon_of(job.path) for job in jobs]
         _draw_grid(context, layout, chosen, shown, icons)
         if not shown:
-            words.write(layout, "No expression has these words.", "INFO")
+            words.write(layout, "No expression matches the search and filters.", "INFO")
         if not all(icons):
             _ask_once(thumbnails.look_of(rig))
         if chosen.active in items:

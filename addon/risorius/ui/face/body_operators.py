@@ -119,7 +119,7 @@ class RISORIUS_OT_detach_body(FaceOperator, Operator):
         if not super().poll(context):
             return False
         if rig_placement.body_of(face_controls(context)) is None:
-            cls.poll_message_set(say("This face is attached to no body."))
+            cls.poll_message_set(say("This face is not attached to a body."))
             return False
         return True
 

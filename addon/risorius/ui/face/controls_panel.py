@@ -66,7 +66,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
                 part = _Part(context, face, region, names, followers, given)
                 _draw_parted(body, part, dict(zip(live.labels, live.rests, strict=True)))
         if not shown:
-            nothing = "No control has these words." if search else "All controls are at rest."
+            nothing = "No control matches the search." if search else "All controls are at rest."
             words.write(layout, nothing, "INFO")
 
 

@@ -70,7 +70,13 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
         if self.enable and context.scene.camera is None:
-            self.report({"WARNING"}, say("The scene has no camera yet: the level stays as it is."))
+            self.report(
+                {"WARNING"},
+                say(
+                    "The scene has no camera yet: the level of detail does not change until it "
+                    "has one."
+                ),
+            )
         lods.follow_camera(rig, self.enable, _size(rig))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}

@@ -147,7 +147,9 @@ class RISORIUS_OT_prepare_for_export(FaceOperator, Operator):
             rig.pop(parts.SKINNING, None)
         evaluate.bring_up(context, rig)
         if self.enable:
-            self.report({"INFO"}, say("Joints are posed until Direct is chosen again."))
+            self.report(
+                {"INFO"}, say("Risorius poses the joint bones until you choose Direct again.")
+            )
         return {"FINISHED"}
 
 

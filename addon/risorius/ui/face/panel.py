@@ -98,7 +98,7 @@ def _draw_hint(layout: UILayout, context: Context) -> None:
     words.show(row, words.say("First Steps"), "LIGHT")
     row.operator("risorius.hide_hints", text="", icon="X")
     words.write(box, "Drag the Face pulls at the skin.")
-    words.write(box, "Key All keeps the pose here.")
+    words.write(box, "Key All keys the whole pose at this frame.")
 
 
 def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
@@ -142,7 +142,7 @@ def _draw_shapes(layout: UILayout, rig: ArmatureObject) -> None:
     if plan is None or "AUTO" not in modes or not plan.why:
         return
     column = layout.column(align=True)
-    column.label(text="Not Direct now:", text_ctxt=words.CONTEXT)
+    column.label(text="Why Direct is off:", text_ctxt=words.CONTEXT)
     for sentence in plan.why[:_MOST_REASONS]:
         words.write(column, sentence)
     if armatures.joints_are_shown(rig):

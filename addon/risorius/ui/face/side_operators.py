@@ -85,7 +85,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
             return False
         if face_controls(context).override_library:
             cls.poll_message_set(
-                say("The controls are an override: Blender keeps no drivers there.")
+                say("The controls are a library override: Blender saves no drivers in it.")
             )
             return False
         return True

@@ -55,7 +55,11 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
     report_all(operator, sentences)
     operator.report(
         {"INFO"},
-        say("{face} is now {file}", face=rig.name.removesuffix("_rig"), file=Path(path).name),
+        say(
+            "{face} now uses the DNA of {file}",
+            face=rig.name.removesuffix("_rig"),
+            file=Path(path).name,
+        ),
     )
     return {"FINISHED"}
 

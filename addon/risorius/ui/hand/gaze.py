@@ -60,7 +60,9 @@ class RISORIUS_OT_gaze_target(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         rig, controls = face_rig(context), face_controls(context)
         if "eyes" not in controls.pose.bones:
-            self.report({"ERROR"}, say("The target of the eyes is gone from the controls."))
+            self.report(
+                {"ERROR"}, say("The controls have no bone for the target of the eyes any more.")
+            )
             return {"CANCELLED"}
         if self.mode == "HEAD":
             gaze_target.follow_head(context, controls)
@@ -74,7 +76,7 @@ class RISORIUS_OT_gaze_target(FaceOperator, Operator):
                 self.report({"ERROR"}, say(text, name=self.target))
                 return {"CANCELLED"}
             if parts.rig_of(item) == rig:
-                self.report({"ERROR"}, say("A part of the face itself cannot be its target."))
+                self.report({"ERROR"}, say("The eyes cannot follow a part of their own face."))
                 return {"CANCELLED"}
             gaze_target.follow_object(context, controls, item)
         evaluate.bring_up(context, rig)

@@ -72,7 +72,7 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
         frame = context.scene.frame_current_final
         found = between.next_key(controls, frame, self.forward, paths)
         if found is None:
-            self.report({"INFO"}, say("There is no further key."))
+            self.report({"INFO"}, say("There are no more keys in this direction."))
             return {"CANCELLED"}
         context.scene.frame_set(int(found // 1), subframe=found % 1)
         return {"FINISHED"}
@@ -177,7 +177,9 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
             return False
         evaluate.bring_up(context, face_rig(context))
         if context.area is not None:
-            text = say("{percent} %: click to keep, Esc to leave", percent=round(self.factor * 100))
+            text = say(
+                "{percent} %: click to keep, Esc to cancel", percent=round(self.factor * 100)
+            )
             context.area.header_text_set(text)
             context.area.tag_redraw()
         return True

@@ -86,7 +86,7 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
                 {"ERROR"},
                 say("There is no action {name}.", name=self.source)
                 if self.source
-                else say("There is no action to make a layer of."),
+                else say("There is no active action to make a layer from."),
             )
             return {"CANCELLED"}
         layers.add_action(controls, action)

@@ -242,11 +242,14 @@ def _finish(
     except native.user_errors() as error:
         why = names.printable(str(error)).rstrip(".")
         operator.report(
-            {"ERROR"}, say("{reason}. The recording waits: finish it in the panel.", reason=why)
+            {"ERROR"},
+            say(
+                "{reason}. The recording was kept: finish it in the panel Live Capture.", reason=why
+            ),
         )
         return False
     if report is None:
-        operator.report({"WARNING"}, say("Nothing was received: there is no recording."))
+        operator.report({"WARNING"}, say("Nothing was received, so nothing was recorded."))
         return False
     operator.report({"INFO"}, say(report.summary()))
     for note in report.notes:

@@ -26,7 +26,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
         column.prop(chosen, "everywhere")
         words.write(column, _where(chosen))
         words.prop_or(column, chosen, "mapping", "", "Empty: names of ARKit and VRM")
-        words.prop_or(layout, chosen, "subject", "", "Empty: the first heard")
+        words.prop_or(layout, chosen, "subject", "", "Empty: first subject heard")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)
@@ -77,7 +77,7 @@ def _draw_status(layout: UILayout, session: sessions.Session) -> None:
     if not status.subject:
         heard = "Port {port}: nothing heard yet"
         if status.packets:
-            heard = "Port {port}: no face in what comes"
+            heard = "Port {port}: data without a face"
         words.show(column, words.say(heard, port=session.receiver.port), "INFO")
     else:
         rate = f"{status.per_second:.0f}"

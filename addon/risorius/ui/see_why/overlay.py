@@ -166,7 +166,7 @@ def _draw_graph(pen: _Pen, context: Context, rig: ArmatureObject, x: float, y: f
     label, now = choices(context).control, present.of(rig)
     control = causes.control_of(rig, label)
     if control < 0 or now is None:
-        pen.text(words.say("Choose a control in See Why."), x, y, _DIM)
+        pen.text(words.say("Choose a control in the panel See Why."), x, y, _DIM)
         return
     found = causes.parts_of(rig, control)
     rows, unit = found[:_MOST], pen.scale

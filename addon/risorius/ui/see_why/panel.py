@@ -100,7 +100,7 @@ def _draw_cause(layout: UILayout, context: Context, cause: causes.Cause, most: f
     if cause.now:
         text = words.say("{name}  {now:.2f} mm", name=name, now=cause.now)
     else:
-        text = words.say("{name}  could {full:.2f} mm", name=name, full=cause.full)
+        text = words.say("{name}  max. {full:.2f} mm", name=name, full=cause.full)
     row.progress(text=text, factor=min(cause.now / most, 1.0) if most else 0.0, translate=False)
     button = row.operator("risorius.heat", text="", icon="SHADING_RENDERED")
     solo = row.operator("risorius.solo", text="", icon="RADIOBUT_ON")
@@ -148,7 +148,7 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
     if circle:
         words.write(column, circle, "ERROR")
     if not fired:
-        words.show(column, words.say("No corrective fires."))
+        words.show(column, words.say("No corrective is active."))
     for cause in fired[:_ROWS]:
         _draw_cause(column, context, cause, fired[0].now)
 

@@ -59,7 +59,7 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
         self.report(
             {"INFO"},
             say(
-                "Vertex {vertex}: {count} move it, {moved:.2f} mm from neutral",
+                "Vertex {vertex}: moved by {count} controls, now {moved:.2f} mm from neutral",
                 vertex=vertex,
                 count=len(found.causes),
                 moved=found.moved,

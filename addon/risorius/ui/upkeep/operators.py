@@ -95,7 +95,7 @@ class RISORIUS_OT_bring_back(Operator):
         item = context.object
         back = repair.bring_back(item, context.scene) if item is not None else []
         if not back:
-            self.report({"ERROR"}, say("No deleted part of this face is in the file."))
+            self.report({"ERROR"}, say("No deleted part of this face was found in this file."))
             return {"CANCELLED"}
         context.view_layer.update()
         self.report({"INFO"}, say("Brought back: {names}", names=", ".join(o.name for o in back)))
