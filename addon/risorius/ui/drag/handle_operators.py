@@ -105,7 +105,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
         rig, point = face_rig(context), (self.mesh, self.vertex)
         surface = pointing.skin_of(context, rig).surface
         if self.vertex >= 0 and point not in handles.offered(rig, surface):
-            self.report({"ERROR"}, say("This face has no handle at this vertex."))
+            self.report({"ERROR"}, say("This face has no such handle."))
             return {"CANCELLED"}
         if self.extend and self.vertex >= 0:
             kept_points.toggle(rig, kept_points.SELECTED, point, surface.vertex_counts)

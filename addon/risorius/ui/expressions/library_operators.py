@@ -101,7 +101,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
             self._redrawn = done
             redraw(current_context())
         return say(
-            "Drawing pictures of expressions: {done} of {count}. Esc cancels.",
+            "Pictures of expressions: {done} of {count}. Esc ends it.",
             done=done,
             count=self._count,
         )

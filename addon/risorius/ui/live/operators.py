@@ -243,9 +243,7 @@ def _finish(
         why = names.printable(str(error)).rstrip(".")
         operator.report(
             {"ERROR"},
-            say(
-                "{reason}. The recording was kept: finish it in the panel Live Capture.", reason=why
-            ),
+            say("{reason}. The recording waits: finish it in the panel.", reason=why),
         )
         return False
     if report is None:
