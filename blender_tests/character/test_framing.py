@@ -26,7 +26,8 @@ def _state():
 
 
 def _on_screen(points):
-    """Places of points in the view's region, (0, 0) to (1, 1), through a camera in its place."""
+    """Coordinates of points in the region of the 3D view, from (0, 0) at the lower left to (1, 1).
+    A temporary camera with the view's place, rotation and lens projects them."""
     area, view = _area(), _view()
     region = next(r for r in area.regions if r.type == "WINDOW")
     data = bpy.data.cameras.new("view")

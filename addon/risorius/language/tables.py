@@ -27,7 +27,7 @@ def _read(name: str) -> dict[str, Any]:
 
 @cache
 def controls(language: str = ENGLISH) -> ControlWords:
-    """What is said of the standard controls in a language."""
+    """The descriptions (for tooltips) and search words of the standard controls in a language."""
     table = _read(f"controls_{language}")
     return expand(table, table.pop("sides"))
 
@@ -52,7 +52,8 @@ def search_words() -> dict[str, str]:
 
 
 def language_of(locale: str) -> str:
-    """The language of ours that a locale of Blender's is, as de of de_DE; empty for all others."""
+    """The language of the tables for a locale of Blender, such as "de" for "de_DE"; "" for English
+    and for languages without tables."""
     language = locale.replace("@", "_").partition("_")[0]
     return language if language in languages() else ""
 

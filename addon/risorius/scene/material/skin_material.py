@@ -59,7 +59,7 @@ class Skin:
 
     Args:
         graph: nodes.Graph of the material.
-        look: look.Look of the mesh base: sizes, textures, areas.
+        look: look.Look of the mesh, for all its LODs: sizes, textures, regions of the face.
     """
 
     def __init__(self, graph: Graph, look: Look) -> None:

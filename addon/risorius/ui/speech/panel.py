@@ -19,7 +19,8 @@ from .correcting import (
 
 
 class RISORIUS_UL_sounds(UIList):
-    """One line per sound: the word that begins, the mouth, start and length in frames."""
+    """One line per sound: the word that begins with this sound, if any; the mouth shape; start and
+    length in frames."""
 
     def draw_item(
         self,

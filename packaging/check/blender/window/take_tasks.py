@@ -57,7 +57,7 @@ def _span(curve: list) -> float:
 
 
 def _smile(hand: Hand) -> Iterator[Check]:
-    """Add a layer with a smile at frame 36 by the search."""
+    """Go to frame 36 and add a layer with a smile there, by an operator from Blender's search."""
     go_to(hand, 36)
     below = hand.ask("curves_below")
     search(hand, "Add Layer Smile Closed", "RISORIUS_OT_layer_add")

@@ -82,11 +82,14 @@ def _overlapping(low: Doubles, high: Doubles) -> Ints:
 
 
 def completed(surface: Surface) -> list[Surface]:
-    """Completes a half head: one surface with its mirror image for each side on which the given
-    surface was cut along an axis plane.
+    """Completes a half head in each possible way.
 
     Args:
         surface: the surface; it is not changed.
+
+    Returns:
+        For each side of the bounding box at which the surface has a flat cut: the surface together
+        with its mirror image at this side. A flat cut of the neck counts too. Empty without a cut.
     """
     points = surface.points
     border = points[surface.border()]

@@ -165,7 +165,8 @@ def _kept(
 
 
 def _scale_of(at: Mapping[str, Doubles]) -> float:
-    """Metres of a unit: nobody is 20 m tall."""
+    """Metres per unit of the file: 0.01 if the head is more than 20 units above the lowest bone
+    (nobody is 20 m tall, so the unit is a centimetre), else 1."""
     low = min(float(place[1]) for place in at.values())
     return 0.01 if float(at["head"][1]) - low > _TALLEST else 1.0
 

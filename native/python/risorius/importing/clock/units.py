@@ -52,8 +52,8 @@ _NAMES: dict[str, str] = {
 # Texts in brackets after a frame number that are no unit.
 _NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
 _BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
-# Times without a unit are seconds if they step by at most this much (seconds): keys may be so far
-# apart, frames never are.
+# Times without a unit are seconds if their median step is at most this number, because keys can be
+# 4 s apart. Larger steps are ms, us or ns if they are usual steps (_STEPS) in that unit.
 _LONGEST_STEP = 4.0
 # Smallest and largest usual step of a capture in milliseconds: 250 and 5 frames per second.
 _STEPS = (4.0, 200.0)
