@@ -234,7 +234,7 @@ TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
   for (std::uint16_t joints = 1; joints < 4; ++joints) {
     const auto places = static_cast<std::uint16_t>(joints * 9);
     dna::Dna dna = make_face(2, 0, joints, 1);
-    // In descending order, so that each row is a piece of its own.
+    // A piece is a run of consecutive rows. In descending order each row is a piece of its own.
     std::vector<std::uint16_t> outputs;
     std::vector<float> values, expected(places);
     for (std::uint16_t p = places; p-- > 0;) {

@@ -53,8 +53,9 @@ std::string filtering(View bytes);
 /// A converted Dna can be written, and a second conversion changes nothing.
 std::string conversion(const dna::Dna& dna, View options);
 
-/// All of the above, for tests: written for its own version and for one of 2.1 to 2.8, evaluated,
-/// filtered and converted with one set of options; turn selects them.
+/// Checks the promises of a file in one call. A file that can be parsed is written for its own
+/// version and for one of 2.1 to 2.8, evaluated, filtered and converted. turn selects the second
+/// version and the options.
 std::string everything(View bytes, std::size_t turn);
 
 }  // namespace risorius::promises

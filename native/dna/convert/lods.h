@@ -55,7 +55,7 @@ struct LodPlan {
   std::uint16_t root = 0;
 };
 
-/// Nullopt if the selection keeps every LOD. In: a definition that validate accepts
+/// Nullopt if the selection keeps every LOD. In: definition  one that validate accepts
 core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
                                                const Definition& definition,
                                                const LodSelection& selection);

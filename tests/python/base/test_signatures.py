@@ -64,7 +64,8 @@ KINDS = {
 
 
 READERS = {
-    # reader, its suffix, kinds that it reads or reports in more detail
+    # Reader, suffix of the test's file, and words of the kinds that the test leaves out, because
+    # the reader reads such files or has a more detailed error for them.
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

@@ -19,8 +19,8 @@ class Row:
 
     Attributes:
         title: text before the sliders.
-        sliders: controls from left to right; a pair is left and right of one control, or its two
-            directions.
+        sliders: controls from left to right; a pair is one control on both sides of the face, or
+            one movement to the left and to the right.
     """
 
     title: str

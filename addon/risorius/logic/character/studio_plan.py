@@ -35,8 +35,8 @@ class Lamp:
 
     Attributes:
         name: key, fill or rim light.
-        place: centre of the softbox; it points at the origin.
-        size: width and height, in Blender units.
+        place: centre of the softbox in Blender units; it points at the origin.
+        size: width and height in Blender units.
         watts: radiant power.
         colour: linear RGB, 0 to 1.
     """

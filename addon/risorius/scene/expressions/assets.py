@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes pose assets of expressions in this file, with asset catalogues and pictures."""
+"""Makes pose assets of expressions in the open .blend file, with catalogues and pictures."""
 
 from __future__ import annotations
 

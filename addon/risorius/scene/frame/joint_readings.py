@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds joints of neck and head that constraints, keys or drivers rotate, not the control bones.
+"""Finds joints of neck and head that are rotated by constraints, keys or drivers of their own bone.
 
 The rotations of these joints are read from their evaluated bones. The search runs once per frame
 and after edits.

@@ -157,12 +157,16 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
+    The rotations are computed from the clip's curves of ANGLES. The joints of the neck or the head
+    get no curves if the clip has no angles of the neck or the head. A joint gets none either if
+    the clip already has a curve of one of its raw controls.
+
     Args:
-        clip: a clip with or without curves of ANGLES. Existing curves of these raw controls stay.
+        clip: a clip with or without curves of ANGLES.
         face: the character.
 
     Returns:
-        The clip with additional curves for each joint, one per component of its quaternion.
+        The clip with additional curves for each such joint, one per component of its quaternion.
     """
     raw = face.rig.raw_control_names
     given = dict(zip(clip.names, clip.curves, strict=True))

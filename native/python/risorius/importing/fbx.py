@@ -450,7 +450,10 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """Flags of each key, and slopes after it and before the next key, shared by runs of keys."""
+    """int64[count]: flags of each key; float64[count, 2]: slopes after it and before the next key.
+
+    The file stores both once for each run of keys that have them in common.
+    """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)

@@ -11,7 +11,8 @@ from .errors import AnimationFileError
 from .mapping import ANGLES, Mapping
 
 ANGLE_UNITS = ("radians", "degrees")
-# A full movement is 1, an exaggerated one up to 2; larger values are on another scale.
+# A full movement is 1, an exaggerated one up to 2. Values above 4 must be on another scale, such
+# as percent; values from 2 to 4 are accepted.
 _LARGEST = 4.0
 # radians, about 115 degrees; no head turns further
 _LARGEST_ANGLE = 2.0

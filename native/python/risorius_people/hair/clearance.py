@@ -147,7 +147,7 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """The roots of strips, as places on the vertices of this skin."""
+        """The roots of strips, as weighted corners of triangles; corners are rows of this skin."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:

@@ -40,10 +40,11 @@ class Standing:
 
 
 def turns(up: Doubles | None, front: Doubles | None) -> list[Doubles]:
-    """float64[3, 3] each: from the form to the surface, along the axes.
+    """float64[3, 3] each: rotations from the form to the surface that map axes to axes.
 
     Args:
-        up, front: float64[3], where the surface has them; None: anywhere.
+        up, front: float64[3], the head's directions in the axes of the surface; rotations more than
+            about 45 degrees away are left out. None: the direction is unknown.
     """
     axes = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
     out = []
