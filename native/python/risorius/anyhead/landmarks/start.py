@@ -90,8 +90,9 @@ def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
 
 
 def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> Doubles:
-    """float64[n, 3]: smooth correction that moves the landmarks of the first head onto those of the
-    second after the displacement by the models."""
+    """A smooth correction, float64[n, 3], in addition to the displacement by the fitted models.
+
+    With both, the landmarks of the first head meet the landmarks of the second head."""
     names = common(one, other)
     if not names:
         return np.zeros_like(inside)

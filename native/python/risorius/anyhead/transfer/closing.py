@@ -15,7 +15,7 @@ from ..surface import Surface
 from .template import TemplateFace
 
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
-_MOVES = 0.02  # cm: what a blink moves less is no lid
+_MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
 _MEETS, _APART = 0.1, 0.35  # cm: farthest places that meet, and nearest that are two lids at rest
 _AROUND = 0.3  # cm around places that meet, in which motions are multiplied
 _REST = 0.02  # of the most that places say together: from there motions stay as they are

@@ -43,7 +43,7 @@ def about_library(became: Assignment, folder: Path) -> list[str]:
 
 
 def _expression(name: str, controls: Sequence[str]) -> Expression:
-    """An expression that sets a shape's controls; its label and group are those of our library."""
+    """An expression that sets the controls of a shape, with the label and group of the library."""
     own = expressions.load().get(name)
     weights: Mapping[str, float] = {PREFIX + control: 1.0 for control in controls}
     if own is None:
