@@ -119,7 +119,7 @@ def main():
     parser.add_argument("--strength", type=float, default=1.0)
     parser.add_argument("--deepest", type=int, default=3)
     args = parser.parse_args()
-    template = risorius.load(args.template) if args.template else default_template()
+    template = risorius.load(args.template or default_template())
     source = read_template(template)
     print("| " + " | ".join(HEADS) + " |\n|" + "---|" * len(HEADS))
     for path in args.heads:
