@@ -29,7 +29,7 @@ class Converted:
     """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: largest difference of raw controls by the conversion, over the pose and all frames.
+        loss: largest change of a raw control by the conversion, over the pose and all frames.
         kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
         idle: names of other actions of the face whose keys have no effect after the switch.
@@ -42,10 +42,10 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about the loss of a conversion; None if it is at most board.SEEN.
+    """A sentence about raw controls that a conversion changed; None below board.SEEN.
 
     Args:
-        loss: differences of raw controls after a fit.
+        loss: differences of raw controls before and after the conversion.
     """
     if loss.largest <= board.SEEN:
         return None
@@ -171,7 +171,7 @@ def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
 def _leading_curves(
     action: bpy.types.Action, controls: ArmatureObject, live: runtime.Runtime, of_board: bool
 ) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of an action that move the board's handles, or the sliders that it reaches."""
+    """The F-curves of the board's handles (of_board), or of the sliders that the board moves."""
     if of_board:
         paths = {board.path_of(handle.bone) for handle in live.handles}
     else:
@@ -194,7 +194,8 @@ def convert(
         by_board: True: from sliders to handles; False: from handles to sliders.
 
     Returns:
-        The loss of raw controls at whole frames and at the keys, and the number of new curves.
+        The largest changes of raw controls at whole frames and at keys, and the number of new
+        curves.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))

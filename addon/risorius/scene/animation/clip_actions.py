@@ -432,7 +432,7 @@ class Turning:
     """The rotation of a control bone in an action.
 
     Attributes:
-        mode: its PoseBone.rotation_mode.
+        mode: rotation mode of the curves; it may differ from the mode of the bone.
         path: data path of the rotation property of this mode.
         curves: one F-curve for each component; None for a component without a curve.
         rest: components of the rest rotation.
@@ -444,7 +444,7 @@ class Turning:
     rest: tuple[float, ...]
 
     def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64[frames, 3 or 4]: the rotation at frames; at rest for missing curves."""
+        """float64[frames, 3 or 4]: the rotation; a component without a curve is at rest."""
         return np.stack(_rows(self.curves, self.rest, frames), axis=1)
 
 
@@ -457,7 +457,8 @@ def turning(
         bone: of the control armature; None gives None.
         curves: of an action, by data path and index.
     """
-    # The bone's own mode comes first, because an action of another face may have another mode.
+    # Curves of the bone's current rotation mode are preferred. The other modes are tried because
+    # the action may come from a face whose bones use another mode.
     if bone is None:
         return None
     for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):

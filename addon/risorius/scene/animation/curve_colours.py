@@ -42,7 +42,7 @@ def colour_of(region: str, step: int = 0) -> Colour:
 
 
 def label_of(path: str) -> str:
-    """The slider that an F-curve moves, or "". Args: path  data path of the F-curve."""
+    """The slider that an F-curve moves, "" for other curves. Args: path  the curve's data path."""
     start, _, end = parts.property_path("@").partition("@")
     if not path.startswith(start) or not path.endswith(end):
         return ""
