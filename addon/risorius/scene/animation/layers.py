@@ -105,9 +105,9 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point to a layer that pins the source frame shown at a scene frame to this frame.
+    """Add a warp point at a scene frame, with the source frame that the layer shows there.
 
-    The first warp point also adds one at each end, so that all frames keep their timing.
+    The first warp point also adds one at each end of the layer, so that the timing does not change.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -361,7 +361,7 @@ def unfire(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: in the list of fired reactions, from 0.
+        place: index of the reaction in `reactions_of`.
     """
     reactions_of(controls).remove(place)
     controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))
