@@ -165,7 +165,7 @@ def take(
         frame: of the scene.
         bones: data paths of `paths_of`; others are ignored.
         held: True: controls without a difference get a key too if the tweak moves them already.
-        old: earlier curves of the tweak, from `curves_so_far`; None: the current curves.
+        old: curves to which the changes are added, from `curves_so_far`; None: the current curves.
 
     Returns:
         The number of tweaked sliders and bones.
@@ -223,7 +223,7 @@ def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -
 
 @contextmanager
 def curves_so_far(controls: ArmatureObject) -> Iterator[Curves]:
-    """Yields a copy of the curves of the tweak's layer, for keys of several frames at once.
+    """Yields a copy of the curves of the tweak's layer, which stays unchanged by inserted keys.
 
     Args:
         controls: the control armature; without a tweak or layer the result is empty.
@@ -264,7 +264,7 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Data path -> values of the layer at a frame that reproduce the current bones."""
+    """Data path -> key values with which the tweak's layer reproduces the current bone poses."""
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -365,7 +365,7 @@ def changed(stand: Stand, other: Stand) -> Stand:
 
 
 def put(controls: ArmatureObject, stand: Stand) -> None:
-    """Set the controls to a pose; controls outside the pose stay.
+    """Set the controls to a pose; controls that the pose lacks keep their values.
 
     Args:
         controls: the control armature.
