@@ -27,7 +27,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
 
     Raises:
         BakeError: the scene has no simulation with a cache, a cache begins below frame 0, or a face
-            cannot be evaluated before its frame; if this shows during the bake, bakes are freed.
+            would be posed only after the simulation of a frame. If a face is late during the bake,
+            all bakes are freed.
     """
     found = [cache for _key, cache in caches.of_scene(context.scene)]
     count = len(found)
