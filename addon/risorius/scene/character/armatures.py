@@ -166,8 +166,8 @@ def build_rig(
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False
-    # It follows the control armature (rig_placement.py); moved together with it by the user, it
-    # would move twice as far.
+    # The rig follows the control armature (rig_placement.py). If the user moved both together, the
+    # rig would move twice as far.
     lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
@@ -178,11 +178,11 @@ def build_rig(
 
 
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Make Blender evaluate the controls with the rig, also if they are hidden.
+    """Add drivers to the rig so that Blender evaluates the controls even if they are hidden.
 
-    Without a dependency Blender skips hidden objects in viewport and render, and the face would not
-    move. The drivers read the bones, because Blender evaluates only those components of a hidden
-    object that something visible depends on.
+    Blender skips hidden objects that no visible object depends on, and the face would not move. The
+    drivers read each control bone, because Blender evaluates only the bones of a hidden armature
+    that something visible depends on.
 
     Args:
         rig: the deforming armature.
@@ -218,7 +218,7 @@ def _pulling(rig: ArmatureObject) -> bpy.types.Driver | None:
 
 
 def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Make Blender also evaluate new bones of the controls, see `pull_controls`.
+    """Extend the driver of `pull_controls` to new bones of the control armature.
 
     Args:
         rig: the deforming armature.
@@ -233,7 +233,7 @@ def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
 
 
 def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
-    """Remove dependencies on control bones before these are deleted.
+    """Remove control bones from the driver of `pull_controls` before the bones are deleted.
 
     Args:
         rig: the deforming armature.
@@ -315,7 +315,7 @@ def build_controls(
 
 
 def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
-    """Places of the control bones: name -> (position, axis, length, name of the parent)."""
+    """Control bone -> (position, direction, length in Blender units, name of the parent bone)."""
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -346,7 +346,7 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The extent of the face, for placing the outlines. Args: plan  meshes and joints of a face."""
+    """The extent of a face, to place outlines of bones. Args: plan  its meshes and joints."""
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)

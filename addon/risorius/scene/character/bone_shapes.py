@@ -66,12 +66,12 @@ def _cross() -> list[Line]:
 
 
 def _collar() -> Line:
-    """A band around the front of a neck; the back is left out, because it would cross the mouth."""
+    """A band around the front of a neck; the back is left out, because it would hide the mouth."""
     outer = [(1.0, 0.0), (1.0, 0.6), (0.6, 1.0), (-0.6, 1.0), (-1.0, 0.6), (-1.0, 0.0)]
     return outer + [(0.93 * x, 0.93 * y) for x, y in reversed(outer)]
 
 
-# Outlines lie in the xy plane, with a radius of about 1.
+# Control bone -> lines of its outline in the xy plane, with a radius of about 1.
 _OUTLINES: dict[str, list[Line]] = {
     "head": [_ring(), _ring(0.94)],
     "neck": [_collar()],
@@ -138,7 +138,8 @@ def disc(name: str) -> bpy.types.Object:
     """Make a filled disc of radius 1, which is easy to click. Args: name  of the datablocks."""
     mesh = bpy.data.meshes.new(name)
     ring = [(x, y, 0.0) for x, y in _ring()]
-    # Two opposite faces, because Blender does not draw back faces, and some handles show them.
+    # The disc has a second face for its back, because Blender draws only the front of a face and
+    # some handles are seen from behind.
     back = range(2 * _COUNT - 1, _COUNT - 1, -1)
     mesh.from_pydata([*ring, *ring], [], [range(_COUNT), back])
     return bpy.data.objects.new(name, mesh)
