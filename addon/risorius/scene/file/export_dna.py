@@ -187,9 +187,10 @@ class _Job:
     def _neutral(
         self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
     ) -> None:
-        """Write the neutral coordinates that differ from the import; others keep their bits."""
+        """Write the neutral coordinates that differ from the import; others stay bit-identical."""
         moved = user_edits.changed(shape.points, mesh_plan.positions)
-        # The axes are only exchanged and mirrored, so each Blender coordinate is one of the file.
+        # Blender's axes are the file's axes in another order and direction, so each coordinate in
+        # Blender belongs to one coordinate in the file.
         theirs = moved @ (np.abs(self._space.axes) > 0.5)
         positions = dna_mesh.positions.copy()
         positions[theirs] = self._space.file_points(shape.points)[theirs]
@@ -290,7 +291,7 @@ def _normalised(
 
 
 def _keep_report(rig: ArmatureObject, sentences: Sequence[str]) -> None:
-    """Write the report to a Text and to the console."""
+    """Write the report of an export to a Text and to the console."""
     title = f"{rig.name.removesuffix('_rig')} export report"
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
     text.from_string("\n".join(sentences) + "\n")
