@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a sample person in a thread."""
+"""Builds the DNA file of a sample person in a background thread."""
 
 from __future__ import annotations
 
