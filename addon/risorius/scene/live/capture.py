@@ -30,7 +30,7 @@ _REDRAW = 0.25  # seconds between redraws of the status
 
 @dataclass
 class _State:
-    """State of the timer."""
+    """State of the timer that writes captured faces."""
 
     error: str = ""  # why the last capture ended by itself
     since_redraw: float = 0.0  # seconds
