@@ -76,7 +76,7 @@ def write(
     """Make an action from baked tracks. A track that stays at its current value gets no F-curve.
 
     Args:
-        name: of the action.
+        name: name of the action.
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
@@ -163,7 +163,8 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
     points = curve.keyframe_points
     points.add(len(times))
     places = np.stack([times, values], axis=1).ravel()
-    # Linear keys ignore their handles. Handles at the key itself save Blender the slow computation.
+    # Linear keys ignore their handles. Placing these at the key saves Blender their slow
+    # computation.
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))

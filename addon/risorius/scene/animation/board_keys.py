@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts the current pose and the keys of an action between sliders and the face board."""
+"""Converts the current pose and the keys of an action between sliders and the face board.
+
+Either the sliders or the board lead, that is, move the face; the others have no effect.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about raw controls that a conversion changed; None below board.SEEN.
+    """A sentence about raw controls that a conversion changed by more than board.SEEN, or None.
 
     Args:
         loss: differences of raw controls before and after the conversion.
@@ -100,7 +103,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
     Args:
         context: with a view layer.
         rig: a character with a face board; its control armature must not be linked.
-        kind: of the new board, runtime.PRIMARY or runtime.COMPLETE.
+        kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
         The result of the conversion to the new board; empty if the sliders lead.

@@ -102,9 +102,9 @@ def make_action(
 
     Args:
         rig: the character's deforming armature.
-        clip: risorius.Clip; curves such as "head.yaw" turn the bones of head, neck and eyes.
+        clip: risorius.Clip; curves such as "head.yaw" rotate the bones of head, neck and eyes.
         timing: place of the clip in the scene, from timing_of.
-        name: of the action.
+        name: name of the action.
         with_eyes: animate the eye bones too if the clip has eye rotations.
         tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a
             tenth of this value for rotations of bones. 0: a linear key for each sample.
@@ -208,7 +208,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
     """Add keys to a curve and keep its existing keys.
 
     Args:
-        curve: of an action.
+        curve: F-curve of an action.
         keys: new keys, at frames where the curve has no key.
         bent: True: Bezier interpolation; False: linear.
     """
@@ -308,7 +308,7 @@ def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> 
     Args:
         rig: deforming armature of the character.
         action: any action.
-        name: of the track and the strip; "": the name of the action.
+        name: name of the track and the strip; "": the name of the action.
 
     Returns:
         The strip.
@@ -454,8 +454,8 @@ def turning(
     """The curves that rotate a control bone; None if there are none.
 
     Args:
-        bone: of the control armature; None gives None.
-        curves: of an action, by data path and index.
+        bone: pose bone of the control armature; None gives None.
+        curves: F-curves of an action, by data path and index.
     """
     # Curves of the bone's current rotation mode are preferred. The other modes are tried because
     # the action may come from a face whose bones use another mode.
@@ -474,9 +474,9 @@ def turning_in(
     """The curves that rotate a control bone in one rotation mode.
 
     Args:
-        bone: of the control armature.
+        bone: pose bone of the control armature.
         mode: a value of PoseBone.rotation_mode.
-        curves: of an action, by data path and index.
+        curves: F-curves of an action, by data path and index.
     """
     name = bpy.utils.escape_identifier(bone.name)
     path = f'pose.bones["{name}"].{_ROTATIONS.get(mode, "rotation_euler")}'
@@ -541,9 +541,9 @@ def add_sound(
 
     Args:
         scene: the scene.
-        path: of the sound file.
+        path: path of the sound file.
         frame: frame of the first sample, rounded to a whole frame.
-        name: of the strip; "": the name of the file.
+        name: name of the strip; "": the name of the file.
 
     Returns:
         The strip.

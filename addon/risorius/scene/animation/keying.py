@@ -268,7 +268,7 @@ def pose_at(controls: ArmatureObject, frame: float, now: Pose) -> Pose:
 
     Args:
         controls: the control armature.
-        frame: of the action; need not be whole.
+        frame: frame of the action; need not be whole.
         now: the current pose.
     """
     keyed = curves_by_path(controls)
@@ -347,7 +347,7 @@ def insert(
         controls: the control armature.
         labels: sliders to key; sliders with drivers are left out.
         bones: data paths of bones to key.
-        frame: of the scene; need not be whole.
+        frame: frame of the scene; need not be whole.
         rules: settings for new keys.
 
     Returns:

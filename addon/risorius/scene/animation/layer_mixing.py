@@ -68,7 +68,7 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Cache of compiled sources and masks; the keys are the settings they were made from."""
+    """Cache of compiled layer sources (clips or poses) and masks, by the settings of the layer."""
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
@@ -305,7 +305,7 @@ def native_layer(
         kept: receives the source and the mask of this layer.
 
     Raises:
-        ValueError: the layer has nothing to play, or its source moves no control of this face; the
+        ValueError: the layer has nothing to play, or its source cannot be used on this face; the
             text gives the reason.
     """
     old, kept = old or Kept(), kept or Kept()
@@ -352,8 +352,8 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """Times in seconds at which a constant pose plays: always, from its start on, or for its
-    length."""
+    """Times in seconds at which a layer plays a constant pose: always, from the start of the layer
+    on, or for its length."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}

@@ -193,7 +193,7 @@ def remove(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
     """
     layer = places(controls)[place]
     below = of(controls).index(layer) - 1
@@ -224,7 +224,7 @@ def move(controls: ArmatureObject, place: int, up: bool) -> bool:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
         up: True: up; False: down.
 
     Returns:
@@ -252,7 +252,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
 
     Returns:
         The copy.
@@ -342,8 +342,8 @@ def fire(
 
     Args:
         controls: control armature of the character.
-        name: of the reaction, see known_reactions.
-        frame: of the scene; need not be whole.
+        name: name of the reaction, see known_reactions.
+        frame: frame of the scene; need not be whole.
         strength: 0 to 1, factor on the reaction's values.
 
     Returns:

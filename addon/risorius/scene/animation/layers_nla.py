@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Convert layers to tracks of Blender's NLA."""
+"""Converts layers to tracks of Blender's NLA."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The mesh to read: a selected object of `sources`, else its only object, else None.
+    """The mesh to read: a selected object in `sources`, else the only object in it, else None.
 
     Args:
         context: has the scene.

@@ -61,7 +61,7 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """The evaluated controls below a tweak on a face with NLA strips.
+    """Cached pose of the controls without the tweak, for a face with NLA strips.
 
     Attributes:
         frame: frame of the scene.
@@ -76,8 +76,8 @@ class _Below:
 
 # Session uid of a control armature -> controls that the user moved without a key.
 _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
-# Session uid of a control armature checked since load or undo -> cached pose below its tweak, or
-# None.
+# Session uid of a control armature whose action was checked since load or undo -> its cached pose
+# without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
 # Session uid of a control armature -> reason why the tweak refused its last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
@@ -382,7 +382,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the pose below the tweak; None if none does."""
+    """The controls that differ from the pose without the tweak; None if none does."""
     rig = parts.rig_of(controls)
     if rig is None:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tweaks a range of frames: edits are stored in an additive layer, and the keys below stay.
+"""Tweaks a range of frames: edits go into an additive layer, and the keys below it stay.
 
 While a tweak is on, the layer stores the difference between an edited slider and the keys below,
 and the slider returns to the value of these keys. The same applies to the bones of head, neck and
@@ -323,7 +323,7 @@ def _insert(
 
 
 def is_mixed(controls: ArmatureObject) -> bool:
-    """Whether NLA strips or the blending of the action affect the pose, not the action alone."""
+    """Whether the pose depends on NLA strips or on the blending of the active action."""
     data = controls.animation_data
     if data is None:
         return False
@@ -437,8 +437,8 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by the moved handles of a leading board; the handles return to
-    the pose below the tweak."""
+    """Slider -> change of its value by moved handles, if the face board leads. The handles return
+    to the pose without the tweak."""
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}

@@ -2,8 +2,8 @@
 """Bakes the animation of a face to actions, and restores the live face.
 
 Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
-file looks the same in a Blender without the add-on. The armatures and
-shape keys store their earlier animation for the way back.
+file looks the same in a Blender without the add-on. Armatures and shape keys store their earlier
+animation for the way back.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class BakeOptions:
         kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
         start, end, step: range and step in frames; the step may be a fraction.
         lod: level of detail of a RESULT; -1: the level in the viewport.
-        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; the rest stays still.
+        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; others do not move.
         error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
         strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """

@@ -36,7 +36,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         raise BakeError(told("There is no simulation with a cache in this scene."))
     begin = min(cache.frame_start for cache in found)
     if begin < 0:
-        # Blender reads cache frames as unsigned numbers, so a negative frame reads as the last.
+        # Blender reads cache frames as unsigned numbers, so it would show the last cached frame at
+        # negative frames.
         raise BakeError(
             told(
                 "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "

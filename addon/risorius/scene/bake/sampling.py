@@ -3,8 +3,9 @@
 
 Blender evaluates actions, NLA, drivers, constraints and bodies in a separate scene that has only
 the two armatures of the face and the objects they depend on. The result of every frame equals frame
-stepping in the user's scene, whose other objects are not evaluated and whose frame stays. A few
-features need the user's scene itself (`_needs_whole_scene`); its frame is restored afterwards.
+stepping in the user's scene. Other objects of that scene are not evaluated, and its current frame
+does not change. A few features need the user's scene itself (`_needs_whole_scene`); its frame is
+restored afterwards.
 """
 
 from __future__ import annotations

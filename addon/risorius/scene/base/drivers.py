@@ -148,7 +148,7 @@ def plain_driver(
         curve: F-curve of a new driver without variables.
         owner: the object with the property.
         data_path: path from the object to one number.
-        name: of the driver's variable.
+        name: name of the driver's variable.
     """
     driver = curve.driver
     assert driver is not None

@@ -44,7 +44,7 @@ class Stage:
         data = bpy.data.temp_data()  # a context manager, contrary to the stubs
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # getrefcount must give 3: this attribute, Blender's reference, and the call's argument.
+        # getrefcount must give 3: self._file, Blender's own reference, and the call's argument.
         if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
@@ -54,7 +54,7 @@ class Stage:
         self.roots = identity(roots)
 
     def evaluate(self, user: bpy.types.Scene) -> Depsgraph:
-        """The evaluated graph at the current frame and time settings of the user's scene."""
+        """The dependency graph at the current frame and time settings of the user's scene."""
         render = self._scene.render
         for name in _TIME:
             value = getattr(user.render, name)
@@ -129,7 +129,7 @@ def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]
 
     Args:
         controls: the control armature.
-        frame: of the scene; need not be whole.
+        frame: frame of the scene; need not be whole.
     """
     whole = math.floor(frame)
     made = Stage([controls])

@@ -32,7 +32,7 @@ def telling(
 
 
 class Task(Generic[Result]):
-    """Work in a thread.
+    """A function that runs in a background thread, with its progress and result.
 
     Attributes:
         share: progress, 0 to 1.

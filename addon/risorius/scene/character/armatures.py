@@ -73,7 +73,7 @@ def edit_armature(
 
 @contextmanager
 def kept_selection(context: Context) -> Iterator[None]:
-    """Context manager: restore the active object, its mode and the selection."""
+    """Context manager: at the end, restore the active object, its mode and the selection."""
     layer = context.view_layer
     active = layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
@@ -138,7 +138,7 @@ def build_rig(
         context: a Blender context with a view layer.
         plan: names, joints and meshes of the character.
         made: receives every new datablock.
-        workshop: a linked collection for editing bones.
+        workshop: a collection in the scene, in which bones are edited.
 
     Returns:
         The armature object; each bone stores its joint index.
@@ -275,7 +275,7 @@ def build_controls(
         context: a Blender context with a view layer.
         plan: names, joints, meshes and controls of the character.
         made: receives every new datablock.
-        workshop: a linked collection in which bones are edited.
+        workshop: a collection in the scene, in which bones are edited.
 
     Returns:
         The armature object.
@@ -367,7 +367,7 @@ def add_properties(
     """Add the float property of each slider to a pose bone, with limits, default and tooltip.
 
     Args:
-        bone: the bone of the face.
+        bone: the pose bone that stores the sliders.
         controls: label, rest and lowest value of each slider.
         maximum: largest value of all sliders.
     """
@@ -380,7 +380,7 @@ def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maxi
     """Set limits, default and tooltip of one slider.
 
     Args:
-        bone: the bone of the face, which has the property already.
+        bone: the pose bone that stores the sliders; it has the property already.
         control: label, rest, lowest value and description of the slider.
         maximum: largest value of the slider.
     """

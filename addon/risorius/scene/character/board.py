@@ -254,7 +254,7 @@ def given(rig: ArmatureObject) -> dict[str, float]:
 
 
 def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
-    """Move the board as near to raw controls as possible, starting from its current pose.
+    """Move the handles so that the face comes as near as possible to wanted raw controls.
 
     Args:
         rig: a character with a face board.
@@ -445,5 +445,5 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
 
 def path_of(bone: str) -> str:
-    """The data path of a handle's location, from the armature object. Args: bone  of the handle."""
+    """The data path of a handle's location, from the armature. Args: bone  name of its bone."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'

@@ -66,7 +66,7 @@ def _cross() -> list[Line]:
 
 
 def _collar() -> Line:
-    """A band around the front of a neck; the back is left out, because it would hide the mouth."""
+    """A band around the front of a neck; the back is left out, because it would cross the mouth."""
     outer = [(1.0, 0.0), (1.0, 0.6), (0.6, 1.0), (-0.6, 1.0), (-1.0, 0.6), (-1.0, 0.0)]
     return outer + [(0.93 * x, 0.93 * y) for x, y in reversed(outer)]
 
@@ -120,7 +120,7 @@ def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
     """Make a wire mesh object of open lines, in no collection.
 
     Args:
-        name: of the new datablocks.
+        name: name of the new datablocks.
         lines: corners of each line in the xy plane.
     """
     corners: list[tuple[float, float, float]] = []

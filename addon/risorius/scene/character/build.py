@@ -52,7 +52,7 @@ class _File:
     """A DNA file that was read and compiled.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         content: bytes of the file.
         dna: Dna parsed from these bytes.
         rig: risorius.Rig compiled from the Dna.
@@ -82,7 +82,7 @@ def import_file(
 
     Args:
         context: a Blender context with scene and view layer.
-        path: of the DNA file.
+        path: path of the DNA file.
         options: levels, shapes and materials to build.
         progress: function that is called with the progress, 0 to 1.
 
@@ -272,7 +272,7 @@ def _into_place(
 
 
 def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
-    """Switch the meshes of a character to another kind of shapes.
+    """Switch the shape keys of a character's meshes to another mode.
 
     Args:
         rig: the deforming armature.

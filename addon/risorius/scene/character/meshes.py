@@ -259,7 +259,7 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        Result of user_edits.key_edits.
+        bool[V], whether a vertex was edited, and float64[V, 3] offsets, see user_edits.key_edits.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
@@ -270,7 +270,7 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
 
     Args:
         item: the mesh object.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:
@@ -293,7 +293,7 @@ def add_channel_key(
         item: the mesh object.
         rig: deforming armature with the weights of channels.
         channel: index of the blend shape channel.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:

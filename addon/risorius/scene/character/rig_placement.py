@@ -163,7 +163,7 @@ def attach(
     hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
-    # Relative to the body's rest pose, so that the body's current pose moves the face.
+    # The face is attached relative to the body's rest pose, so that the current pose moves it.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
     hold.set_inverse_pending = False

@@ -45,7 +45,7 @@ class Skin:
 
     @classmethod
     def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
-        """The skin of a character.
+        """Collect the visible meshes of a character.
 
         Args:
             context: has the visible scene.

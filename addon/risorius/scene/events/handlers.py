@@ -104,7 +104,7 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. Control armatures are not tagged, because that would call it again."""
+    """React to edits. Tag no control armature, because that would trigger this handler again."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
@@ -274,7 +274,7 @@ def _loaded(*_arguments: object) -> None:
 
 @persistent
 def _restored(*_arguments: object) -> None:
-    """After load, undo and redo: forget the last written values, because they do not apply.
+    """After load, undo and redo: forget the last written values, which may differ from the data.
 
     Pose bones must not be read here: until the next update, those of restored objects point to
     freed bones, and Blender would crash.
@@ -324,7 +324,7 @@ def _before_save(*_arguments: object) -> None:
 
 @persistent
 def _saved(*_arguments: object) -> None:
-    """After a save: restore solo, mute and heat maps, which were removed for the save."""
+    """After a save: restore Direct mode, solo, mute and heat maps, which files do not contain."""
     if native.problem():
         return
     ordinary.take_off(parts.rigs())

@@ -122,7 +122,7 @@ def give_picture(action: bpy.types.Action, path: Path) -> bool:
 
     Args:
         action: the asset.
-        path: of the PNG file.
+        path: path of the PNG file.
 
     Returns:
         Whether the preview was set; False if the file is missing or no PNG.

@@ -36,7 +36,7 @@ class Piece:
     """One mesh to draw.
 
     Attributes:
-        index: of the mesh in the DNA.
+        index: index of the mesh in the DNA.
         triangles: int64[F, 3], vertex indices.
         uvs: float64[F, 3, 2], UV coordinates of the triangles' corners.
         colors: float64[F, 3] in [0, 1], colours of triangles without an image, and of hairs.

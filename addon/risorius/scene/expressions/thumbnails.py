@@ -218,7 +218,7 @@ def make(
     """Draw pictures and write their files, without using Blender data.
 
     Args:
-        sitter: the character.
+        sitter: data of the character, from sitter_of.
         jobs: the pictures to draw.
         progress: function that is called with the progress, 0 to 1.
         cancelled: function that returns whether to stop.

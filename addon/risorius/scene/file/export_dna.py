@@ -39,7 +39,7 @@ class ExportOptions:
 def export(
     context: Context, rig: ArmatureObject, options: ExportOptions | None = None
 ) -> tuple[bytes, list[str]]:
-    """The bytes of a character's DNA file.
+    """The bytes of a character's DNA file with the user's edits.
 
     Args:
         context: a Blender context with scene and view layer.
@@ -219,7 +219,7 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Write skin weights of vertices that the user painted; other weights keep their bits."""
+        """Write skin weights of vertices that the user painted; others stay bit-identical."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
@@ -259,7 +259,7 @@ class _Job:
             if edit.moved:
                 change = self._space.file_points(edit.after[None, :3, 3])[0]
                 before = self._space.file_points(edit.before[None, :3, 3])[0]
-                # Coordinates that did not change keep their bits.
+                # Coordinates that did not change stay bit-identical.
                 far = np.abs(change - before) > 1e-6 * np.abs(before).max(initial=1e-9)
                 offsets[joint][far] = change[far]
             if edit.turned:

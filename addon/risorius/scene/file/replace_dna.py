@@ -44,7 +44,7 @@ def replace_file(
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
-        path: of the DNA file; it may be the same file.
+        path: path of the DNA file; it may be the same file.
         progress: function that is called with the progress, 0 to 1.
 
     Returns:

@@ -24,7 +24,7 @@ def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
     """A task that builds a person.
 
     Args:
-        path: of the new DNA file; its folder may contain the data package (.whl).
+        path: path of the new DNA file; its folder may contain the data package (.whl).
         person: a key of the sample package's PEOPLE.
         offline: True: do not download.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test override of a channel: the user sets the weight of one blend shape until the next change.
+"""Overrides the weight of one blend shape channel for a test, until the next change.
 
 The deforming armature stores the override with the frame and a hash of the raw controls. If either
 changes, the override ends, so that no frame depends on a forgotten test. Saving and rendering end

@@ -40,7 +40,7 @@ class Look:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the whole face is shown."""
+        """Whether no control is solo and no part of the face is muted."""
         return not self.solo and not self.muted
 
 

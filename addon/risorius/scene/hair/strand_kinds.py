@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the strands that replace hair cards, by kind of hair."""
+"""Defines number and shape of the strands that replace hair cards, for each kind of hair."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ _HANDLERS = (
 
 
 def register() -> None:
-    """Add the handlers."""
+    """Add the handlers for load, save, undo and redo."""
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

@@ -153,7 +153,7 @@ def firing(now: present.Present) -> list[int]:
 
 
 def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
-    """For each of some controls, the current pose without the effect of this control.
+    """Index of a control -> the current pose without the effect of this control.
 
     Args:
         now: the current face.

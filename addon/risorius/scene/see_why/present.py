@@ -113,7 +113,7 @@ def factors_of(live: runtime.Runtime) -> Factors:
 
 
 def name_of(live: runtime.Runtime, control: int) -> str:
-    """The name of a control in lists: its last part; for a corrective its shape or its factors.
+    """The name of a control for lists: its short name; for a corrective its shape or its factors.
 
     Args:
         live: Runtime of the character.

@@ -91,7 +91,7 @@ def _buffers(count: int) -> dict[str, NDArray[np.float32]]:
 def pose_of(
     writer: Writer, deltas: NDArray[np.float32], turns: Mapping[str, Quaternion]
 ) -> dict[str, NDArray[np.float32]]:
-    """The values of the bones that the evaluator owns.
+    """The values of the bones that the evaluator writes.
 
     Args:
         writer: see writer_of.

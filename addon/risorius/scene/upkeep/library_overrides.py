@@ -3,7 +3,7 @@
 
 Blender refuses bulk writes to linked data and to overrides that are not editable, and to the
 shape keys of every override. So the override is made fully editable, and its meshes either have
-real keys, which drivers move without any write, or are copied into this file.
+real keys (one per channel), which drivers move without any write, or are copied into this file.
 """
 
 from __future__ import annotations

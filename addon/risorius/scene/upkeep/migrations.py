@@ -108,7 +108,7 @@ def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_4(rig: ArmatureObject, _controls: ArmatureObject) -> list[str]:
-    """Let materials read animated maps from a mesh, because Direct mode does not pose bones."""
+    """Let materials read animated maps from a mesh, because Direct mode updates no armature."""
     if not rig.override_library:
         if armatures.joints_are_shown(rig):
             rig[parts.JOINTS_SHOWN] = True
