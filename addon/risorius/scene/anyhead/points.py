@@ -66,7 +66,7 @@ def of(head: bpy.types.Object) -> dict[str, Point]:
             stayed = np.linalg.norm(place - found) <= _STAYED * size
             state = FOUND if stayed else MOVED
         name = saved.text(item, parts.LANDMARK)
-        # Ignores copies of an empty, which come later in the order of names.
+        # Copies of an empty sort after the original by name, and setdefault ignores them.
         out.setdefault(name, Point(name, place, state, item))
     return out
 
