@@ -349,7 +349,7 @@ def _renamed(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> Sound:
-    """The sound with the word and mouth shape of a marker's name; raises SpokenError if unknown."""
+    """The sound with the word and mouth of a marker's name. Raises: SpokenError  unknown mouth."""
     if mark.name == before.name:
         return sound
     word, colon, _ = mark.name.rpartition(":")
