@@ -24,7 +24,7 @@ class Row:
     Attributes:
         does: a sentence: the effect of the control.
         words: words by which the control is found.
-        side: the sentence on its side, or nothing.
+        side: a sentence that names the side of the control; "" for a control without a side.
     """
 
     does: str

@@ -26,10 +26,10 @@ ANCHORS = (
 
 
 def colours(shares: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Colours in sRGB.
+    """The sRGB colours of values on the heat map.
 
     Args:
-        shares: float64[n], 0 at the cool end, 1 at the hot end; values outside are clamped.
+        shares: float64[n], values from 0 (cool) to 1 (hot); others are clamped to this range.
 
     Returns:
         float32[n, 4], opaque.

@@ -82,9 +82,10 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
 
 
 def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
-    """Retry two GUI controls with a common output; one may hold a value that the other needs.
+    """Refit two GUI controls that drive the same raw control, if that improves a pose.
 
-    Both are set to 0, and each of them is fitted first once. Args: gui changed in place if better.
+    One of them can drive the raw control so far that the other has no effect. So both are set to 0
+    and fitted in both orders. Args: gui  is changed in the poses that improve.
     """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):

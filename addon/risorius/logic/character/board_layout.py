@@ -104,8 +104,9 @@ class Board:
     height: float
 
 
-# Title, columns for each side, middle columns. Side columns are ordered from the outer side of the
-# face inwards, and the handles of a column from the top down.
+# _FACE has a row for each block of the board: title, columns of handles for each side of the
+# face, columns in the middle. A column lists handles from the top down. The columns of a side are
+# ordered from the outer edge of the face inwards.
 _Columns = tuple[tuple[str, ...], ...]
 _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
     (
@@ -195,7 +196,7 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Handles above a common label, each with the offset of its rest place from the corner."""
+    """Handles above a common label; each has the offset of its rest place from the upper left."""
 
     width: float
     height: float
@@ -303,7 +304,7 @@ def handles_of(
 
 
 def _upright(handle: Handle) -> Handle:
-    """The handle with y upwards if both axes would be horizontal."""
+    """The same handle; if both of its axes are horizontal, its y axis is made vertical."""
     if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
         return handle
     return replace(handle, y=replace(handle.y, way=UP))

@@ -182,7 +182,7 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
 
 
 def read_mask(stem: str) -> dict[str, int]:
-    """Mask regions in a texture file -> channel; regions in lower case, often none."""
+    """Region in lower case -> channel of a mask file; empty if the file is no mask."""
     word = stem.lower()
     packed = _PACKED.match(word)
     if packed:
