@@ -102,9 +102,9 @@ def _repository(installed):
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or real keys on posed bones.
+    """The mode of the face: Direct mode, or posed bones with real keys.
 
-    Tests of frames add a live key.
+    Test files about frames replace this fixture and add the mode with one live key.
     """
     return request.param
 

@@ -84,7 +84,7 @@ def _fill(dna_file):
     return rig
 
 
-# Entries that loading a file did not empty before the registry existed.
+# Entries that must be emptied when a file is loaded.
 MISSED = (
     "caches.late",
     "controls_ahead.edited",

@@ -77,7 +77,6 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-# How far a strand strays: in cards' widths, in rows of two centimetres; metres, by which tips part
 # How far a strand may leave its card: in widths of a card, in rows of 2 cm, and the distance in
 # metres by which tips separate along each axis.
 ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
@@ -126,7 +125,7 @@ def test_roots_stand_between_the_cards_too(haired):
     # Strands use the texture's colour at transparent places between hairs, too.
     pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
     assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
-    # If each strand were in a tuft as wide as its card, there would be gaps of a quarter.
+    # The gaps between cards are a quarter of a card wide; roots fill these gaps too.
     assert np.diff(side).max() < 0.2
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 

@@ -89,7 +89,7 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
 def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
     """The height of the weave is rendered as light.
 
-    It is visible from 30 cm, and even from 3 m, where a thread is smaller than a pixel.
+    The weave is visible from 30 cm. From 3 m, where a thread is smaller than a pixel, it is flat.
     """
     face = small_face()
     skin = face.meshes[0]
@@ -196,8 +196,8 @@ def test_a_mask_of_the_metadata_limits_its_map(tmp_path):
     assert changed[solid & (x > 0.15 * width)].max() <= 2 / 255
 
 
-# A wrinkle map with complete normals or colours, and with differences around 0.5: left half, right
-# half.
+# Colours of the left and right half of a wrinkle map: complete normals or colours in WHOLE,
+# differences around 0.5 in OFFSETS.
 WHOLE = ((0.85, 0.5, 0.85), (0.85, 0.5, 0.85))
 OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved files have the form of Live mode; undo, copies and Blender's own files are restored."""
+"""Saved files have the form of Live mode.
+
+Faces return to Direct mode after undo, after copying, and in files that Blender writes by itself.
+"""
 
 import addon_utils
 import bpy

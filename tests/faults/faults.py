@@ -397,7 +397,7 @@ GROUPS: dict[str, Group] = {
 
 
 def line(row: Row) -> str:
-    """E.g. "kill       convert       30 runs  0 faults"."""
+    """A trial's results as a line: "kill       convert       30 runs  0 faults"."""
     what = f"{row.runs:5} runs {len(row.faults):4} faults"
     if row.not_run:
         what = f"NOT RUN: {row.not_run}"

@@ -55,7 +55,8 @@ LODS = 8
 GROUPS = 122
 FILLED = 0.149  # filled fraction of the merged matrix of the joint groups
 HEAD_CENTRE = (0.0, 150.0, 0.0)
-# Rotations of neck_01, neck_02 and head in degrees, and the axis of the joint.
+# Poses of the neck: name; axis of the joints (0 x, 1 y, 2 z) about which neck_01, neck_02 and head
+# rotate; the three angles in degrees.
 NECK_POSES: tuple[tuple[str, int, Triple], ...] = (
     ("default", 2, (0, 0, 0)),
     ("turnUp_55", 2, (10, 20, 25)),

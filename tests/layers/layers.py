@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks the includes and imports of a part of the project against its rooms in rooms.toml."""
+"""Checks that folders (rooms) include and import only as rooms.toml allows."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ REGISTRATION = "registration.py"
 WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
 CACHES = {"cache", "lru_cache"}
-# Changed by being read, or made to be changed, whatever the name.
+# Types whose objects reading changes, or whose purpose is change; no name makes them constants.
 ALWAYS_MUTABLE = {
     "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
     "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",
@@ -37,7 +37,7 @@ FIXED = {
     "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
     "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
 }  # fmt: skip
-# Classes whose objects a constant may be. Lock: it remembers nothing after its `with`.
+# Classes whose objects may be constants. A Lock is allowed, because it stores nothing after `with`.
 VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
 CHANGES = {
     "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",

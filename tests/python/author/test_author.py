@@ -464,7 +464,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    # The result of 200 rounds depends on the compiler's rounding.
+    # The limit is loose, because the compiler's rounding changes the result of 200 rounds.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)

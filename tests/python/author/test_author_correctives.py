@@ -29,7 +29,7 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """The egg in a combination: less smile, and an additional bulge."""
+    """Sculpts of two combinations for the egg-shaped head: less smile, and an additional bulge."""
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -66,7 +66,7 @@ def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    # The tolerance of each active expression and corrective, and rounding.
+    # Each active expression and corrective may err by the tolerance; 2 % are for rounding.
     parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
     assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
@@ -324,8 +324,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Near the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
-    # elsewhere makes undoing cheap.
+    # `both` enters the ball by 0.35 mm. One expression alone enters it by more than 4 mm, so a
+    # repair that only undoes the other expression would make the depth larger.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])

@@ -23,7 +23,7 @@ MASKS = {
     131: ["joint_behavior_metadata"],
     259: ["twist_swing_behavior"],
 }
-# Files without digests: filtered loads are compared by name, which digests lack.
+# Golden files without digests, because filtered loads are compared by names, and digests have none.
 FILES = sorted(
     p.name
     for p in GOLDEN_SET.glob("*.decode.*")
