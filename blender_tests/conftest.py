@@ -111,7 +111,7 @@ def mode(request):
 
 @pytest.fixture
 def dna_file(tmp_path):
-    """A small DNA file like a face, made by our own code."""
+    """The path of a small DNA file that contains a simple face."""
     from support.faces import small_face
 
     path = tmp_path / "small.dna"

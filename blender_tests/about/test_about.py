@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The self-test, the contents of a face, and the timing overlay in every mode."""
+"""Tests of the self-test, of the list of a face's contents, and of the timing overlay."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions of the controls and are exported again, at any rate and in every target."""
+"""Clips become actions, strips or layers of the controls at any rate, and are exported again."""
 
 import hashlib
 import importlib.util

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked simulations: from older files, in other processes, between frames."""
+"""Tests of baked simulations: in older files, in other processes, and between frames."""
 
 import json
 

@@ -65,7 +65,7 @@ def shown(rig, frame=None, name=JAW):
 
 
 def press_i(rig, name=JAW, frame=20):
-    """Insert a key like I over a slider; auto-key does the same after a move."""
+    """Insert a key on a slider, as the key I and auto-key do."""
     scene.controls(rig).keyframe_insert(path_of(name), frame=frame)
     bpy.context.view_layer.update()
 

@@ -247,7 +247,7 @@ def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int,
 
 
 def entries(files: Mapping[str, str]) -> list[str]:
-    """The names of all entries of the registry, in the order of the files."""
+    """The names of all entries that modules keep in the session, in the order of the files."""
     read = [_read(text) for path, text in files.items() if path != SESSION]
     return [
         ast.literal_eval(node.args[0])
@@ -259,7 +259,7 @@ def entries(files: Mapping[str, str]) -> list[str]:
 
 
 def found(files: Mapping[str, str]) -> list[str]:
-    """`path:line: reason` for all mutable state outside the registry.
+    """`path:line: reason` for all mutable state that is not kept in the session.
 
     Args:
         files: path below addon/risorius -> text, for all Python files of the add-on.

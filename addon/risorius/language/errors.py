@@ -21,7 +21,7 @@ from . import tables
 
 _SLOT = re.compile(r"\{(\w+)\}")
 _DEEPEST = 4  # messages inside a message: a file, a row, a cell, a reason
-_MOST_PLACES = 5  # before a message
+_MOST_PLACES = 5  # most places, such as a file and a line, before a message
 _LONGEST = 1000  # letters of a message; the time grows faster than its length
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
-TOLERANCE = 0.005  # of the range 0 to 1 of a control
+TOLERANCE = 0.005  # largest error of a control, whose range is 0 to 1
 _LONGEST = 1000  # most samples between two keys
 _BETWEEN = 4.0  # factor of the tolerance that is allowed at midpoints between samples
 _HALVES = 0.1  # weight of a midpoint in the fit; a sample weighs 1
@@ -62,7 +62,7 @@ class _Basis(NamedTuple):
 
 
 class Fitter:
-    """Fits many curves; the matrix for n equally spaced samples is computed once."""
+    """Fits many curves; for each number of equally spaced samples, the matrix is computed once."""
 
     def __init__(self, tolerance: float) -> None:
         """Args: tolerance  largest distance of a curve from a sample, above 0."""
@@ -96,7 +96,7 @@ class Fitter:
         return self.between(frames, values)
 
     def between(self, frames: Float, values: Float) -> Bezier:
-        """As `keys`, with a key at the first and the last sample, also if the values are constant.
+        """Like `keys`, but the first and the last sample have keys also if all values are equal.
 
         Args:
             frames: float64[n], ascending, n at least 2.

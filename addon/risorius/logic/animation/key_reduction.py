@@ -48,9 +48,9 @@ def continuous(quaternions: Floats) -> Floats:
 def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
     """Find the keys that each curve has to keep.
 
-    All curves are processed together. Each curve keeps the range of slopes for which a line from
-    its last key passes all later values within the error. If a value lies outside this range, the
-    value before it becomes a key.
+    All curves are processed together. For each curve, a range of slopes is known for which a line
+    from its last key passes all later values within the error. If a value is outside of this
+    range, the value before it becomes a key.
 
     Args:
         frames: float[N], ascending.

@@ -18,7 +18,7 @@ Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
 _LIMIT = 100_000  # most samples of one source
-_NEAR = 1e-7  # frames
+_NEAR = 1e-7  # times that differ by fewer frames are merged
 
 
 def masked(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypedDict
 
-PREFIX = "CTRL_expressions."  # of the raw controls of a standard DNA file
+PREFIX = "CTRL_expressions."  # prefix of raw controls in a standard DNA file
 
 
 class WrittenRow(TypedDict):

@@ -23,7 +23,7 @@ Line = list[Point]
 RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
 Direction = tuple[int, int]
 
-_TEXT, _TITLE = 0.29, 0.46  # heights of letters
+_TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board units
 _TRACK = 0.34  # width of a slider's frame
 _GAP = 0.3  # between sliders
 _MARGIN = 0.6  # around the board
@@ -555,7 +555,7 @@ def _moved(line: Sequence[Point], by: Point) -> Line:
 
 
 def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
-    """float64[H, 2] each: lowest and highest place of every handle along its own two axes."""
+    """Lowest and highest location of each handle along its x and y axis, float64[H, 2] each."""
     ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
     both = np.array(ends, np.float64).reshape(-1, 2, 2)
     return both[:, :, 0], both[:, :, 1]

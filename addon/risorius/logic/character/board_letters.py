@@ -45,7 +45,7 @@ def lines(text: str, x: float, y: float, height: float) -> Iterator[list[Point]]
     Args:
         text: one line; unknown letters leave a gap.
         x, y: lower left corner of the text.
-        height: height of the letters.
+        height: height of the letters, in the unit of x and y.
     """
     unit = height / 6.0
     for place, letter in enumerate(text.upper()):

@@ -197,7 +197,7 @@ def read_mask(stem: str) -> dict[str, int]:
 
 
 def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
-    """The part and side of a mesh, in the words of `read_name`.
+    """The part and side of a mesh, named as in the result of `read_name`.
 
     Args:
         base: mesh name without its LOD.

@@ -19,7 +19,7 @@ from ..blender_types import Context
 _FRONT = Vector((0.0, -1.0, 0.0))  # direction in which an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer
 _ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # types of regions that overlap a view
-_SIDE = 0.77  # cosine of 40 degrees: views from farther aside are turned
+_SIDE = 0.77  # cosine of 40 degrees: views farther off the front are rotated
 
 
 def frame(context: Context, rig: ArmatureObject) -> None:
