@@ -219,7 +219,7 @@ def live_sources() -> dict[str, LiveSource]:
 
 
 def dna_error() -> type[Exception]:
-    """The class of errors about bad DNA files; a class that is never raised if it is missing."""
+    """The class of errors about bad DNA files; without the native module nothing raises it."""
     return _risorius.DnaError if _risorius is not None else _Never
 
 

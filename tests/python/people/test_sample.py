@@ -310,7 +310,7 @@ def _check_lips(dna, most):
 def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
     """Captured lips stay together within 0.8 mm, and do not move if the jaw is shut.
 
-    The shape in the source data moves them 35 mm apart.
+    The unchanged shape of the source data would move them by 35 mm.
     """
     _check_lips(sample[1], 0.8)
 

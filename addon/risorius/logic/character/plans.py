@@ -309,7 +309,7 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # In float32, a very short bone loses the direction of its axis, so 3 % is the shortest.
+    # In float32, a very short bone loses its direction, so 3 % of the skeleton is the minimum.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:

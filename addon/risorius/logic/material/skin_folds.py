@@ -114,7 +114,7 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth in them.
+    """float32[V, 3]: x and height of face_coordinates, distance from the mouth in their units.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -128,7 +128,7 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils do not count as borders, so that subsurface light stays there.
+    Rims of lids, lips and nostrils do not count, so that they keep their subsurface scattering.
 
     Args:
         points: float[V, 3], in Blender units.
