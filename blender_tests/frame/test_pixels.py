@@ -140,7 +140,7 @@ def test_two_processes_render_the_same_pixels(mode, dna_file, tmp_path):
 )
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "blurred"])
 def test_a_frame_has_the_same_pixels_in_eevee(motion_blur, dna_file, tmp_path):
-    # Plain grey, because compiling materials takes long in software rendering.
+    # The face is plain grey, because compiling materials takes long in software rendering.
     animate(scene.load(dna_file, "LIVE", use_materials=False))
     setup = _set_up(motion_blur, False)
     setup.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"

@@ -50,9 +50,9 @@ def haired(tmp_path):
 
 
 def points_of(thing):
-    """Points of the rendered curves in world space, float64[n, 3].
+    """Read the rendered curves.
 
-    Also the index of each curve's first point.
+    Returns: their points in world space, float64[n, 3], and the index of each curve's first point.
     """
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
@@ -166,7 +166,7 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks p
 
 @pytest.fixture
 def curly(tmp_path):
-    """Returns a function that makes a face like `haired` with coiled hair, from metadata."""
+    """Returns a function that makes a face like `haired` whose metadata ask for coiled hair."""
 
     def made(words):
         dna = small_face()
@@ -182,7 +182,7 @@ def curly(tmp_path):
 
 
 def strands_of(face):
-    """Points of a face's strands, indices of first points, and corners of the cards."""
+    """Points of a face's strands, index of each strand's first point, and corners of the cards."""
     corners = scene.evaluated(scene.meshes(face)[1]).reshape(CARDS, ROWS, 2, 3).astype(float)
     before = set(bpy.data.objects)
     bpy.ops.risorius.set_strands()
@@ -204,8 +204,8 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis is straight, like the card; its inclination and parting are smaller than the
-        # coil.
+        # The axis of a coil is straight, like the card; its inclination and its distance from other
+        # axes are smaller than the coil.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000
         assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS

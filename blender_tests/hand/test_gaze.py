@@ -71,7 +71,7 @@ def eye(rig, side):
     """Centre and direction of an eye in world space, from the bone that deforms the skin."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # The direction that is -y at rest.
+    # The eye's direction is -y at rest.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (

@@ -121,7 +121,7 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
         shader = looks.principled(_materials(scene.load(_save(tmp_path, small_face())))["head"])
         # The weight depends on the distance from an open border.
         assert shader.inputs["Subsurface Weight"].is_linked
-        # The distance in the palest skin; it is smaller if the colour is dark.
+        # How far light scatters in the palest skin; in dark skin it is less.
         far = shader.inputs["Subsurface Scale"].links[0].from_node
         scales.append(far.inputs[1].default_value)
     assert scales[1] == pytest.approx(3 * scales[0], rel=1e-4)
@@ -490,7 +490,7 @@ for image in bpy.data.images:
 
 @pytest.mark.parametrize("data", ["Utility - Raw", "ACES - Linear"])
 def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
-    """A configuration like ACES has neither `sRGB` nor `Non-Color`, and once no data role."""
+    """Colour configurations like ACES have no `sRGB` and `Non-Color`; one has no data role."""
     path = _save(tmp_path, _mapped("head_wm1_normal.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
     config = tmp_path / "config.ocio"

@@ -544,7 +544,7 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """Neither Automatic nor a save enables a modifier that the user disabled in Live mode."""
+    """Neither the mode Automatic nor a save enables a modifier that the user disabled before."""
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

@@ -174,9 +174,9 @@ def prepare(play):
 
 
 def _choose_slot(item):
-    """Choose the slot of an action without one.
+    """Choose the first slot of an object's action if no slot is chosen.
 
-    Blender 5.0 does not choose one for an override's action that comes from 4.2.
+    Blender 5.0 chooses none for an override's action that comes from 4.2.
     """
     data = item.animation_data
     if data is not None and data.action is not None and hasattr(data, "action_slot"):

@@ -166,7 +166,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     """Add a short spine and facial joints on the surface of the head.
 
     Returns:
-        float32[J, 3] world positions in the neutral pose, up to the small neutral rotations.
+        float32[J, 3] world positions in the neutral pose, without the small neutral rotations.
     """
     parents = np.full(JOINTS, 3)
     parents[:4] = [0, 0, 1, 2]
@@ -180,7 +180,8 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     offsets[0] = points[0]
     turns = euler_matrices(random.uniform(-0.5, 0.5, (JOINTS, 3)))
     turns[:1] = turns[4:6] = np.eye(3)
-    # Along the neck x points up the bone and z to the character's right: about z it looks up.
+    # Along the neck x points up the bone and z to the character's right, so a rotation about z
+    # makes the head look up.
     turns[1:4] = np.array([[0, 0, -1], [1, 0, 0], [0, -1, 0]])
     local, offsets = turns.copy(), points.copy()
     for joint, parent in enumerate(parents.tolist()):

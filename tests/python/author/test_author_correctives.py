@@ -406,7 +406,7 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
+    # Controls 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
@@ -449,7 +449,7 @@ def test_it_ends_where_it_is_told_to(face):
 
 
 def test_a_triple_that_pairs_do_not_repair_gets_its_own(face):
-    # Without a limit of its own a, b and d together push 2.6 mm; the pairs with b are repaired.
+    # The controls a, b and d together push 2.6 mm; the pairs with b are repaired.
     found = find_correctives(face, CorrectiveOptions())
     assert {one.controls for one in found.correctives} >= {(0, 1), (0, 3), (1, 3)}
     rows = [(one.controls, one.shape) for one in found.correctives]

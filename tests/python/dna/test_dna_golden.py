@@ -59,7 +59,7 @@ def comparable(view, dna):
         for derived in ("blendShapeChannelOutputIndices", "animatedMapOutputIndices"):
             pose.pop(derived, None)
     if dna.version < 6 or not dna.machine_learned_behavior_ext.types:
-        # The reference derives operations from the networks.
+        # The reference derives operations from the networks, so they are removed.
         view["machineLearnedBehaviorExt"]["types"] = []
     if dna.version < 5:  # and pose controls from the poses
         view["rbfBehavior"]["poseControlNames"] = []

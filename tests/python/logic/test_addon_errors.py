@@ -15,7 +15,7 @@ ADDON = Path(__file__).resolve().parents[3] / "addon" / "risorius"
 
 
 def language(module: str) -> Any:
-    """A module of the add-on's language, under a name of its own."""
+    """A module of the add-on's folder language, loaded under another name."""
     name = "risorius_addon_errors"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, None, is_package=True)

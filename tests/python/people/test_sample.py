@@ -199,7 +199,7 @@ def _moves(dna, joints):
 def _rows():
     """The rows of arkit.toml.
 
-    To a control that is a share of another control, the other control is added with 1.
+    If a row has a control that is a share of another one, the other one is added with value 1.
     """
     whole = shares()
     return {
@@ -340,8 +340,8 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
         wanted = _wanted(data, body, unit, row)
         for part in parts:
             number = dna.mesh_names.index(part.name)
-            # Displacements are compared, because the man's sides differ at rest, but his joints'
-            # do not.
+            # Displacements are compared, because at rest the man's skin is not symmetric, but his
+            # joints are.
             rest = np.asarray(dna.meshes[number].positions, float)
             goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0

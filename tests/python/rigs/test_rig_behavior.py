@@ -269,8 +269,8 @@ def test_a_face_through_time(name, tag, simd):
 def test_filtered_loads_are_our_lods(name, tag, lods, simd):
     """Compare filtered loads of the reference with our LODs.
 
-    They have the joints of their LODs and of no LOD. Quaternions are left out, because the order of
-    their columns depends on the load.
+    They have the joints of their LODs, and joints that belong to no LOD. Quaternions are left out,
+    because the order of their columns depends on the load.
     """
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)

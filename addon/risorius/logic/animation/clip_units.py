@@ -73,7 +73,8 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
         values: float64[n] or float64[n, width].
 
     Returns:
-        Whole frames float64[m] and the values there; the first and the last value are held.
+        Whole frames float64[m] and the values there. Frames before the first sample or after the
+        last one get the value of that sample.
     """
     near = np.rint(frames)
     frames = np.where(np.abs(frames - near) < 1e-4, near, frames)

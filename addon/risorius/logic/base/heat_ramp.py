@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# sRGB, 0 to 1, at equal steps from cool to hot.
+# Colours at equal steps from cool to hot, in sRGB, 0 to 1.
 ANCHORS = (
     (0.267, 0.005, 0.329),
     (0.283, 0.141, 0.458),

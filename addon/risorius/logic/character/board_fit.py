@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fits GUI controls to wanted raw controls.
 
-Several settings may give the same raw controls. The fit minimises squared differences within the
-controls' ranges: it sets one GUI control after another to its best value, which a formula gives for
-each linear piece. So no step makes the fit worse.
+Several settings of the GUI controls may give the same raw controls. The fit minimises squared
+differences within the controls' ranges: it sets one GUI control after another to its best value,
+which a formula gives for each linear piece. So no step makes the fit worse.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_expressions:
-    """The settings of the window manager.
+    """The settings of the grid of expressions.
 
     Args:
         context: context of Blender.
