@@ -82,7 +82,7 @@ CLASSES = (
 )
 
 
-# Caches of files of the extension, which do not change before Blender ends.
+# These caches are kept until Blender quits, because the extension's files do not change.
 session.adopt(
     ("quit",),
     native.addon_version,
@@ -97,7 +97,7 @@ session.adopt(
     tables.search_words,
     tables.translation,
 )
-# The class that is registered if another copy of the add-on is active.
+# RISORIUS_Idle, if it was registered because another copy of the add-on is active; else empty.
 _idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
@@ -180,7 +180,7 @@ def register() -> None:
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """Handle the start of an export by Blender's glTF exporter.
+    """Warn about live faces and switch off Direct mode before Blender's glTF exporter writes.
 
     Args:
         settings: settings of the exporter.
@@ -191,7 +191,7 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def after_gltf() -> None:
-    """Handle the end of an export by Blender's glTF exporter."""
+    """Allow Direct mode again after Blender's glTF exporter has written."""
     if not _idle:
         ordinary_form.end(ordinary_form.GLTF)
 

@@ -21,7 +21,7 @@ _ASKED = 30  # pixels that a button requests from a row in addition to its text
 _NUMBER = 60  # the same for a number field
 _NAMES = 0.4
 _VALUE = "0.000"
-# Heights measured in a window of Blender 4.3, where they are larger than in 5.2.
+# Heights in pixels, measured in a window of Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
 # English -> translation; replaces Blender's lookup, which the bpy module lacks.
 LOCAL = {}

@@ -78,7 +78,7 @@ def save_and_open(path, folder):
 
 
 def append(path, _folder):
-    """Append its characters and actions to an empty file."""
+    """Append the characters and actions of a .blend to an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path)) as (there, _here):
         collections, actions = list(there.collections), list(there.actions)
@@ -91,7 +91,7 @@ def append(path, _folder):
 
 
 def link(path, _folder):
-    """Link its characters and actions into an empty file."""
+    """Link the characters and actions of a .blend into an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path), link=True) as (there, here):
         collections = list(there.collections)
@@ -102,7 +102,7 @@ def link(path, _folder):
 
 
 def override(path, folder):
-    """Link its characters and make library overrides of them."""
+    """Link the characters of a .blend and make library overrides of them."""
     link(path, folder)
     for rig in rigs():
         bpy.context.view_layer.objects.active = rig["risorius_controls"]
@@ -174,9 +174,9 @@ def prepare(play):
 
 
 def _choose_slot(item):
-    """Choose the slot of an action without one.
+    """Choose the first slot of an object's action if no slot is chosen.
 
-    Blender 5.0 does not choose one for an override's action that comes from 4.2.
+    Blender 5.0 chooses none for an override's action that comes from 4.2.
     """
     data = item.animation_data
     if data is not None and data.action is not None and hasattr(data, "action_slot"):

@@ -70,7 +70,7 @@ def opened(positions):
 
 
 class Onto(Package):
-    """Also replaces the transfer, with one expression, and records its arguments.
+    """Also replaces the transfer of expressions: the fake makes jawOpen only.
 
     Attributes:
         asked: arguments of each call.

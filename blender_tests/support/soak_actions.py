@@ -41,7 +41,7 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """Save a library with a character, then an undoable file with the first characters."""
+        """Save a library with a character, then a file with characters and an undo step."""
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
@@ -266,9 +266,9 @@ class World:
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
             objects.remove(controls)
         if rig.override_library:
-            # Blender recreates objects that an override's collection has lost.
+            # Blender recreates deleted objects of an override unless its collection is deleted too.
             root = rig.override_library.hierarchy_root
-            # A copy of an override has the same root and lies outside of it.
+            # A copy of an override has the same root collection but is not in it.
             whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
             bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
@@ -493,7 +493,7 @@ class World:
             for p in kinds
             if p.identifier != "libraries"
         }
-        # Reports are Texts that stay for the user.
+        # Texts with reports are not counted, because they stay for the user.
         local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
         counts = {name: len(found) for name, found in local.items()}
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))

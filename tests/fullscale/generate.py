@@ -55,7 +55,8 @@ LODS = 8
 GROUPS = 122
 FILLED = 0.149  # filled fraction of the merged matrix of the joint groups
 HEAD_CENTRE = (0.0, 150.0, 0.0)
-# Rotations of neck_01, neck_02 and head in degrees, and the axis of the joint.
+# Poses of the neck: name; axis of the joints (0 x, 1 y, 2 z) about which neck_01, neck_02 and head
+# rotate; the three angles in degrees.
 NECK_POSES: tuple[tuple[str, int, Triple], ...] = (
     ("default", 2, (0, 0, 0)),
     ("turnUp_55", 2, (10, 20, 25)),
@@ -165,7 +166,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     """Add a short spine and facial joints on the surface of the head.
 
     Returns:
-        float32[J, 3] world positions in the neutral pose, up to the small neutral rotations.
+        float32[J, 3] world positions in the neutral pose, without the small neutral rotations.
     """
     parents = np.full(JOINTS, 3)
     parents[:4] = [0, 0, 1, 2]
@@ -179,7 +180,8 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     offsets[0] = points[0]
     turns = euler_matrices(random.uniform(-0.5, 0.5, (JOINTS, 3)))
     turns[:1] = turns[4:6] = np.eye(3)
-    # Along the neck x points up the bone and z to the character's right: about z it looks up.
+    # Along the neck x points up the bone and z to the character's right, so a rotation about z
+    # makes the head look up.
     turns[1:4] = np.array([[0, 0, -1], [1, 0, 0], [0, -1, 0]])
     local, offsets = turns.copy(), points.copy()
     for joint, parent in enumerate(parents.tolist()):

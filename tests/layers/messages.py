@@ -5,7 +5,7 @@ import ast
 import re
 from pathlib import Path
 
-# Rooms whose errors reach the interface of Blender. The command line alone shows the others.
+# Folders whose errors reach Blender's interface. Only the command line shows all other errors.
 ROOMS = (
     *("anim", "anyhead", "author", "base", "controls", "expressions", "files", "gameface"),
     *("importing", "lightening", "live", "mixing", "ranges", "rigs", "solving", "speech", "web"),

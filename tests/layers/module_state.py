@@ -27,7 +27,7 @@ REGISTRATION = "registration.py"
 WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
 CACHES = {"cache", "lru_cache"}
-# Changed by being read, or made to be changed, whatever the name.
+# Types whose objects change when they are read or used; no module may keep such an object.
 ALWAYS_MUTABLE = {
     "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
     "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",
@@ -37,7 +37,7 @@ FIXED = {
     "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
     "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
 }  # fmt: skip
-# Classes whose objects a constant may be. Lock: it remembers nothing after its `with`.
+# Classes whose objects may be constants. A Lock is allowed, because it stores nothing after `with`.
 VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
 CHANGES = {
     "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",
@@ -247,7 +247,7 @@ def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int,
 
 
 def entries(files: Mapping[str, str]) -> list[str]:
-    """The names of all entries of the registry, in the order of the files."""
+    """The names of all entries that modules keep in the session, in the order of the files."""
     read = [_read(text) for path, text in files.items() if path != SESSION]
     return [
         ast.literal_eval(node.args[0])
@@ -259,7 +259,7 @@ def entries(files: Mapping[str, str]) -> list[str]:
 
 
 def found(files: Mapping[str, str]) -> list[str]:
-    """`path:line: reason` for all mutable state outside the registry.
+    """`path:line: reason` for all mutable state that is not kept in the session.
 
     Args:
         files: path below addon/risorius -> text, for all Python files of the add-on.

@@ -47,7 +47,7 @@ def _call(node: ast.Call) -> Iterator[str]:
 
 
 def of_python(text: str) -> list[str]:
-    """Each use of what only POSIX has, as `line: what`."""
+    """`line: name` for each use in Python of functions that Windows lacks."""
     rules = POSIX["python"]
     modules, names = set(rules["modules"]), set(rules["names"])
     path = re.compile(rules["paths"])

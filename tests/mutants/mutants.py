@@ -197,7 +197,7 @@ class Copy:
         return self.outcome(test)[0] == "passed"
 
     def outcome(self, test: str) -> tuple[str, str]:
-        """Run a test on the present sources: passed, killed, slow or unbuildable; and a line."""
+        """Run a test. Returns: passed, killed, slow or unbuildable, and a line of its output."""
         if "/" not in test.partition(":")[0]:
             target = test.partition(":")[0]
             if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:

@@ -83,7 +83,7 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """Steps 1, 2 and 5 of the comment in mixer.h."""
+    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h."""
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
     for layer in layers:
@@ -361,9 +361,9 @@ def test_yields_see_values_before_any_of_them():
 
 
 def test_the_seal_of_an_open_jaw_stills_the_lips():
-    """The lips-together controls have no effect with a shut jaw.
+    """The lips-together controls reduce a raised upper lip only while the jaw is open.
 
-    Then they neither hide teeth nor hold the jaw.
+    They leave the jaw unchanged.
     """
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
     names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The jaw of a head by its skin and by its own teeth; eyeballs before a head stands; stopping."""
+"""Tests of finding a head's jaw by its skin or its own teeth, of finding eyes, and of stopping."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """The egg in a combination: less smile, and an additional bulge."""
+    """Sculpts of two combinations for the egg-shaped head: less smile, and an additional bulge."""
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -66,7 +66,7 @@ def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    # The tolerance of each active expression and corrective, and rounding.
+    # Each active expression and corrective may err by the tolerance; 2 % are for rounding.
     parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
     assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
@@ -324,8 +324,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Near the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
-    # elsewhere makes undoing cheap.
+    # `both` enters the ball by 0.35 mm. One expression alone enters it by more than 4 mm, so a
+    # repair that only undoes the other expression would make the depth larger.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])
@@ -406,7 +406,7 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
+    # Controls 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
@@ -449,7 +449,7 @@ def test_it_ends_where_it_is_told_to(face):
 
 
 def test_a_triple_that_pairs_do_not_repair_gets_its_own(face):
-    # Without a limit of its own a, b and d together push 2.6 mm; the pairs with b are repaired.
+    # The controls a, b and d together push 2.6 mm; the pairs with b are repaired.
     found = find_correctives(face, CorrectiveOptions())
     assert {one.controls for one in found.correctives} >= {(0, 1), (0, 3), (1, 3)}
     rows = [(one.controls, one.shape) for one in found.correctives]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig has at most as many deltas as its input, and its last line states the trade."""
+"""A rig has at most as many deltas as its input; `author` prints both numbers and the errors."""
 
 import re
 

@@ -86,7 +86,7 @@ def test_joints_lie_where_they_move_the_other_one(people):
 
 @pytest.mark.parametrize("name", ["mouthCornerPullL", "jawOpen", "eyeBlinkR"])
 def test_a_control_at_1_is_the_other_ones_expression(people, name):
-    """By joints and shapes, at LOD 0, by another reader."""
+    """An independent reader poses LOD 0; its vertices are within 0.05 mm of the expression."""
     _, _, before, rig = people
     dna = rig.dna
     values = np.zeros(len(dna.raw_control_names), np.float32)

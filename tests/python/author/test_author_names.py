@@ -94,7 +94,7 @@ def test_odd_names_are_one_sentence(names, words):
 
 @pytest.fixture(scope="module")
 def authored(tmp_path_factory):
-    """The egg with a viseme, an emotion, a funnel and ARKit's units, made by the command author."""
+    """The egg-shaped head with a viseme, an emotion, a funnel and ARKit's units, by `author`."""
     folder = tmp_path_factory.mktemp("names") / "egg"
     path = face_shapes.write_all(folder, joints=8, more="rounds = 2\n[lods]\ncount = 1\n")
     positions, faces = face_shapes.head()

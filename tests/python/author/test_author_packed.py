@@ -101,7 +101,7 @@ def test_a_packed_head_is_its_plain_twin(tmp_path):
 
 @pytest.mark.parametrize("bits", [12, 23])
 def test_floats_and_corners_in_a_row_are_unpacked(tmp_path, bits):
-    """The exponential filter, the mode INDICES, and two accessors in one view."""
+    """Tests the exponential filter, the mode INDICES, and two accessors in one view."""
     positions, moved = face_shapes.head()[0] / 100, face_shapes.expressions(face_shapes.head()[0])
     jaw = moved["jawOpen"] / 100
     glb = Glb()

@@ -212,7 +212,7 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
 
 
 def test_a_capture_is_mapped(tmp_path, capsys):
-    """Names of Live Link Face, with the mapping that is found and with a mapping of the user."""
+    """A take of Live Link Face is mapped by the mapping that fits its names, or by the user's."""
     dna = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(dna))
     jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")

@@ -92,7 +92,7 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
 
 
 def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
-    """Joint groups of this file read controls of networks, which version 2.1 lacks."""
+    """Version 2.1 stores no networks, so joint groups lose the columns of networks' controls."""
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)

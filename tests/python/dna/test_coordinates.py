@@ -167,7 +167,7 @@ def assert_pose_maps(dna, converted, raw, lod):
     world = oracle.world_matrices(dna, before.joints)
     expected = oracle.mapped_world(source, target, world)
     result = oracle.world_matrices(converted, after.joints)
-    # Angles of up to MANY degrees are float32 sums of about a hundred products.
+    # Angles are float32 sums of about a hundred products, so their error grows with their size.
     size = max(180.0, float(np.abs(before.joints).max())) / 180
     assert np.abs(result - expected).max() <= 100 * size * ANGLE * size_of(expected)
 

@@ -23,7 +23,7 @@ MASKS = {
     131: ["joint_behavior_metadata"],
     259: ["twist_swing_behavior"],
 }
-# Files without digests: filtered loads are compared by name, which digests lack.
+# Golden files without digests, because filtered loads are compared by names, and digests have none.
 FILES = sorted(
     p.name
     for p in GOLDEN_SET.glob("*.decode.*")
@@ -59,7 +59,7 @@ def comparable(view, dna):
         for derived in ("blendShapeChannelOutputIndices", "animatedMapOutputIndices"):
             pose.pop(derived, None)
     if dna.version < 6 or not dna.machine_learned_behavior_ext.types:
-        # The reference derives operations from the networks.
+        # The reference derives operations from the networks, so they are removed.
         view["machineLearnedBehaviorExt"]["types"] = []
     if dna.version < 5:  # and pose controls from the poses
         view["rbfBehavior"]["poseControlNames"] = []

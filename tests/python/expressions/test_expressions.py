@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: Risorius' own fit the standard controls; errors in files are reported."""
+"""Risorius' expressions use only standard controls; errors in files of expressions are reported."""
 
 from __future__ import annotations
 

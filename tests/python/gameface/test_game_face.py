@@ -163,7 +163,7 @@ def test_the_driver_brings_sums_of_two_to_the_rig(face, tmp_path):
 
 @pytest.mark.parametrize("kind", ["cubic", "early", "late", "middle", "triple"])
 def test_refinements_leave_exact_poses_alone(kind):
-    # If one target is active, or two fully, the other targets add nothing.
+    # If only one target is active, or several fully, the refining targets have weight 0.
     many = {"cubic": 1, "triple": 3}.get(kind, 2)
     for on in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.0, 0.5)):
         weights = np.array([*on, 0.0])[:many]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The vocabulary of a file's names: VRM as in live captures; never by single letters."""
+"""Names of VRM are recognised in files as in live captures; single letters alone are not."""
 
 from __future__ import annotations
 

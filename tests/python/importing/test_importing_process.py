@@ -77,7 +77,7 @@ def test_the_neutral_becomes_0_and_full_stays_1():
 
 
 def test_a_face_at_rest_with_shut_lips_keeps_them_shut():
-    """At rest the jaw is slightly open and the lips are shut: the share is 1, and stays 1."""
+    """At rest the jaw is slightly open and mouthLipsTogether is 1; later shut lips still give 1."""
     lips = RIG + "mouthLipsTogetherDL"
     before = Clip([lips, RIG + "jawOpen"], [[1.0, 1.0, 0.5], [0.04, 0.52, 0.52]])
     after = process.calibrate(before, 0)

@@ -239,7 +239,7 @@ def test_tables_as_spreadsheets_write_them(tmp_path, form, encoding):
 
 @pytest.mark.parametrize("hole", ["", " ", "-", "N/A", "NULL"])
 def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
-    """In a take of Live Link Face: a cell, a column, a timecode, the end; in a table: cells."""
+    """A take of Live Link Face lacks a cell, a column, a timecode, its end; a table lacks cells."""
     rows = [line.split(",") for line in take(60).splitlines()]
     rows[5][2] = rows[9][0] = hole
     for row in rows[1:]:

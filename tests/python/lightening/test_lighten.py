@@ -55,8 +55,8 @@ def test_a_lighter_face_keeps_controls_and_named_joints(face, file, tmp_path):
     assert {row["corrective"] for row in rows} == {"", "kept", "removed"}
     sizes = [float(row["largest_mm"]) for row in rows]
     assert sizes == sorted(sizes, reverse=True)
-    # The corrective that the neck's solver reads is active in both faces, also the one that drives
-    # a map.
+    # Both faces drive the animated maps equally, and the corrective with the neck's pose, which has
+    # another index in the lighter face, is active in both.
     raw = risorius.Rig(face).initial_raw_controls
     raw[7:15] = [0, 0, 0.26, 0.9656] * 2
     raw[:7] = 1

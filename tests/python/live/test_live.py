@@ -261,8 +261,8 @@ def test_units_of_perfect_sync_are_not_doubled_by_vrm():
 
 
 def test_face_cap_and_plain_messages():
-    # Without a receiver, because a receiver also ends a face after a pause, and a busy machine has
-    # pauses.
+    # The decoder is tested without a receiver, because a receiver also ends a face after a pause,
+    # and a busy machine has pauses.
     decoder, packets = osc.Decoder(), []
     for n in range(3):
         face = [["osc", "/HR", [10.0 * n, 20.0, 0.0]], ["osc", "/W", [24, n / 4.0]]]

@@ -167,7 +167,7 @@ def test_a_region_takes_the_other_ones_form_to_its_own_place(faces):
     np.testing.assert_allclose(after, before, atol=1e-4)
     other = copy.deepcopy(high)
     mesh = other.meshes[0]
-    # One half of its mouth is moved forward; the mix contains this in its own size.
+    # One half of the other face's mouth is moved forward; the mix contains this motion, scaled.
     left = before[:, 0] > 0
     mesh.positions = np.asarray(mesh.positions) + np.outer(0.6 * (left & (mouth > 0.5)), [0, 0, 1])
     other.meshes = [mesh, *other.meshes[1:]]

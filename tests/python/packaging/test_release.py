@@ -163,7 +163,7 @@ def test_the_sums_are_those_of_sha256sum(make, made):
 
 
 def test_the_sbom_reads_versions_where_they_are_pinned():
-    # Its library is not installed for the tests.
+    # The script is only read, because the library that it imports is not installed for tests.
     text = (PROJECT / "packaging" / "ship" / "release" / "sbom.py").read_text(encoding="utf-8")
     named = re.findall(r'pinned\("([\w-]+)", "([\w./]+)"\)', text)
     assert len(named) == 3

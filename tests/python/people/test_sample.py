@@ -199,7 +199,7 @@ def _moves(dna, joints):
 def _rows():
     """The rows of arkit.toml.
 
-    To a control that is a share of another control, the other control is added with 1.
+    If a row has a control that is a share of another one, the other one is added with value 1.
     """
     whole = shares()
     return {
@@ -308,7 +308,10 @@ def _check_lips(dna, most):
 
 
 def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
-    """Within 0.8 mm; a shut jaw moves no lips. The data's own shape moves them by 35 mm."""
+    """Captured lips stay together within 0.8 mm, and do not move if the jaw is shut.
+
+    The unchanged shape of the source data would move them by 35 mm.
+    """
     _check_lips(sample[1], 0.8)
 
 
@@ -337,7 +340,8 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
         wanted = _wanted(data, body, unit, row)
         for part in parts:
             number = dna.mesh_names.index(part.name)
-            # At rest the man's sides differ, unlike his joints', so displacements are compared.
+            # Displacements are compared, because at rest the man's skin is not symmetric, but his
+            # joints are.
             rest = np.asarray(dna.meshes[number].positions, float)
             goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0

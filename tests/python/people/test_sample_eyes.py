@@ -118,7 +118,7 @@ LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLo
 
 
 def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
-    """The skin around the rim when several controls raise it at the same time."""
+    """Skin around the lids stays 0.4 mm outside the eye if several controls raise it together."""
     for side, eye in face.eyes.lids.items():
         for pose in (
             {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},

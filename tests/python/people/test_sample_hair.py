@@ -238,14 +238,14 @@ def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, 
     kept = cut_clear(_lying(stage, [-0.055, 0.14], 1), stage, head, 1.0, faces)
     assert len(kept) == 1  # a hair with its root at the slope has no room
     np.testing.assert_array_equal(kept.points[0, 0], toward.points[0, 0])
-    # Shortened once to three quarters, it would end in the slope, at x = 0.17.
+    # Shortened once to three quarters, the hair would end in the slope, at x = 0.17.
     np.testing.assert_allclose(
         kept.points[0, -1] - kept.points[0, 0], 0.75**2 * np.array([0.3, 0.03, 0]), atol=1e-12
     )
 
 
 def test_a_face_that_no_control_makes_alone_counts(stage):
-    """Two controls of a fifth of the height do no harm alone, but together make a slope."""
+    """Each of two controls raises the skin too little to reach a hair; together they reach it."""
     head = stage.meshes[0]
     target = head.blend_shape_targets[0]
     low = 0.2 * np.asarray(target.deltas)  # 0.02 each; the ends are 0.03 high
@@ -404,7 +404,7 @@ def test_metadata_say_where_strands_wind(haired):
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):
-    """Within 2 mm, for several controls at 1."""
+    """Roots of hair stay within 2 mm of the skin for each of several controls at 1."""
     dna, hair, _ = haired[1]
     names = dna.raw_control_names
     worst = {}

@@ -152,7 +152,7 @@ def test_the_file_is_for_editing(folder, tmp_path, capsys):
     text = out.read_text()
     assert text == ranges_text(load_ranges(out))
     assert 'source = "rom.csv"' in text
-    # Edited by hand: the pucker is switched on, the jaw off; a name may lack its prefix.
+    # The file is edited as by hand: pucker switched on, jaw off; a name may lack its prefix.
     text = text.replace(', off = "does not come near its extreme"', "")
     text = text.replace('"CTRL_expressions.jawOpen" = {', "jawOpen = { off = true,")
     out.write_text(text)

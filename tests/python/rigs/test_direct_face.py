@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Final vertices from Python: compared with the oracle, rules of writing, and wrong arguments."""
+"""DirectFace computes final vertices like the oracle, writes only changes, refuses bad input."""
 
 import re
 import sys

@@ -340,7 +340,7 @@ def face_of_regions(seed, regions=6, joints=12, controls=20):
         values[joint * 9 : joint * 9 + 9, reads[region]] = part
     clean = values.copy()
     for region in range(regions):
-        # At most a quarter of the region's joints, which still counts as foreign.
+        # A column may move a quarter of the region's joints and still count as foreign to it.
         for column in np.setdiff1d(np.arange(60), reads[region])[::2]:
             for joint in rng.choice(np.flatnonzero(owner == region), 3, replace=False):
                 values[joint * 9 + rng.integers(9), column] = rng.uniform(0.0001, 0.0009)

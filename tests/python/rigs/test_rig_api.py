@@ -75,7 +75,7 @@ def test_faces_in_turn_and_in_threads_do_not_see_each_other(dna):
         one.joint_groups = groups
         rigs.append(risorius.Rig(one))
     raw = np.float32([0.5, 0.25, 0, 1])
-    # A batch has its own memory.
+    # A batch has memory of its own, so its results are the expected ones.
     wanted = [rig.evaluate_batch(raw[None]).joints[0] for rig in rigs]
     assert not np.array_equal(wanted[0], wanted[1])
 

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Networks, solvers, setups and quaternions at every LOD, compared with the reference's values.
 
-Known deviations, left out by name below: - networks that move joints by Euler angles, read as Euler
-angles: the reference takes their
-  rotation and first scale for a quaternion;
-- where joints of networks come in another system of axes, the reference overwrites the network's
+Known deviations are left out by name below:
+
+- networks that move joints by Euler angles: the reference takes the rotation and the first scale
+  for a quaternion;
+- networks whose joints have another system of axes: the reference overwrites the network's
   controls with converted values, and loses the sign of their scale;
-- of several twists that share a rotation with a swing the reference moves the joints of the first
-  by the weights of the last, and those of the others not at all;
-- a twist that shares a rotation with a swing of another axis: the reference turns its joints about
-  the axis of the swing;
-- a rotation of 0 0 0 0 is NaN there and identity here; - solvers that interpolate between targets
-that are the same: nothing decides between those.
+- several twists that share a rotation with a swing: the reference moves the joints of the first
+  twist by the weights of the last, and does not move the joints of the others;
+- a twist that shares a rotation with a swing of another axis: the reference rotates its joints
+  about the axis of the swing;
+- a rotation of 0 0 0 0 is NaN in the reference and identity in Risorius;
+- solvers with equal targets: any interpolation between equal targets is right.
 """
 
 import numpy as np
@@ -268,8 +269,8 @@ def test_a_face_through_time(name, tag, simd):
 def test_filtered_loads_are_our_lods(name, tag, lods, simd):
     """Compare filtered loads of the reference with our LODs.
 
-    They have the joints of their LODs and of no LOD. Quaternions are left out, because the order of
-    their columns depends on the load.
+    They have the joints of their LODs, and joints that belong to no LOD. Quaternions are left out,
+    because the order of their columns depends on the load.
     """
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)

@@ -58,10 +58,7 @@ class Golden:
 
 
 def assert_within(actual, expected, bound, what):
-    """Check
-
-    actual - expected| <= 2 bound, because both sides may round.
-    """
+    """Check that |actual - expected| <= 2 bound, because both sides may round."""
     excess = np.abs(actual.astype(float) - expected) - 2 * bound
     worst = int(np.argmax(excess)) if excess.size else 0
     assert excess.size == 0 or excess[worst] <= 0, (
@@ -89,7 +86,7 @@ def raw_of_case(golden, rig, case):
     if case["kind"] == "raw":
         return values
     raw = rig.gui_to_raw(values)
-    # The generator then set the w of quaternion inputs to 1.
+    # Like the generator of the golden files, set the w of quaternion inputs to 1.
     raw[[name.endswith((".w", ".qw")) for name in rig.raw_control_names]] = 1
     return raw
 

@@ -109,8 +109,8 @@ def turned(dna, values, losses):
     out[:, 3:7] = oracle_behavior.from_euler(
         dna.rotation_sequence, dna.rotation_signs, values[:, 3:6] * scale
     )
-    # Half of the angle's error, the rounding of the angle, an error of 1e-7 of sines, three
-    # products.
+    # A quaternion's error: half of the angle's error, rounding of the angle, 1e-7 for sines, and
+    # three products.
     angles = np.abs(values[:, 3:6]) * scale
     loss = 0.5 * (losses[:, 3:6] * scale + 4 * EPS * angles).sum(axis=1) + 3e-7 + 12 * EPS
     lost[:, 3:7] = loss[:, None]

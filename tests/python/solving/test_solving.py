@@ -183,7 +183,7 @@ def test_partners_change_as_readily_as_the_readier_one(face, eases):
 
 
 def test_of_opposites_one_alone_is_used(face):
-    """The left smile and the puff both raise this vertex; both together fit slightly better."""
+    """Two opposites, left smile and puff, raise a vertex; only one of them is used."""
     surface, vertex = face[1], 14 * 5 + 6
     target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
     drag = [(0, vertex)], target
@@ -241,7 +241,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """At most 1.3 mm farther away; no active slider has an active opposite."""
+    """It ends at most 1.3 mm farther from the goal; no active slider has an active opposite."""
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
