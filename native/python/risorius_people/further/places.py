@@ -99,7 +99,7 @@ def find_places(
         positions: float64[V, 3], in decimetres.
         groups: name of a group of the base mesh -> vertex indices.
         jaw_open: float64[V, 3], displacement of the opening jaw, which distinguishes the lips.
-        brow_shapes: float64[V, 3], sum of the sizes of displacements of brows up and down.
+        brow_shapes: float64[V, 3], sum of the absolute displacements of brows up and down.
     """
     count = len(positions)
     faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
@@ -109,7 +109,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # A parabola, because the lips touch over some millimetres, not along a line.
+    # Smooths the line (degree 4 in x), because the lips touch in an area some millimetres high.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)
@@ -129,7 +129,9 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of lips that are near the other lip, share no face with it, and that the jaw parts.
+    """Vertices of each lip near a vertex of the other lip from which the opening jaw parts them.
+
+    Both vertices share no face.
 
     Args:
         positions: float64[V, 3], in decimetres.
