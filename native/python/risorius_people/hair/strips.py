@@ -30,7 +30,7 @@ class Strips:
         normals: float64[n, rows, 3], unit normals for shading, away from the skin.
         tiles: int64[n], tile of each strip in the atlas.
         roots: place of each strip on the skin.
-        held: float64[n]: above 0, each row follows the skin below it; 0, all rows follow the root.
+        held: float64[n]; if above 0, each row follows the skin below it, else all follow the root.
     """
 
     points: Floats
