@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Changes of polygon meshes as linear operators, for positions and displacements alike."""
+"""Cuts and subdivides polygon meshes, by linear operators for positions and displacements."""
 
 from __future__ import annotations
 
