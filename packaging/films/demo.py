@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The demo inside Blender: installs the extension, imports the face, keys the acting, renders.
+"""Makes the demo in Blender: installs the extension, imports the face, keys the acting, renders.
 
 demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key every track on the bone `face` and the turning bones."""
+    """Key the tracks of acting.py on the bone `face`, and its rotations on other bones."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

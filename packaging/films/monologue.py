@@ -54,7 +54,7 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """Drag one corner of the mouth up by its vertex, with a single control, and key the result."""
+    """Drag a vertex of the mouth's corner up, which sets one control, and key the result."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex, way = corner_of_mouth(path)
@@ -119,7 +119,7 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """The point between the eyes, and the head's height: four times the eyes' distance. Metres."""
+    """The point between the eyes, and the head's height (four eye distances), in metres."""
     rig = next(
         thing
         for thing in controls.users_collection[0].objects

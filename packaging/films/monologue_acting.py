@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The acting of the monologue as data: speech, moods, gaze and turns. Does not need Blender.
+"""Lists the times of speech, moods, gaze and head turns of the monologue. Does not need Blender.
 
 python monologue_acting.py      prints a line of milliseconds, words per minute and text, separated
                                 by tabs, for each line of speech
