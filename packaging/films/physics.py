@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The demo's acting with a loop scarf and a lock of hair that Blender simulates on the face.
+"""Renders the demo's acting with a loop scarf and a lock of hair, which Blender simulates.
 
 physics.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 
@@ -226,7 +226,7 @@ def add_lock(head, first, last):
 
 
 def follow_skin(thing, head):
-    """Bind an object to the posed skin by a Surface Deform modifier. Raises if Blender does not."""
+    """Bind an object to the posed skin by a Surface Deform modifier. Raises if this fails."""
     bound = thing.modifiers.new("Skin", "SURFACE_DEFORM")
     bound.target = head
     with bpy.context.temp_override(object=thing, active_object=thing):

@@ -31,7 +31,7 @@ MOST_BYTES = 4 * 1000 * 1000
 OLDEST_GLIBC = 28  # 2.28
 OLDEST_MACOS = (11, 0)
 LICENCES = {"LICENSE", "native/NOTICES.txt"}
-# Files of the package beside the module: sources, data of the self-test, the page of web.sh.
+# Files that the package may contain besides the module: sources, data of the self-test, web page.
 OWN = re.compile(
     r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256)"
     r"|web/page\.html)"
@@ -99,7 +99,7 @@ def names_of_python(program: Path) -> set[str]:
 
 
 def python_has(undefined: Iterable[str], program: Path) -> str:
-    """Check that a Python exports all its symbols that the module imports. Returns a line.
+    """Check that a Python exports all Python symbols that the module imports. Returns a line.
 
     Args:
         undefined: imported symbols of the module.
