@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes frames of random acting by a seed, both usual and unusual ones.
+"""Makes frames of random acting from a seed, both usual and unusual ones.
 
 A third of the frames are one or two expressions. A third are speech (of a clip, or blended visemes)
 under an expression. A third are two random controls. Gaze and blinks are added to all. The rules of

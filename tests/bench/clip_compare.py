@@ -42,7 +42,8 @@ def pcodec(level: int) -> tuple[Pack, Unpack]:
 
 
 def zstd(shuffled: bool) -> tuple[Pack, Unpack]:
-    """zstd at level 19. With `shuffled`, it packs uint32 differences of frames, byte by byte."""
+    """zstd at level 19. With `shuffled`, it packs uint32 differences between frames: all first
+    bytes, then all second bytes, and so on."""
     package = importlib.import_module("zstandard")
     compressor, decompressor = package.ZstdCompressor(level=19), package.ZstdDecompressor()
 
