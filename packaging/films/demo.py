@@ -102,7 +102,7 @@ def still(path, frame, size=None):
     """Render one frame to a file.
 
     Args:
-        path: the picture.
+        path: path of the picture.
         frame: frame of the scene.
         size: width and height in pixels; None keeps the scene's resolution.
     """

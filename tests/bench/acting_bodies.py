@@ -56,7 +56,7 @@ def skin_samples(places: Floats, faces: Sequence[Sequence[int]]) -> Skin:
 
     Args:
         places: [V, 3] at rest.
-        faces: corners of each, three or more.
+        faces: vertex indices of each face, three or more.
     """
     normals = np.zeros_like(places)
     rows: list[tuple[int, int, int, int]] = []

@@ -211,7 +211,7 @@ class Face:
         return [corners[a:b] for a, b in itertools.pairwise(ends)]
 
     def triangles(self, mesh: int) -> Ints:
-        """[F, 3], fans of the faces."""
+        """int64[F, 3]: the vertices of the faces, divided into triangles."""
         fans = ((f[0], f[i], f[i + 1]) for f in self.faces(mesh) for i in range(1, len(f) - 1))
         return np.array(list(fans), np.int64)
 

@@ -7,7 +7,7 @@ comparison, the errors of displacements that are copied unchanged are printed, t
 
 python tests/bench/any_head_conform.py FACE.dna HEAD.npz ... [--worst N] [--remeshed KIND]
 
-With --remeshed the skin of FACE.dna is laid onto HEAD_KIND.obj, which has other vertices.
+With --remeshed the skin of FACE.dna is fitted to HEAD_KIND.obj, which has other vertices.
 
 HEAD.npz has, in centimetres and with the vertices of FACE.dna's skin, NAME/points float64[V, 3],
 NAME/deltas float32[E, V, 3], where NAME is the skin's mesh, and expressions, str[E]: names of raw

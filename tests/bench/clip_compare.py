@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """clip_compare.py [--out FOLDER]: compares `.rzc` with other lossless packers of float32, on the
 three kinds of curves of clip_curves.py. Values are the size of the curves divided by the packed
-size, and the unpacking speed in GB/s. The size of `.rzc` includes its head, names and index.
+size, and the unpacking speed in GB/s. The size of `.rzc` includes its header, names and index.
 
 Each other packer counts with the smaller of two sizes: all curves in one array, or each curve alone
 with constant curves at no cost. Packages: pcodec, zstandard, blosc2, fpzip; a missing package is

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The body of a person before meshes are made: positions, skin weights and expressions."""
+"""Makes the body of a person, before its meshes: positions, skin weights and expressions."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ class Body:
         lip_rim: int64[n], vertices of the lower lip's rim, where the upper lip touches it.
         eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on
             the eyeballs.
-        man: body of the man; for the man this object.
+        man: body of the man, which is this object if it is the man's body.
         weights: float64[V, 9], skin weights.
     """
 
@@ -283,8 +283,8 @@ class Body:
         """The man's `closing` displacements, adapted to this person's proportions.
 
         Each is adapted together with jawOpen, because both lips share the jaw's rotation, and the
-        lips would miss each other otherwise. The quarters of the lips get shares of their adapted
-        sum, because separately adapted quarters do not add up to it.
+        lips would miss each other otherwise. The four quarters of the lips (LIPS_TOGETHER) are
+        fractions of their adapted sum, because separately adapted quarters do not add up to it.
 
         Args:
             man: body of the man, whose displacements are adapted.

@@ -299,7 +299,7 @@ def _assemble(making: _Making) -> None:
 
 
 def _begin_painting(making: _Making) -> None:
-    """Starts to paint textures and grow hair in a thread; native fits release the GIL meanwhile.
+    """Starts to paint textures and grow hair in a thread, parallel to fits, which release the GIL.
 
     If the build stops, the thread still runs to its end, and its result is dropped.
     """

@@ -42,9 +42,8 @@ def side_masks(positions: Floats) -> dict[str, Floats]:
 def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
     """float64[V] by "U" and "D": weights of upper and lower lip with sum 1.
 
-    Vertices that jawOpen moves are of the lower lip.
-
-    The lips touch, so their positions cannot distinguish them; the jaw's motion can.
+    The lips touch, so their positions cannot distinguish them. The lower lip consists of the
+    vertices that jawOpen moves.
     """
     travel = np.linalg.norm(jaw_open, axis=1)
     lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
@@ -270,7 +269,7 @@ def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
 def corrective_displacements(
     out: dict[str, Expression], places: Floats
 ) -> dict[tuple[str, str], Floats]:
-    """Displacements of correctives: (a, b) is added with the product of the controls a and b.
+    """Correctives: two raw controls -> displacement, whose weight is the product of both controls.
 
     Args:
         out: raw control -> expression.

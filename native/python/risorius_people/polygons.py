@@ -60,7 +60,7 @@ def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons,
     Args:
         mesh: the mesh; not changed.
         heights: float64[V], height of each vertex above the plane.
-        level: height of the cut.
+        level: height at which the mesh is cut.
 
     Returns:
         The part that is left, with renumbered vertices, and the operator from old to new vertices.

@@ -7,8 +7,9 @@
                                                                  file name
 
 pefile (Windows), LIEF (macOS) and auditwheel (Linux) read the module. `wheel` checks the hashes in
-RECORD. repairwheel must find no library to copy into the wheel. PROGRAM is a Python of the wheel's
-version for any system. FOLDER is zig's lib folder, which contains the symbols of macOS.
+RECORD. repairwheel must find no library to copy into the wheel. PROGRAM is a Linux Python of the
+wheel's version, also for wheels of other systems. FOLDER is zig's lib folder, which contains the
+symbols of macOS.
 If a check fails, prints one sentence and gives exit code 1.
 """
 
@@ -125,7 +126,7 @@ def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[st
     of_python = next(e for e in image.DIRECTORY_ENTRY_IMPORT if e.dll.decode().lower() == own)
     yield python_has((symbol.name.decode() for symbol in of_python.imports), program)
     exported = [symbol.name.decode() for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols]
-    # Windows resolves an import in the named DLL only, so exports of pybind11 cannot collide.
+    # Windows resolves an import in the named DLL only, so exports of pybind11 do no harm.
     ours = [name for name in exported if not PYBIND11.match(name)]
     want(ours == ["PyInit__native"], f"it exports {ours[:5]}")
     flags = image.OPTIONAL_HEADER

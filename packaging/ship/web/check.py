@@ -168,9 +168,9 @@ def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
 
 
 async def same_turned_head(one: Browser, built: Path) -> str:
-    """Compare the vertices of a clip that turns neck and head with a NumPy implementation.
+    """Compare the page's vertices with a NumPy implementation, in a clip that turns neck and head.
 
-    The face has neck poses.
+    The face has RBF poses of the neck.
 
     Returns: a sentence.
 

@@ -65,7 +65,7 @@ def side_map(angle: Floats) -> Floats:
     """float64[...]: distance from the middle of the texture for points outside the iris.
 
     Args:
-        angle: float64[...], angle from the gaze in radians, at least that of the limbus.
+        angle: float64[...], angle from the gaze in radians, at least the angle of the limbus.
     """
     low = IRIS_AT + (SIDE_AT - IRIS_AT) * (angle - _LIMBUS) / (SIDE_ANGLE - _LIMBUS)
     high = SIDE_AT + (0.5 - SIDE_AT) * (angle - SIDE_ANGLE) / (np.pi - SIDE_ANGLE)

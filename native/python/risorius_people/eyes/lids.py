@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lays the lids on the eye: at rest, in each expression, closed and half closed."""
+"""Moves lids so that they touch the eyeball: at rest, in expressions, closed and half closed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 # skin's edge, the middle of the rim, the contact with the eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-# Share of the rim's displacement that the rings outside the rim follow, from the rim outward.
+# Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. At half the look they have moved straight
@@ -211,8 +211,8 @@ def _lower_closed(lids: Lids) -> Floats:
 
 
 def following(lids: Lids, way: str, look: Floats) -> Floats:
-    """float64[V, 3]: displacement of the lids in a look, larger than in the data, as the eye turns
-    further.
+    """float64[V, 3]: displacement of the lids in a look, larger than in the data because the eye
+    rotates further.
 
     Args:
         lids: the lids at rest.
@@ -316,7 +316,7 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
 
 
 def between(lids: Lids, way: Floats) -> Floats:
-    """float64[V, 3]: correction of half-closed lids, which move straight and not round the ball.
+    """float64[V, 3]: correction of half-closed lids, which would move straight through the ball.
 
     Args:
         lids: the lids at rest.

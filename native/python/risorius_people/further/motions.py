@@ -153,7 +153,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
     def move(places: Places, by: object) -> Floats:
         _, points, share = _on_tongue(places)
         beyond = np.clip((share - begin) / (1 - begin), 0, 1) ** power
-        # a positive rotation about the axis to the character's left would be down
+        # negated, because a positive rotation about x, to the character's left, is down
         degrees = beyond[:, None] * _vector(by) * [-1, 1, 1]
         return _of_tongue(places, _turned(points, _root(points, share, begin), degrees))
 

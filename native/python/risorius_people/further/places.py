@@ -51,7 +51,7 @@ def bell(distance: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Places:
-    """Regions and measures of a face for the further controls.
+    """Regions and measures of a face for the controls of further.toml.
 
     Arrays have a row per vertex of the base mesh; lengths are in decimetres.
 
@@ -169,7 +169,8 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         roots = positions[lashes[height < np.quantile(height, 0.35)]]
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
-        # At the corners the other lid is as near, so only skin on this side of the roots counts.
+        # At the corners of the eye both lids are equally near, so only skin above the roots of the
+        # upper lashes or below those of the lower lashes counts.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

@@ -107,7 +107,8 @@ def make_strips(
         c, s = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
         side = c * side + s * up
     sides = side * half_width[:, None, None] * taper[None, :, None]
-    # A strip on edge would have half of its root deep in the skin, so its root is narrowed.
+    # A strip that stands on its edge would have half of its root deep in the skin, so its root
+    # is narrowed.
     deep = np.abs((sides[:, 0] * outside[:, 0]).sum(axis=1))
     sides[:, 0] *= np.minimum(1, ROOT_DEEP / np.maximum(deep, 1e-9))[:, None]
     return Strips(points, sides, unit(outside), tiles, roots, np.full(len(points), held))

@@ -102,7 +102,7 @@ class Arch:
         length = np.concatenate([[0], np.cumsum(steps)])
         self._length = length - length[-1] / 2
         self.half = float(length[-1] / 2)
-        # The direction to the gum is the normal of the plane of the edges.
+        # The direction to the gum is the normal of the plane that fits the biting edges.
         middle = points - points.mean(axis=0)
         normal = np.linalg.svd(middle)[2][2]
         self.up = up * normal * np.sign(normal[1])

@@ -57,7 +57,7 @@ def _hairline(face: regions.Face, person: Person) -> Floats:
 
 
 def _grown_beard(face: regions.Face, person: Person) -> Floats:
-    """float64[V], 0 to 1: mask of the beard's cards."""
+    """float64[V], 0 to 1: density of the hair cards of the beard, 0 without a beard."""
     if person.beard_style == "none":
         return np.zeros(len(face.x))
     at = np.column_stack([face.x, face.y, face.z])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stores the joints that all sample people share, which were fitted once on the man (references).
+"""Stores references: the joints that all sample people share, fitted once on the man.
 
 joints.npz, made by packaging/ship/find_joints.py, has the joints for the options build.RIG. The
 joints for other options are files in the user's cache."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs in a Blender with a window, and answers the questions of drive.py.
+"""Runs in a Blender with a window, and calls the functions that drive.py requests.
 
     blender --python inside.py -- TALK
 
@@ -170,7 +170,7 @@ def points():
 
 
 def on_screen(place):
-    """The pixel of a point of world space on the screen, or None behind the viewer."""
+    """The pixel on the screen of a point in world space; None if it is behind the viewer."""
     area, drawing, _sidebar = view()
     at = view3d_utils.location_3d_to_region_2d(drawing, area.spaces.active.region_3d, place)
     if at is None:
