@@ -258,8 +258,9 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A texture at the size and precision in which it is stored.
 
-    Textures of eyes get half the side. Textures up to 1024 texels are part of the released zip:
-    they keep 7 of 8 bits, roughness 6, because the lower bits are noise, which PNG cannot compress.
+    Textures of eyes get half the side. Textures up to 1024 x 1024 are part of the released zip:
+    head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are noise, which
+    PNG cannot compress.
 
     Args:
         name: file name of the texture.
