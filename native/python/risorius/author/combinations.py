@@ -25,7 +25,8 @@ from .work import MM, RigOptions, Work, listed_meshes
 _STEPS = 3  # number of Gauss-Newton steps
 _OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
 _MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
-# Largest number of joints in a step, and smallest share of a joint relative to the strongest one.
+# Largest number of joints in a step, and smallest weighted error of a joint's vertices relative to
+# the joint with the largest one.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
@@ -67,7 +68,7 @@ class _Side:
 
 
 class _Skin:
-    """A mesh of both faces."""
+    """A mesh with its weights and shapes in the face of shapes and in the face of joints."""
 
     def __init__(self, before: Dna, after: Dna, mesh: Mesh, made: Mesh, columns: int) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
@@ -146,7 +147,8 @@ class Combinations:
         """Call a function for each corrective in threads. Returns the results in order.
 
         Args:
-            work: function of a corrective. When it runs, the smaller correctives are finished.
+            work: function of a corrective. When it runs, the correctives of a subset of its
+                controls are finished.
             tell: gets the finished fraction; an exception that it raises ends the work.
         """
         out: list[T] = []
@@ -197,7 +199,7 @@ class Combinations:
         self._leave(column, active, rows, joints)
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
-        """Set the values of joints to 0 that move no vertex by least_effect_mm or more."""
+        """Set to 0 the values of joints that move no vertex by least_effect_mm or more."""
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -211,7 +213,7 @@ class Combinations:
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
         """Choose the vertices and the new joints of a corrective's equations.
 
-        Returns: vertices with an error and some held vertices; indices of the joints.
+        Returns: vertices with an error, and some others, which must not move; the joints' indices.
         """
         motions = self.after.motions(self.after.worlds(active))
         parts, found, errors = [], [], []
@@ -259,7 +261,7 @@ class Combinations:
         return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
-        """float64[new joints, 6, correctives]: values that the correctives add, in `order`."""
+        """float64[new joints, 6, correctives]: joint values of correctives, sorted as `order`."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
     def finish(self, lods: int) -> list[Combination]:

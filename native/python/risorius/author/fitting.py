@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The native fit of joints, weights and motions to expressions, and its options."""
+"""Calls the native fit of joints, skin weights and joint motions to the shapes of expressions."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class FitOptions:
     # A joint takes no part in an expression if it moves no vertex by this distance, in the mesh'
     # unit.
     least_effect: float = 0.0
-    # True keeps the round with the smallest largest error of the second half of the rounds. False
-    # keeps the best of the last four rounds.
+    # The result is the round with the smallest maximum error: among the second half of the rounds
+    # if True, among the last four rounds if False.
     bound: bool = False
 
 
@@ -49,7 +49,7 @@ def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Double
     """Rotation vectors and shifts of the joints, both float64[E, J, 3], of rigid motions.
 
     Args:
-        motions: float64[E, J, 3, 4].
+        motions: float64[E, J, 3, 4], motion of each joint in each expression.
         positions: float64[J, 3], positions of the joints.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
@@ -205,7 +205,10 @@ def _weights(dense: Doubles) -> _native.FitWeights:
 
 
 def _rows(dense: Doubles) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
-    """Joints and weights [V, n] of dense rows [V, J]; n is the largest number per vertex."""
+    """Joints and weights [V, n] of dense weights [V, J], largest first, padded with weight 0.
+
+    n is the largest number of joints with a weight above 0 at one vertex.
+    """
     most = int((dense > 0).sum(axis=1).max(initial=0)) if dense.size else 0
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
     return joints.astype(np.uint32), np.take_along_axis(dense, joints, axis=1).astype(np.float32)

@@ -28,7 +28,8 @@ class LevelMeshes:
 
     Attributes:
         count: number of levels, including levels of the source.
-        triangles: (level, mesh of the source) -> triangles; a level lacks missing meshes.
+        triangles: (level, mesh of the source) -> triangles; meshes that a level leaves out have no
+            entry.
         ended: reason why there are no more levels, or "".
     """
 
@@ -100,7 +101,7 @@ class _Skin:
         self.poses = [self.positions, *(self.positions + wanted[e] for e in most)]
         fine = self.places[fan_triangles(mesh)]
         self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
-        # The fine mesh may already have slivers and folds, for example at the rims of lids.
+        # A level may have as many slivers and folds as the fine mesh, which has some at lid rims.
         self.had = [shape_of(points, self.fine) for points in self.poses]
 
     def wrong(self, triangles: Ints | None) -> str:

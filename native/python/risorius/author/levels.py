@@ -30,14 +30,17 @@ _LEAST_VERTICES = 24
 
 @dataclass(frozen=True)
 class LodOptions:
-    """The number of levels and the budgets of each. Levels of the source are kept."""
+    """The number of levels, and the numbers of joints and vertices of each level.
+
+    Levels that the source face already has are not simplified again.
+    """
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
     vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
 
     def check(self) -> None:
-        """Raise ValueError if a budget has not `count` numbers or grows from level to level."""
+        """Raise ValueError if `count` is invalid, or a budget has not `count` numbers or grows."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -71,7 +74,7 @@ class _Merging:
     """Removes joints one after the other; the most similar joint takes a removed joint's vertices.
 
     Attributes:
-        points: float64[V, 4], vertices with a 1.
+        points: float64[V, 4], vertices in homogeneous coordinates.
         weights: float64[V, J].
         motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
         heirs: removed joint -> joint that took its vertices.

@@ -108,7 +108,7 @@ def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def arc(positions: Doubles, displacement: Doubles, middle: Doubles, share: float) -> Doubles:
-    """float64[V, 3]: displacements on arcs about a point; the distance changes linearly.
+    """float64[V, 3]: displacements on arcs about a point; the radius changes linearly with `share`.
 
     Args:
         positions: float64[V, 3], neutral vertices.

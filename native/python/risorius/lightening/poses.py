@@ -145,7 +145,7 @@ def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
 def motion_rows(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
 ) -> Iterator[Doubles]:
-    """The motions of joints in poses, a block of poses at a time; 0 at rest.
+    """The motions of joints in poses minus the identity, so 0 at rest; a block of poses at a time.
 
     Args:
         dna: the face.

@@ -125,7 +125,8 @@ def _add_targets(
         corners, shares = np.zeros((0, 3), np.int64), np.zeros((0, 3))
         if m != skin:
             points = np.asarray(mesh.positions, np.float64)
-            # A coarser skin has the same normals as the skin, but lashes have two sides.
+            # Only for a coarser skin, the nearest point must have a similar normal. The normals of
+            # lashes point to both sides, so normals are not compared there.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
             found, shares, distance = checker.nearest(points, normals)

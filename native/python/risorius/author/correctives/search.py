@@ -32,7 +32,8 @@ _BLOCK = 64  # number of combinations between two reports of progress
 _ENOUGH = 3000  # smallest number of vertices of a skin that shows faults
 _MOVED_MM = 0.1  # vertices that move less count as resting
 _SHARED = 4  # a pair is checked if both expressions move at least this many common vertices
-# Sums of volume and of faces that count as equally bad, and the largest severity that is ignored.
+# Volume of intersection in mm3 and number of faces that count as equally bad; largest severity that
+# is ignored.
 _VOLUME, _FACES, _LEAST = 100.0, 5.0, 0.1
 KINDS = ("volume", "stretched", "folded")
 _ALIKE = np.array([_VOLUME, _FACES, _FACES])  # equally bad sums, by kind
@@ -122,7 +123,7 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """The faults that a combination may have: those of its controls, and of pairs of them."""
+        """The faults that a combination may have, because its controls or their pairs have them."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)

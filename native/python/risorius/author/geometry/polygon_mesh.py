@@ -49,7 +49,7 @@ def polygon_mesh(
 
 
 def vertex_normals(positions: Floats, faces: Sequence[Sequence[int]]) -> Floats:
-    """Unit normals [V, 3]: area-weighted means of the adjacent faces; +z for a vertex without area.
+    """Unit normals [V, 3]: area-weighted means of the adjacent faces; +z if the faces have no area.
 
     Args:
         positions: float64[V, 3].

@@ -262,7 +262,7 @@ class Influences:
 
 
 class Skin:
-    """Vertices with skin weights, for poses in which few joints move: others cost nothing."""
+    """Vertices with skin weights, for poses of few moving joints. Joints at rest cost no time."""
 
     def __init__(self, positions: Doubles, weights: Doubles) -> None:
         """Prepare vertices.

@@ -77,8 +77,8 @@ class Wishes:
     """The user's settings for a head; "" or 0 means that the value is guessed.
 
     Attributes:
-        mesh: name of the face's mesh.
-        rather: name of the face's mesh if the file has several heads.
+        mesh: name of the face's mesh; the file must contain it.
+        rather: name of the mesh that is preferred if the file has several heads.
         left: direction of the character's left, one of AXES.
         up: direction of the top, one of AXES.
         front: direction in which the face looks, one of AXES.
