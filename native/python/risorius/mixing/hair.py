@@ -23,7 +23,7 @@ _STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
-    """Numbers of the meshes that only this person has: trailing hair and beard meshes, by name.
+    """Numbers of the hair and beard meshes, found by name at the end of the list of meshes.
 
     Args:
         dna: a face.
