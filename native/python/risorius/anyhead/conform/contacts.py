@@ -161,7 +161,7 @@ def _gaps(face: _Posed, posed: Doubles, touch: Touch, change: Change) -> Doubles
 
 
 def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V]: share of its motion that each vertex needs in addition; None without a gap."""
+    """float64[V]: fraction by which the motion of each vertex must grow; None without a gap."""
     posed = face.at(control)
     ways = posed - face.rest
     way = ways[touch.vertex] - np.einsum("nk,nkd->nd", touch.shares, ways[touch.corners])
@@ -169,7 +169,8 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
     square = np.einsum("nd,nd->n", way, way)
     share = np.einsum("nd,nd->n", gaps, way) / np.maximum(square, 1e-12 * change.reach**2)
     length = np.sqrt(square)
-    # LODs without blend shapes have the joints alone: lids that overlap are better than a gap.
+    # At LODs without blend shapes only joints close the lids, and overlapping lids are better
+    # than a gap. So the joints aim at an overlap.
     share += _OVERLAP * np.std(share * length) / np.maximum(length, 1e-6 * change.reach)
     if np.median(np.abs(share) * length) < _LEAST * change.reach:
         return None
@@ -185,7 +186,8 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
     """float64[V, 3]: motion that each vertex needs in addition; None without a gap.
 
-    Both lids move in proportion to their motion. The correction fades out behind the rims.
+    The gap is divided between both lids in proportion to their motion by the control. The
+    correction fades out behind the rims.
     """
     posed = face.at(control)
     ways = posed - face.rest

@@ -317,8 +317,9 @@ class Eyelids:
     def _edge_line(
         self, points: Doubles, turn: Doubles | None, *, upper: bool
     ) -> tuple[Doubles, Doubles]:
-        """float64[columns]: the lowest angle of the upper lid, or the highest of the lower lid, of
-        points above the eye, and their distances from the eye's centre; NaN without such a point.
+        """float64[columns] each: angle up of a lid's edge, and distance of the edge from the eye's
+        centre. The edge is the lowest point of the upper lid, or the highest point of the lower
+        lid, among points outside the eye; NaN if there is none.
         """
         across, up, away = self.opening.frame.angles(points)
         own = self._above == upper
@@ -342,8 +343,8 @@ class Eyelids:
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
-        """float64[n]: for each vertex the height that its triangles lack to be `above` over the
-        eye. Only triangles that are clear of the eye at rest count."""
+        """float64[n]: height by which the triangles of each vertex must rise to be `above` over
+        the eye. Only triangles outside the eye at rest count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
