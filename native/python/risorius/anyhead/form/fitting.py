@@ -261,7 +261,7 @@ def _round(
 
 
 class _System:
-    """The normal equations of a round. Unknowns: rotation (3), translation (3), growth (1), then
+    """The normal equations of a round. Unknowns: rotation (3), translation (3), log scale (1), then
     the weights of parts and of expressions."""
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:

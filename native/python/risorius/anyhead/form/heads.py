@@ -17,7 +17,7 @@ FILE_NAME = "heads.npz"  # made by packaging/ship/make_head_form.py
 
 @dataclass(frozen=True)
 class TeethForm:
-    """A linear regression from the skin to the lower teeth, over the drawn heads.
+    """A linear regression from the skin to the lower teeth, over the heads of the model.
 
     Its 12 results are the centre of the teeth in cm, and row by row the matrix [3, 3] that maps the
     teeth of the mean head to the teeth of this head.
