@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips: named control curves over time, and their .rzc files, read completely or in parts.
+"""Defines clips (curves of named controls), and reads .rzc clip files completely or in parts.
 
 A clip plays on every character whose rig has these controls.
 """

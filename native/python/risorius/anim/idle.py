@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Idle movement from a random seed: blinks, saccades with lids that follow, and subtle motion.
+"""Makes idle movement from a random seed: blinks, saccades with lids, and subtle motion.
 
 Randomness comes from the raw bits of PCG64, which NumPy keeps stable; all other arithmetic is sums,
 products and quotients. So every machine makes the same blinks at the same times.

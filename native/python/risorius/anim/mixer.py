@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixes layers of clips and poses, reactions and exclusive controls to the controls of a face."""
+"""Computes a face's controls from layers of clips and poses, reactions, and exclusion rules."""
 
 from __future__ import annotations
 

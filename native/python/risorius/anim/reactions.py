@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reactions that a Mixer fires, and rules of controls that exclude each other; read from TOML."""
+"""Reads from TOML the reactions of a Mixer and the rules of controls that exclude each other."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A triangle mesh with its normals, edges and border."""
+"""Defines a triangle mesh, and computes its normals, edges and border."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Progress of long work, which the caller may stop."""
+"""Reports the progress of long work to the caller, who can stop the work."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Solves the joint values of correctives, because turns of joints do not add up like blend shapes.
+"""Solves the joint values of correctives, because joint rotations do not add up like blend shapes.
 
 With all controls of a corrective at 1, the face of joints must have the form of the face of shapes.
-The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes hold the
+The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes store the
 remaining displacements.
 """
 

@@ -68,7 +68,8 @@ def fit_joints(
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> JointFit:
-    """Fit new joints beside given joints: their positions and motions, and weights of all joints.
+    """Fit positions and motions of new joints in addition to given joints, and weights of all
+    joints.
 
     Args:
         neutral: float64[V, 3], neutral vertices; the face's middle is x = 0.

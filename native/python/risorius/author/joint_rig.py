@@ -117,7 +117,7 @@ def make_joint_rig(
 
 
 def lighten(rig: JointRig, source: Dna) -> None:
-    """Remove the shortest blend shape deltas of a rig that has more of them than its source.
+    """Remove the shortest blend shape deltas of a rig that has more deltas than its source.
 
     The errors in `rig` are updated.
 

@@ -136,8 +136,8 @@ def joint_order(
 ) -> tuple[list[int], dict[int, int]]:
     """The new joints sorted by importance, the most important first; mirrored joints are adjacent.
 
-    The joint whose vertices another joint moves most similarly is removed repeatedly; the other
-    joint takes its vertices. The reverse order of removal is the result.
+    Repeatedly, the joint is removed whose vertices another joint can move with the least error, and
+    the other joint takes its vertices. The reverse order of removal is the result.
 
     Args:
         positions: float64[V, 3].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Removes the shortest deltas, so that a rig has at most as many as the face it was made from."""
+"""Removes the shortest deltas, so that a rig has at most as many as its source face."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Chooses the parent of each new joint: the jaw, or the neck or head joint of its vertices.
 
-A joint under the jaw follows the jaw's arc. An expression added to an open jaw then turns with the
-jaw, like a blend shape, which is added before skinning.
+A child joint of the jaw follows the jaw's arc. An expression added to an open jaw then turns with
+the jaw, like a blend shape, which is added before skinning.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
-# Tolerance relative to the head's height: 0.16 mm of 240 mm. Default of the command line, of
-# Blender and of the sample people.
+# Tolerance relative to the head's height: 0.16 mm for a head of 240 mm. Default of the command
+# line, of Blender and of the sample people.
 TOLERANCE = 1 / 1500
 _RIGID_MM = 0.02  # a mesh needs no new joints if the existing joints' error is smaller
 
@@ -41,7 +41,7 @@ class RigOptions:
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
     shapes: bool = True  # False: joints only, no blend shapes
-    # Whether the rig has at most as many blend shape deltas as its input. If necessary, the
+    # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
     # A joint takes no part in an expression if it moves no vertex by this distance.
@@ -256,8 +256,8 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But vertices must keep their joint, because a neck
-    may be turned by hand.
+    The fit cannot distinguish resting joints. But vertices must keep following the same one,
+    because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: named poses of the standard raw controls in data files that users can edit.
+"""Reads expressions (named poses of the standard raw controls) from files that users can edit.
 
 The files in this folder contain six emotions, fifteen visemes and more. Any file of the same form
 can be loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the

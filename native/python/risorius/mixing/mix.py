@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixes faces: numeric values become weighted means, names and lists stay.
+"""Mixes faces: numeric values become weighted means; names and lists are not changed.
 
 Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
 weights of its vertices. A region from another face is scaled to the size of the mixed face and

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Argument classes of the solvers: limits of controls, and distribution of a drag over controls."""
+"""Defines arguments of the solvers: limits of controls, and how a drag is divided among them."""
 
 from __future__ import annotations
 

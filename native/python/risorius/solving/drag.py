@@ -209,10 +209,10 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls that belong elsewhere (see LOCAL) get ELSEWHERE, so that a dragged brow does not turn
-    the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of their
-    effect here to their effect on the whole face, so that the brow lowers before the whole face
-    contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face (see LOCAL) get ELSEWHERE, so that a dragged brow does not
+    turn the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of
+    their effect here to their effect on the whole face, so that the brow lowers before the whole
+    face contracts, which would lower it too. The largest ease is 1.
 
     Args:
         surface: surface of the face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The method "sparse" of solve_drag: selects few controls, and adds more if necessary."""
+"""Implements the method "sparse" of solve_drag: few controls, and more only if necessary."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .surface import Doubles
 
 _HARD = 0.1  # fraction of the largest ease below which a control belongs elsewhere
 # _MISSING: distance by which a sparse drag may miss the target to use fewer controls. _HELP: gain
-# in distance that justifies the use of controls which belong elsewhere. Both are the smaller of a
-# fraction of the distance to the target and a limit in mm.
+# in distance that justifies the use of controls of other parts of the face. Both are the smaller of
+# a fraction of the distance to the target and a limit in mm.
 _MISSING, _MISSING_MM = 0.02, 0.6
 _HELP, _HELP_MM = 0.02, 1.3
 _DEAR = 100.0  # price of controls that belong elsewhere, so that all others are selected first
 # Smallest effect of a selectable control relative to the strongest one; the second number is for
-# controls that belong elsewhere.
+# controls of other parts of the face.
 _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
 # mm: if a sparse drag misses the targets by more than this, the solution with all controls is
 # computed too. If that one is nearer by more than this, controls are added to the sparse drag.
@@ -81,7 +81,7 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
 
 
 def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The best pose near a selected change `x`, float64[U], that changes only its nonzero controls.
+    """The best pose near the change `x`, float64[U], among poses that change the same controls.
 
     It uses full Gauss-Newton steps, whose result is continuous in the targets. If the result is far
     from the targets, halved steps are tried, too, and the nearer result is used.

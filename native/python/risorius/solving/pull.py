@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drag as equations: residuals of target coordinates, derivatives by controls, least squares."""
+"""Makes and solves the equations of a drag: residuals, derivatives by controls, least squares."""
 
 from __future__ import annotations
 

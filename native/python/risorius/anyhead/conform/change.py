@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The deformation of a skin mesh from its own head (source) to another head (target).
+"""Computes the deformation of a skin mesh from its own head (source) to another head (target).
 
 Each vertex has a deformation gradient (Sumner and Popovic, "Deformation Transfer for Triangle
 Meshes", 2004). The gradients are smoothed over about 2 cm, because expressions scale with the size

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An eyeball with its cornea, and the distance of its surface from its centre in any direction."""
+"""Measures the distance of an eye's surface, with cornea, from its centre in any direction."""
 
 from __future__ import annotations
 

@@ -281,7 +281,7 @@ class Eyelids:
         return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
-        """float64[n]: the share of a turn that each vertex takes, 0 to 1.
+        """float64[n]: the fraction of an angle by which each vertex rotates, 0 to 1.
 
         most: the largest angle of an edge in radians; it widens the fade.
         """
@@ -297,8 +297,9 @@ class Eyelids:
         turn: Doubles | None,
         wanted: Doubles,
     ) -> Doubles:
-        """float64[n]: the angles, in radians, by which vertices of the upper lid go down, so that
-        its edge goes down by `wanted`. The lid's own turn is scaled first; `_fade` adds the rest.
+        """float64[n]: the angles, in radians, by which vertices of the upper lid rotate down so
+        that its edge rotates down by `wanted`. The lid's rotation by the expression is scaled
+        first; `_fade` distributes the remaining angle.
         """
         columns = self.opening.across
         high = self._edge(points, turn)

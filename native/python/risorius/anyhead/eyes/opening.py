@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Finds the opening between the lids of an eye by rays from the eye's centre.
 
-A ray that hits no lid leaves through the opening. This tells upper from lower lid on a mesh of any
-topology, without names and without a template.
+A ray that hits no lid leaves through the opening. This distinguishes the upper from the lower lid
+on a mesh of any topology, without names and without a template.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The statistical head model: a mean head, its principal variations and some expressions."""
+"""Loads the statistical head model: a mean head, its main variations and some expressions."""
 
 from __future__ import annotations
 

@@ -219,9 +219,9 @@ def _held(hints: Hints) -> Held | None:
 
 
 def _with_eyes(pose: Pose, hints: Hints) -> Held | None:
-    """The user's landmarks and the given eyeballs, each as a position of the nearer model eye.
+    """The user's landmarks, and the given eyeballs as positions of the eyes of the head model.
 
-    None if no eyeball is near an eye of the model.
+    None if no given eyeball is near an eye of the model.
     """
     held = _held(hints)
     form = head_form()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The landmarks of a head (found, moved by hand or missing), and their JSON file."""
+"""Stores the landmarks of a head (found, moved by the user or missing) in a JSON file."""
 
 from __future__ import annotations
 

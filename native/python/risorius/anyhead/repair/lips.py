@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Closes the lips in poses that close the mouth, so that they meet and do not cut each other.
 
-Positions do not tell upper from lower lip at a point of contact, but the motion of an opening jaw
-does. This finds the lips of a mesh of any topology by its expressions.
+At a point of contact, positions do not distinguish the upper from the lower lip, but the motion by
+jawOpen does. So the lips of a mesh of any topology are found by its expressions.
 """
 
 from __future__ import annotations

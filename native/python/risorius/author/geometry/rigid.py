@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rigid motions of points: least squares fit, change of pivot, and partial rotations."""
+"""Computes rigid motions of points: least squares fit, change of pivot, partial rotations."""
 
 from __future__ import annotations
 

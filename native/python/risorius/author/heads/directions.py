@@ -37,8 +37,8 @@ class Direction:
         sure_up, sure_front: True if the user or the shapes determine the axis, False if it is the
             usual axis of file formats.
         inside_out: whether polygons face inwards, for example in a mirrored file.
-        turned: angle in degrees between `left` and the line from the shapes named right to those
-            named left; 0 for angles below 37 degrees.
+        turned: angle in degrees between `left` and the line from the shapes named right to the
+            shapes named left; 0 for angles below 37 degrees.
     """
 
     left: Doubles

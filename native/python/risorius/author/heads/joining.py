@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes one upright face of usual size from the meshes of a head, with joints of eyes and jaw."""
+"""Joins the meshes of a head to one upright face in cm or m, with joints of eyes and jaw."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a head, their materials, and the user's settings for the head."""
+"""Defines the meshes of a head, their materials, and the user's settings for the head."""
 
 from __future__ import annotations
 

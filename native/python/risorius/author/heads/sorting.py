@@ -132,7 +132,9 @@ class Places:
 
 
 def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
-    """The joint that a mesh without shapes follows. A mesh of all teeth is cut in two.
+    """The joint that a mesh without shapes follows.
+
+    A mesh of all teeth is divided into upper and lower teeth.
 
     Args:
         part: the mesh.
