@@ -195,7 +195,7 @@ class Clip:
         """The clip with evenly spaced frames at its `rate`, from the time of its first frame on.
 
         Raises:
-            BudgetError: see resampled.
+            BudgetError: too many frames, see resampled().
         """
         count = self._even_count(self.rate, 0.5)
         start = float(self.frame_times()[0]) if self.frame_count else self.start
@@ -325,13 +325,13 @@ class ClipReader:
 
     Attributes:
         names: names of the controls.
-        rate, start: as in a Clip.
+        rate, start: frames per second, and time of the first frame in seconds.
         has_times: whether each frame has its own time.
         frame_count: number of frames in the file.
         byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
             a recovery.
         block_starts: index of the first frame of each block, and at the end the frame count.
-        events, metadata: as in a Clip.
+        events, metadata: events of the clip and facts about it, see Clip.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:

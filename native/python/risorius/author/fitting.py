@@ -115,7 +115,7 @@ def fit_motions(
         given: float64[J, 3], positions of the given joints.
         motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
             all expressions.
-        weights: float64[V, J + new joints].
+        weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
         at: index of the pivot of each new joint; None: the middle of its vertices.
         options: options of the fit; only emphasis, threads and least_effect are used.
@@ -160,7 +160,7 @@ def fit_weights(
         options: options of the fit; only influences, smoothness, symmetric and threads are used.
 
     Raises:
-        DnaError: as fit_joints().
+        DnaError: a value is not finite, nothing moves, or an option is out of range.
     """
     return _native.fit_weights(
         _shapes(neutral, displacements, edges, importance),

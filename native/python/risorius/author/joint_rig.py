@@ -177,8 +177,8 @@ def find_reference(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        DnaError: as make_joint_rig().
-        ValueError: as make_joint_rig().
+        DnaError: see make_joint_rig().
+        ValueError: see make_joint_rig().
     """
     work, fit, made, _ = _made(dna, options or RigOptions(), progress, None, whole=False)
     return reference_of(work, fit, made)
@@ -514,7 +514,7 @@ def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGr
 
     Args:
         work: the face.
-        values: float64[new joints, 6, columns].
+        values: float64[new joints, 6, columns], translations and Euler angles by each input.
         columns: indices of the inputs.
     """
     count = len(values)

@@ -137,8 +137,8 @@ def shape_of(points: Doubles, triangles: Ints) -> tuple[float, float]:
     """The fractions of triangles that are slivers, and of edges folded by more than 120 degrees.
 
     Args:
-        points: float64[V, 3].
-        triangles: int64[n, 3].
+        points: float64[V, 3], vertex positions.
+        triangles: int64[n, 3], vertex indices.
     """
     if not len(triangles):
         return 0.0, 0.0

@@ -111,7 +111,7 @@ def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
 
     Args:
         work: the face.
-        start: float64[V, joints].
+        start: float64[V, joints], weights of the finer level.
         there: indices of the level's joints.
     """
     rows = start.copy()

@@ -75,7 +75,7 @@ class _Merging:
 
     Attributes:
         points: float64[V, 4], vertices in homogeneous coordinates.
-        weights: float64[V, J].
+        weights: float64[V, J], skin weights of the joints that are still there.
         motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
         heirs: removed joint -> joint that took its vertices.
         there: bool[J], whether a joint is still there.
@@ -140,10 +140,10 @@ def joint_order(
     the other joint takes its vertices. The reverse order of removal is the result.
 
     Args:
-        positions: float64[V, 3].
-        weights: float64[V, J].
-        rotations: float64[E, J, 3, 3].
-        translations: float64[E, J, 3].
+        positions: float64[V, 3], neutral vertices.
+        weights: float64[V, J], skin weights.
+        rotations: float64[E, J, 3, 3], rotation of each joint in each expression.
+        translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
         fixed: number of first joints that all levels keep and that the result does not contain.

@@ -88,7 +88,7 @@ def of_text(text: str) -> dict[str, Expression]:
     """Read expressions from the text of a file.
 
     Raises:
-        ValueError: see load.
+        ValueError: the text is invalid; the message says where.
     """
     return _parsed(toml.parse(text), "an expression")
 

@@ -25,7 +25,7 @@ class Pose:
 
     Attributes:
         name: name of the control, or of a corrective's controls joined by +.
-        raw: float32[R].
+        raw: float32[R], values of all raw controls.
         input: index in the control vector of the raw control or corrective that the pose tests.
         controls: number of controls in the pose; a joint's rotation counts as one.
     """

@@ -25,7 +25,7 @@ class Refit:
         """Args:
         products: float64[J, 4, J, 4] at the LOD, see joints.Leaving.
         places: float64[J, 3], rest positions of the joints relative to the face's middle.
-        parents: int64[J].
+        parents: int64[J], parent of each joint.
         kept: indices of the remaining joints that the LOD lists, ascending.
         """
         self.products = np.ascontiguousarray(products.transpose(0, 2, 1, 3))

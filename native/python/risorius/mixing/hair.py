@@ -118,8 +118,8 @@ def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Int
     """int64[n, count]: indices of the points of `others` nearest to each point, in any order.
 
     Args:
-        points: float64[n, 3].
-        others: float64[m, 3].
+        points: float64[n, 3], points whose neighbours are searched for.
+        others: float64[m, 3], the possible neighbours.
         count: number of neighbours, from 1 to m.
         budget: budget of the face.
 

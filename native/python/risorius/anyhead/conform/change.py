@@ -177,7 +177,7 @@ class Change:
         therefore preferred, and points with the same texture coordinates if they are close enough.
 
         Args:
-            points: float64[n, 3].
+            points: float64[n, 3], positions on or near the source skin.
             mesh: the mesh that the points are the vertices of; None: points without normals.
         """
         found, places, far = self._closest.nearest(points)

@@ -22,7 +22,7 @@ class Eyeball:
         middle: float64[3], the centre.
         radius: the radius of the white of the eye.
         points: float64[V, 3], vertices of the ball and of the meshes that turn with it.
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], indices into `points`.
     """
 
     side: str

@@ -48,7 +48,7 @@ class Frame:
         """Angle across and angle up in radians, and distance from the centre, float64[n] each.
 
         Args:
-            points: float64[n, 3].
+            points: float64[n, 3], positions in the space of the head.
         """
         arm = points - self.middle
         length = np.linalg.norm(arm, axis=1)

@@ -48,7 +48,7 @@ class HeadForm:
         parts: float64[K, V, 3], principal displacements of one standard deviation.
         expressions: float64[E, V, 3], displacements of expressions, for weights from 0 to 1.
         expression_names: the names of the expressions.
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], vertex indices of the skin's triangles.
         weights: float64[V], weight of each vertex in a fit, 0 to 1.
         places: the vertex index of each landmark by name.
         teeth: the regression from the skin to the lower teeth.

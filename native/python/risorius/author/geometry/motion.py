@@ -119,7 +119,7 @@ class Mover:
         """float64[V]: for each vertex, the sum of its weights times its joints' amounts.
 
         Args:
-            amounts: float64[joints].
+            amounts: float64[joints], a number for each joint.
         """
         weights = self._weight * amounts[self._joint]
         sums = np.bincount(self._vertex, weights=weights, minlength=len(self._positions))

@@ -35,7 +35,7 @@ class FacePart:
         start, stop: range of its vertices.
         faces: range of its polygons.
         joint: name of the joint that the mesh follows.
-        material, source, polygons: as in HeadPart.
+        material, source, polygons: its material and its origin, see HeadPart.
     """
 
     name: str

@@ -39,7 +39,7 @@ class Turn:
 
     Attributes:
         name: name of the joint.
-        position: float64[3].
+        position: float64[3], the joint's position at rest.
         motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
     """
 
