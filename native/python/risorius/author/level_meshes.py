@@ -16,7 +16,8 @@ from .work import Work, listed_meshes
 
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
 _LOOKED_AT = 2000  # number of checked vertices of the fine skin
-# Limits of a level. Largest distances from the fine skin, as fractions of the skin's size.
+# Limits of a level: root mean square and largest distance of the skin from the fine skin, as
+# fractions of the skin's size.
 _RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
 _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees

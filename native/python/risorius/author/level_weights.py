@@ -23,7 +23,8 @@ from .work import (
     resting,
 )
 
-# Weight of a displacement at the value 0.5 relative to the value 1, for expressions along an arc.
+# Weight in the fit of the displacements by expressions along an arc at the value 0.5. Displacements
+# at the value 1 have the weight 1.
 _HALVES = 1.5
 
 

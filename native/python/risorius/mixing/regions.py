@@ -21,7 +21,7 @@ from ..base.budget import Budget
 from ..controls.regions import region_of
 from .hair import budget_of, nearest, without_hair
 
-# Region -> regions of controls in controls/regions.toml.
+# Region of a mix -> regions of controls, as named in controls/regions.toml.
 _CONTROLS = {
     "brow": ("brow",),
     "eyes": ("eye",),

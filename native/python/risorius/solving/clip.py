@@ -32,7 +32,7 @@ _AROUND = 8  # frames before and after a chunk that are smoothed with it
 _FLOOR_MM = 0.004  # mm: smallest noise that is assumed
 _WORTH = 3.0  # price of a control in standard errors of its value
 _LEAST = 0.01  # a control whose curve has a smaller range is not used
-# smallest and largest usual second difference of a control at 30 frames per second
+# limits of the usual second difference of a control's curve, at 30 frames per second
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
 _ENOUGH = 5e-4  # a smaller change of all controls ends an iteration

@@ -27,8 +27,8 @@ _STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems 
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024  # vertices that are smoothed together
 # The point with the same texture coordinates is taken if its distance is at most _LONGER times the
-# distance of the closest point plus _BESIDE times the reach. _SAME_TEXEL: largest UV distance at
-# which texture coordinates count as the same.
+# distance of the closest point plus _BESIDE times the smoothing radius. _SAME_TEXEL: largest UV
+# distance at which texture coordinates count as the same.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
 _NO_TEXTURE = 1e-6  # texture coordinates with a smaller extent are unusable
 _TURNED = 0.5  # a rotation counts if it leaves at most this share of the RMS difference

@@ -24,12 +24,13 @@ from ..surface import Surface
 from .change import Change, Hold
 from .parts import Eye
 
-# Shares of the reach (2 cm on a head of 24 cm): the least motion of a vertex that comes into
-# contact, the largest distance in contact, the least distance in the neutral pose, and the largest
-# gap that is not corrected.
+# Fractions of the smoothing radius (2 cm on a head of 24 cm): least motion of a vertex that comes
+# into contact, largest distance in contact, least distance in the neutral pose, and largest gap
+# that is not corrected.
 _FAR, _NEAR, _APART, _LEAST = 0.1, 0.05, 0.12, 0.004
 _FACING = 0.2  # least cosine between one normal and the opposite of the other normal
-# Shares of the reach: smoothing of the correction around a contact, for joints and for shapes.
+# Standard deviations of the correction around a contact, for joints and for shapes, as fractions of
+# the smoothing radius of 2 cm.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
 _SEEN = 0.001  # of the reach: smaller deltas are not added to a blend shape
 _MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts

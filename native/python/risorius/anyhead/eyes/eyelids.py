@@ -272,7 +272,7 @@ class Eyelids:
             return np.zeros(len(apart))
         columns = np.arange(len(apart))
         apart = np.interp(columns, columns[known], apart[known])
-        # Columns in which the eye is visible also close by a small overlap.
+        # In columns in which the eye is still visible, the edges approach by an additional overlap.
         seen = self._seen(points, turn) / self.ball.radius
         lacks = np.where(seen > 0, np.maximum(apart, seen) + _PRESSED * unit, 0.0)
         through = np.minimum(apart + _THROUGH * unit, 0.0)
@@ -366,7 +366,7 @@ class Eyelids:
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
-        # The rim keeps the height that it has at rest.
+        # The rim of a moved lid stays as high above the eye as at rest, at most _SKIN.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)

@@ -103,7 +103,8 @@ def near_eye(surface: Surface, ball: Eyeball) -> Surface:
         surface: the skin.
         ball: the eye.
     """
-    # Boxes are tested because a large triangle may pass the eye with all corners far away.
+    # Bounding boxes of the triangles are tested, because a large triangle may pass near the eye
+    # although all of its corners are far away.
     corners = surface.points[surface.triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     off = ball.middle - np.clip(ball.middle, low, high)

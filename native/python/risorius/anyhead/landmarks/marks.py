@@ -34,7 +34,7 @@ class Landmarks:
     """Landmarks of a face by name, in the space of the surface in which they were found.
 
     Attributes:
-        points: float64[3] by name.
+        points: float64[3] by landmark name, positions.
         how: FOUND or MOVED for each point.
         notes: sentences for the user.
     """

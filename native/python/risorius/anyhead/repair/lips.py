@@ -113,7 +113,8 @@ class Lips:
     def _touching(self) -> Doubles | None:
         """float64[2, 3]: both ends of the line in which the lips touch at rest; None if they do not
         touch."""
-        # Halved because the first estimate of the width covers about two mouths.
+        # `least` is halved, because `mm` derives from the first estimate of the mouth's width,
+        # which is about twice too large.
         half, least = COLUMNS // 2, _TOUCH * self.mm / 2
         for _ in range(3):  # each round narrows the columns
             gap = self.meeting(self.skin.points).gap
@@ -247,7 +248,7 @@ class Lips:
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest
-        # The cosine excludes points beside the border of an open lip surface.
+        # The cosine excludes points next to the border of an open lip surface.
         inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
         inside &= distance < _NEAR * self.mm
         signed = np.where(inside, -distance, distance)
