@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The default template: the sample person, which is built once and kept in the cache folder."""
+"""Builds the default template, the sample person, once and stores it in the cache folder."""
 
 from __future__ import annotations
 

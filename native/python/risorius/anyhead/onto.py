@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Transfers the expressions of a template to a head: from meshes to a face of blend shapes.
 
-The steps: standing, laying, transfer, fittings, repair, author's joining, ShapeSet, Dna.
+The steps: rotate and scale the head (standing), register the template's skin onto it (laying),
+transfer the displacements, find or add eyes and teeth (fittings), repair lids and lips, join the
+meshes (author.heads.joining), and make a Dna (author.input.shape_face).
 """
 
 from __future__ import annotations
