@@ -39,6 +39,7 @@ from .ui import (
 from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.anyhead import operators as head_operators
+from .ui.anyhead import overlay as landmark_overlay
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
 from .ui.drag import tool as drag_tool
@@ -176,6 +177,7 @@ def register() -> None:
     capture.register()
     drag_tool.register()
     why_overlay.start()
+    landmark_overlay.start()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -212,6 +214,7 @@ def unregister() -> None:
         bpy.app.timers.unregister(_refresh_once)
     why_panel.stop()
     why_overlay.stop()
+    landmark_overlay.stop()
     drag_tool.unregister()
     capture.unregister()
     paste_flipped.unregister()
