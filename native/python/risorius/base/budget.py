@@ -73,7 +73,7 @@ class Budget:
 
 
 def _amount(count: float) -> str:
-    """The amount as text; limited, because a file may contain integers beyond float."""
+    """The amount as text, capped at 2**80, because larger integers of a file may overflow float."""
     return f"{min(count, 1 << 80) if isinstance(count, int) else count:,.0f}"
 
 
