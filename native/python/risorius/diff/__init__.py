@@ -78,7 +78,7 @@ def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[
 def _in_system(
     a: risorius.Dna, b: risorius.Dna, report: Report
 ) -> tuple[risorius.Dna, Report, bool]:
-    """B in A's axes and units, its report, and whether the comparison is exact."""
+    """B converted to A's axes and units, the report, and whether the comparison is bit for bit."""
     target = {
         argument: getattr(a, name)
         for argument, name in _SYSTEM.items()
