@@ -44,8 +44,8 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # Remove the name before the lock ends, so that no process locks a file that is then
-        # removed. Windows cannot remove an open file, but there `_open` notices a removed one.
+        # The file is removed before the lock ends, so that `_open` of a waiting process notices
+        # it. Windows cannot remove an open file, so there the file is closed first.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
