@@ -261,5 +261,5 @@ def _quoted(name: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A target's name in lower case without the prefix up to the last dot, as in Face.M_F00.A."""
+    """A target's name in lower case, without a prefix such as "Face." up to its last dot."""
     return name.rpartition(".")[2].lower()
