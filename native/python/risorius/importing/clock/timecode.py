@@ -84,10 +84,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """Infers the base from the drop of the frame number at each new second, or None.
+    """Infers the frames per second from the frame number's drop at each new second, or None.
 
-    The frame number then drops by the base minus one step. Lost rows make it drop by less, so that
-    an unusual base is accepted only if several drops agree or no rows are lost.
+    The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
+    unusual rate is accepted only if several drops agree or no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
