@@ -26,7 +26,7 @@ from .source import Take, keep_ascending, make_clip, read_bytes
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"glTF"
-# Samples per second of smooth curves.
+# Samples per second into which smooth and stepped curves are converted.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = (5126,)
@@ -305,7 +305,7 @@ class Document:
         """The bytes that a uri stands for: its own in base64, or a file in the glTF's folder.
 
         Args:
-            uri: of a buffer or a picture, as in the file; may be of any type.
+            uri: uri of a buffer or a picture, as in the file; may be of any type.
             place: place of the uri, for errors.
 
         Raises:
@@ -355,14 +355,14 @@ class Document:
         return np.array(found, np.float64)
 
     def transform(self, node: Mapping[str, Any], place: str) -> Doubles:
-        """float64[4, 4] from a node to the node above it.
+        """float64[4, 4], the matrix from a node to its parent.
 
         Args:
-            node: its table.
-            place: its name in errors.
+            node: table of the node.
+            place: name of the node for errors.
 
         Raises:
-            AnimationFileError: its matrix, rotation, scale or translation is no list of numbers.
+            AnimationFileError: a matrix, rotation, scale or translation is no list of numbers.
         """
         if "matrix" in node:
             return self.finite(node, "matrix", [0.0] * 16, place).reshape(4, 4).T
@@ -572,7 +572,8 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Animated extras may be properties of a rig; colours, positions and so on are no face curves.
+    # Custom properties of a rig are in "extras". Other animated properties, such as colours, are
+    # no curves of a face.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 

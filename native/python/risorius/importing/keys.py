@@ -27,8 +27,8 @@ class Keys:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
         kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
-        leave: float64[keys], slope after each key per second; empty unless a key is CUBIC.
-        arrive: float64[keys], slope before each key per second.
+        leave: float64[keys], slope just after each key, per second; empty unless a key is CUBIC.
+        arrive: float64[keys], slope just before each key, per second; empty as `leave`.
     """
 
     times: Doubles
