@@ -143,7 +143,7 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 
 
 def matrix(reader: Reader, document: object) -> Take | None:
-    """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
+    """Reads {names: [...], frames: [[...], ...]}; Audio2Face calls these facsNames, weightMat.
 
     A frame may be a table with the values under "weights" and a time. Returns None if the document
     has another layout.
@@ -197,7 +197,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
 
 
 def neurosync(reader: Reader, document: object) -> Take | None:
-    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
+    """Reads {"blendshapes": [[61 or 68 values], ...]}, which the NeuroSync service returns.
 
     Returns None if the document has another layout.
 
@@ -232,7 +232,7 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}; the values may be in a table under "weights".
+    """Reads a list of frames {time, name: value, ...}; "weights" may be a table of the values.
 
     Returns None if the document has another layout.
 
@@ -305,8 +305,9 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None if the
-    document has another layout.
+    """Reads Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...].
+
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -394,7 +395,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
+    """Reads {name: [values], ...}, which may be under "curves", with a rate or a list of times.
 
     Returns None if the document has another layout.
 
