@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the registration on heads of a formula, whose corresponding points are known exactly."""
+"""Tests of the registration on computed heads, whose corresponding points are known exactly."""
 
 from __future__ import annotations
 
