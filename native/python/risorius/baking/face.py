@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A character prepared for baking, and clips prepared for it."""
+"""Loads a character for baking, adapts clips to it, and evaluates their frames in chunks."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def _amount(count: float) -> str:
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
-    """`left` after `count` is taken. Raises: BudgetError: less than `count` is left."""
+    """What remains of `left` after `count` is taken. Raises: BudgetError: `left` is too small."""
     if not count <= left:  # True for NaN too
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "

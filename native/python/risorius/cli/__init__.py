@@ -42,7 +42,7 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command. Returns the exit code.
 
-    Args: arguments  words of the command line; None for those of the process.
+    Args: arguments  words of the command line; None: the words with which the program was started.
     """
     for stream in (sys.stdout, sys.stderr):
         # Characters that the terminal's encoding lacks are printed as escapes, not as an error.

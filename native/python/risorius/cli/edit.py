@@ -151,7 +151,9 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """Parse --threshold: one number, or one each for translation, rotation and scale.
+    """Parse --threshold: effects of a coefficient that count as small, for all or for each kind.
+
+    Kinds are translation in mm, rotation in degrees, and scale in per cent.
 
     Raises:
         CommandLineError: not one or three numbers from 0.

@@ -98,7 +98,7 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether both files are equal, to find differences that the modules of the layers missed."""
+    """Whether both faces give equal bytes; else there may be differences that no module found."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

@@ -42,7 +42,7 @@ _COMBINATIONS = 256  # limit of combination targets if the user gives no limit o
 
 @dataclass
 class Made:
-    """The exported files and what to tell the user.
+    """The exported files, and notes for the user.
 
     Attributes:
         files: file name -> bytes, the .glb first.
@@ -56,7 +56,7 @@ class Made:
 
 
 def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
-    """Exports a face as glTF; with wishes.within, adds the JSON and script of its combinations.
+    """Exports a face as glTF; if wishes.within is set, also the JSON and script of combinations.
 
     Args:
         dna: the whole face, with geometry.
@@ -134,7 +134,7 @@ def _within(
             f"{_megabytes(written)}: ask for fewer shapes{more}"
         )
     size = wishes.textures
-    # a coarser LOD may leave room for larger textures
+    # The textures were reduced before the LOD. The coarser LOD may leave room for larger ones.
     while wish.lod != wishes.lod and size > wish.textures:
         larger = replace(wish, textures=size)
         again = maker.make(larger)

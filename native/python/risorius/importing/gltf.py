@@ -302,7 +302,7 @@ class Document:
         return self.linked(uri, place)
 
     def linked(self, uri: object, place: str) -> bytes:
-        """The bytes that a uri stands for: its own in base64, or a file in the glTF's folder.
+        """The bytes that a uri contains in base64, or of the file in the glTF's folder it names.
 
         Args:
             uri: uri of a buffer or a picture, as in the file; may be of any type.
@@ -320,11 +320,12 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A glTF may name files in its own folder, but not elsewhere on the disk.
+        # Only files in the glTF's folder are read, because a uri could name any file on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file, found=True)
-        # A short JSON may refer to a large buffer many times, so each buffer counts.
+        # Each reference takes its bytes from the budget, because a short JSON may refer to one
+        # large file many times.
         self.budget.hold(len(data), place)
         return data
 

@@ -86,7 +86,7 @@ def on_one_clock(
     Raises:
         BudgetError: too many curves with keys at different times, or keys too far apart.
     """
-    # Curves with equal times normally share one array.
+    # Each array of times is used once, because curves with equal times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))

@@ -254,7 +254,8 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Keyed curves and rows of a curve table are lists of tables, too.
+    # Tables with a curve's name are keyed curves or rows of a curve table, which other functions
+    # read.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))

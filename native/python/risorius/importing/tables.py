@@ -155,7 +155,8 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
-    # NumPy writes the header as a comment.
+    # NumPy writes the header as a comment, so a comment with as many cells as the first row of
+    # numbers is the header.
     named = next(csv.reader([comment], delimiter=delimiter), [])
     if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
         rows.insert(0, named)
@@ -166,8 +167,10 @@ def read_table(text: str, name: str) -> Table:
 
 
 def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
-    """Empties lines of comments; returns the lines, the delimiter if a line states it, and the last
-    comment above the header."""
+    """Replaces comments by empty lines.
+
+    Returns: the lines, the delimiter if a line states it, and the last comment above the header.
+    """
     delimiter = comment = ""
     is_top = True
     for i, line in enumerate(lines):

@@ -121,7 +121,7 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times, each lasting until the next; a rest before the first."""
+    """Makes cues from start times, each lasting until the next, with a rest before the first."""
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]

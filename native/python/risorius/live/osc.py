@@ -140,7 +140,7 @@ class Decoder:
         return done
 
     def pending(self) -> bool:
-        """Whether a face is incomplete whose end only silence can mark."""
+        """Whether a sender without Apply messages has an incomplete face, which silence ends."""
         return any(face.fresh and not face.applies for face in self._faces)
 
     def flush(self) -> list[Packet]:

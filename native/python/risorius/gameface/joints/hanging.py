@@ -24,8 +24,8 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
 
     The midpoint of the eyes is moved to the midpoint of the body's eye bones. If either has no
     eyes, the head joint is moved to the head bone. The head joints also decide the depth if the
-    body's eye bones are more than 3 cm deeper or less deep in the head. The root of the face
-    becomes the parent of the body's neck.
+    body's eye bones are more than 3 cm deeper or less deep in the head. The face's root is replaced
+    by the node above the body's neck.
 
     Args:
         skeleton: joints of the face alone.
