@@ -20,7 +20,7 @@ class Wishes:
         lod: number of the LOD.
         skeleton: whether to write joints of root, neck, head, jaw and eyes.
         sparse: whether morph targets store only the vertices that move.
-        quantize: whether positions are stored as 16-bit integers.
+        quantize: whether values of vertices are stored as integers of 8 or 16 bits.
         meshopt: whether vertices and triangles are compressed with meshoptimizer.
         normals: whether targets change normals too.
         textures: largest number of pixels of a picture's longer side.
