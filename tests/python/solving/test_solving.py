@@ -313,7 +313,7 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """The change costs no more than a solution by coordinate descent with the same error.
+    """The change costs as much as a solution by coordinate descent with the same error.
 
     The penalty of the coordinate descent is chosen so that the errors are equal.
     """
