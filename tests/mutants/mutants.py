@@ -48,7 +48,7 @@ SOURCES = {
 SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
 WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
 MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
-# No debug symbols and low optimisation, because each mutant is compiled and linked.
+# Without debug symbols and with low optimisation, each mutant compiles and links faster.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -84,7 +84,7 @@ def _lies_under(path: str, place: str) -> bool:
 
 
 def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
-    """The tests of a file, in the order of the table: those of all patterns that match its path."""
+    """The tests that the table lists for a file, in its order, from all patterns that match."""
     found: list[str] = []
     for pattern, tests in table.items():
         if fnmatch.fnmatch(path, pattern):
@@ -163,7 +163,10 @@ class Copy:
             sys.exit(f"{' '.join(command)}\n{text[-2000:]}")
 
     def try_one(self, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
-        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the test."""
+        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the last test.
+
+        Unsure means that the test also fails without the mutant.
+        """
         place = self.root / mutant.path
         source = place.read_text(encoding="utf-8")
         place.write_text(mutant.applied(source), encoding="utf-8")
@@ -182,7 +185,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; only then the failure counts."""
+        """Whether the failed test passes without the mutant; otherwise it proves nothing."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
@@ -197,7 +200,10 @@ class Copy:
         return self.outcome(test)[0] == "passed"
 
     def outcome(self, test: str) -> tuple[str, str]:
-        """Run a test. Returns: passed, killed, slow or unbuildable, and a line of its output."""
+        """Run a test on the present sources.
+
+        Returns: passed, killed, slow or unbuildable, and a line of the test's output about it.
+        """
         if "/" not in test.partition(":")[0]:
             target = test.partition(":")[0]
             if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:
@@ -308,7 +314,7 @@ def main() -> None:
     parser.add_argument("--survivors", action="store_true", help="try again those that lived")
     parser.add_argument("--programs", action="store_true", help="GoogleTest alone, for a first run")
     options = parser.parse_args()
-    # Background jobs of a shell ignore SIGINT, and tests' programs would inherit that.
+    # A shell's background jobs ignore SIGINT. Programs of the tests would inherit this setting.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # child processes inherit it
     part, wanted = options.part, options.count or COUNTS[options.part]
@@ -319,7 +325,8 @@ def main() -> None:
             print(told(mutant, "drawn", ""))
         return
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
-    # With --programs, the Python module is not built, because that takes long.
+    # The Python module is not built with --programs, because the GoogleTest programs do not need it
+    # and its build takes long.
     used = {"": [test for path in paths for test in tests_of(path, table)]}
     copy = Copy(part, programs(used) + ([] if options.programs else ["_native"]))
     copy.root.mkdir(parents=True, exist_ok=True)

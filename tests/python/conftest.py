@@ -51,7 +51,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip a test whose data are missing; the summary of the run names them."""
+    """Skip a test if `path` is missing; the summary of the run names the missing data (`what`)."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")

@@ -10,7 +10,10 @@ from risorius import Clip, ClipError, ClipReader, ClipWriter, Event
 
 
 def make_clip(frames=1300, times=True):
-    """A clip of random bits with NaN payloads, -0 and denormals; one is constant, one is a copy."""
+    """A clip of random bits with NaN payloads, -0 and denormals.
+
+    One curve is constant, one equals another curve, and one repeats three values.
+    """
     rng = np.random.default_rng(1)
     bits = rng.integers(0, 2**32, (7, frames), np.uint64).astype(np.uint32)
     bits[3] = 0x7FC12345

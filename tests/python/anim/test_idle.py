@@ -29,8 +29,8 @@ def angles(clip, side="L"):
 
 
 def test_a_seed_gives_the_same_everywhere():
-    # The expected values were recorded on one machine. On another one, a difference would come from
-    # NumPy's random bits or from arithmetic.
+    # EVENTS, BROW and LOOK were recorded on one machine. A difference on another machine would come
+    # from NumPy's random bits or from arithmetic.
     clip = idle(7, 20.0)
     assert [round(e.time, 6) for e in clip.events] == EVENTS
     np.testing.assert_allclose(clip.curve(P + "browRaiseInL")[::300], BROW, atol=1e-6)

@@ -279,7 +279,8 @@ def test_lids_close_on_an_eye_that_is_wider_open(shape, left):
     wide[:, 1] += 0.05 * (points[:, 1] > 0) * np.cos(points[:, 0])
     other = conform(face, {SKIN: wide})
     assert np.abs(skin_points(other) - wide).max() < 1e-5
-    # With the unchanged angle the lid stops halfway.
+    # For comparison: with the angle and shape of the source face, the upper lid does not reach the
+    # lower lid of the new head.
     was = copy.copy(other)
     was.joint_groups = face.joint_groups
     if shape:
@@ -301,7 +302,8 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
     for a, b in zip(found.meshes, wanted.meshes, strict=True):
         assert np.abs(a.positions - b.positions).max() < 1e-5
         assert np.abs(a.normals - b.normals).max() < 0.05  # polygons have other triangulations
-    # Grid cells of the smoothing depend on the axes; the root joint, far below, differs most.
+    # The smoothing uses a grid along the file's axes, so joints differ slightly. The root joint
+    # differs most, because it is far below the head.
     off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
     assert off.max() < 3e-3
     assert np.median(off) < 1e-4
@@ -338,7 +340,10 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
 
 
 def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
-    """Exact results replace the earlier steps, which other tests cover."""
+    """Only the last step, which moves the head to the face, is tested.
+
+    The registration, which other tests cover, is replaced by its exact result.
+    """
     system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
     mirrored = face.convert(**system, face_winding_order="ccw")
     points = stretched(skin_points(face))  # cm, standing

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests of finding a head's jaw by its skin or its own teeth, of finding eyes, and of stopping."""
+"""Tests of a head's jaw, measured by its skin or its own teeth.
+
+Also tested: pairs of balls may be eyes, the search for a face can be stopped, and lids meet.
+"""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
 
-# Skinning and morphing from the format's description, without code of risorius.author.
+# This module poses vertices by the format's description, without code of risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
@@ -52,7 +52,8 @@ EIGHT = [506, 304, 182, 109, 66, 39, 24, 24]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("egg")
-    # Given vertex budgets are respected; without budgets a face of 506 vertices has fewer LODs.
+    # The spec gives vertex counts for eight LODs, because this face of 506 vertices would otherwise
+    # get fewer.
     face_shapes.write_all(folder, more=f"[lods]\nvertices = {EIGHT}\n")
     return folder
 
@@ -68,7 +69,7 @@ def made(folder):
 
 
 def tolerated(times=1.0):
-    """The default tolerance of a vertex in cm, a fraction of the head's height, times a factor."""
+    """The default tolerance of a vertex in cm, multiplied by a factor. Args: times  the factor."""
     return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
@@ -397,7 +398,8 @@ def test_joints_alone_come_near(folder, tmp_path):
         error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
-        # Motion along an arc is also fitted at half its way, so the error at the end is larger.
+        # Motion along an arc is fitted at weights 0.5 and 1. So the error at weight 1 is larger
+        # than if it were fitted at 1 alone.
         assert error.max() < 0.12 * np.linalg.norm(delta, axis=1).max() * METRES
         if name.startswith(("mouth", "brow")):  # others follow an arc
             between = max(
@@ -415,7 +417,7 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     )
     assert np.abs(jaw.position - [0, 0, -2]).max() < 0.2
     assert jaw.expressions == (0,)
-    # A lid of vertices on the surface of a ball, which slides down along it.
+    # The vertices of a lid on the surface of an eyeball, and their way down along this surface.
     middle, turn = np.array([3.0, 2.0, 7.0]), np.linspace(0.1, 0.6, 9)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.7, 0.7, 9), turn))
 
@@ -464,14 +466,17 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    # The limit is loose, because the compiler's rounding changes the result of 200 rounds.
+    # Only a small gain is required, because the result of 200 rounds depends on rounding.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)
 
 
 def test_joints_that_are_there_stay(folder):
-    """A neck keeps its weight of a half on the lower vertices, and a jaw keeps its motion."""
+    """A source with a neck and a jaw joint keeps both.
+
+    The neck joint keeps its weight of 0.5 on the lower vertices, and the jaw keeps its rotation.
+    """
     read = spec.read_spec(folder / "spec.toml")
     dna = spec.read_face(read).dna
     positions, _ = face_shapes.head()
@@ -515,7 +520,10 @@ def test_joints_that_are_there_stay(folder):
 
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
-    """With jawOpen at 0.5 or with other expressions, the skin is where the source's rig puts it."""
+    """New joints in the skin that the jaw moves become children of the jaw joint.
+
+    So the skin equals the source's at jawOpen 0.5 and in combinations with other expressions.
+    """
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     hinge = np.array([0, 0, -2.0])

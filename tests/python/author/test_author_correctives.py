@@ -29,7 +29,11 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """Sculpts of two combinations for the egg-shaped head: less smile, and an additional bulge."""
+    """Sculpted displacements in cm of two combinations, which weaken a smile; one adds a bulge.
+
+    Args:
+        positions: float64[V, 3], the egg's vertices in cm.
+    """
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -66,7 +70,7 @@ def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    # Each active expression and corrective may err by the tolerance; 2 % are for rounding.
+    # The error is at most the tolerance once for each active expression and corrective.
     parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
     assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
@@ -193,7 +197,7 @@ def make_face(pushes, turning=None, first="head_lod0_mesh"):
     """A face whose controls push the sheet.
 
     Args:
-        pushes: pushes of the controls.
+        pushes: control -> arguments of `push`, its displacement of the sheet.
         turning: control that also turns everything about x by 25 degrees, or None.
         first: name of the file's first mesh.
     """
@@ -285,7 +289,8 @@ def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
 
 
 def test_what_has_a_corrective_is_as_somebody_wanted_it(face):
-    # The sculpt goes deeper into the ball: the search keeps it, and repairs the other pair.
+    # The sculpt for the pair (0, 1) enters the ball. The search leaves it as it is, and repairs
+    # only the two other pairs.
     sculpt = push(sheet(SIDE)[0], 0.5, 9.0) / 10
     found = find_correctives(add_correctives(face, 0, [((0, 1), sculpt)]))
     assert {one.controls for one in found.correctives} == {(0, 3), (1, 3)}
@@ -300,7 +305,8 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
         plain, _ = sheet(SIDE if lod == 0 else 21)
         linear = plain + sum(push(plain, *PUSHES[name]) for name in names)
         assert depth(linear).max() > 0.6
-        # Vertices away from the ball stay; each goes as far down as by either expression alone.
+        # The corrective changes no vertex away from the ball. Every vertex moves down at least as
+        # far as by the stronger expression alone.
         away = np.hypot(plain[:, 0], plain[:, 2]) > 17
         assert np.abs(posed[away] - linear[away]).max() < 1e-3
         least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)
@@ -324,8 +330,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # `both` enters the ball by 0.35 mm. One expression alone enters it by more than 4 mm, so a
-    # repair that only undoes the other expression would make the depth larger.
+    # Both expressions together enter the ball by 0.35 mm. If one of them is faded out, the other
+    # alone pushes the skin 6 mm down, deeper into the ball. The repair must not cause this.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])
@@ -406,13 +412,15 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # Controls 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
+    # (1, 2, 3) is no candidate, because 2 and 3 move no common vertices. (0, 1, 2) is one, although
+    # its pair (0, 2) has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
 
 def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
-    # A single measure such as volume / 100 + folds / 5 would put all pairs with volume first.
+    # If one number such as volume / 100 + folds / 5 ranked the pairs, all pairs with volume would
+    # come before all pairs with folds.
     sums = {(0, i): SimpleNamespace(volume=100.0 + i, stretched=0, folded=0) for i in range(1, 21)}
     sums |= {(1, i): SimpleNamespace(volume=0.0, stretched=0, folded=4) for i in range(30, 50)}
     sums[2, 50] = SimpleNamespace(volume=5.0, stretched=0, folded=0)  # too small to be repaired
@@ -420,7 +428,7 @@ def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
     assert len(chosen) == len(set(chosen)) == 20
     folds = [on for on in chosen if on[0] == 1]
     assert 8 <= len(folds) <= 12
-    # Of the pairs with volume, the pairs with the largest volume are chosen.
+    # Among the pairs that penetrate, those with the largest volume are chosen.
     assert {on for on in chosen if on[0] == 0} == {(0, i) for i in range(len(folds) + 1, 21)}
     assert set(fairest_of(sums, 40)) == set(fairest_of(sums, 999)) == set(sums) - {(2, 50)}
     assert fairest_of(sums, 0) == []
@@ -449,7 +457,8 @@ def test_it_ends_where_it_is_told_to(face):
 
 
 def test_a_triple_that_pairs_do_not_repair_gets_its_own(face):
-    # The controls a, b and d together push 2.6 mm; the pairs with b are repaired.
+    # The controls a, b and d together push the sheet down by 2.6 mm, and their pairs get
+    # correctives. The triple must not enter the ball deeper than the pairs do.
     found = find_correctives(face, CorrectiveOptions())
     assert {one.controls for one in found.correctives} >= {(0, 1), (0, 3), (1, 3)}
     rows = [(one.controls, one.shape) for one in found.correctives]
@@ -482,7 +491,8 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     for names in (("a", "b"), ("b", "d")):
         assert depth(skin_of(before, at_one(*names))).max() > 0.35
         assert depth(skin_of(after, at_one(*names))).max() < 0.11
-    # One pair has a corrective already, the other gets one; single controls stay the same.
+    # The pair (a, b) has a corrective, which is changed; (b, d) gets a new one. Poses of single
+    # controls stay the same.
     assert (rig.psd_count, again.psd_count) == (1, 2)
     for name in PUSHES:
         assert (skin_of(before, at_one(name)) == skin_of(after, at_one(name))).all()
@@ -523,7 +533,7 @@ def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
-    """The sums by moments equal those of a matrix with three rows for each vertex."""
+    """Equations that are summed from moments equal those of a matrix with 3 rows per vertex."""
     random = np.random.default_rng(7)
     joints, vertices = 9, 200
     turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A rig has at most as many deltas as its input; `author` prints both numbers and the errors."""
+"""A made rig has at most as many deltas as its input.
+
+The last line of the command states its numbers of joints and deltas, its size and its errors.
+"""
 
 import re
 

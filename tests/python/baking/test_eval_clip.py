@@ -160,7 +160,7 @@ def test_frames_and_rate(tmp_path):
     out = tmp_path / "out.npz"
     jaw = risorius.load(core).raw_control_names.index("CTRL_expressions.jawOpen")
     arguments = ["eval", str(ramp), core, "-o", str(out), "--what", "controls"]
-    # Resampled from 10 to 20 frames per second: every second frame is in the middle of two.
+    # Resampling from 10 to 20 frames per second adds a frame in the middle of every two frames.
     assert main([*arguments, "--rate", "20", "--frames", "1:6"]) == 0
     with np.load(out) as arrays:
         np.testing.assert_array_equal(
@@ -212,7 +212,10 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
 
 
 def test_a_capture_is_mapped(tmp_path, capsys):
-    """A take of Live Link Face is mapped by the mapping that fits its names, or by the user's."""
+    """Curves named as in Live Link Face are mapped to controls.
+
+    Without --mapping a built-in mapping is found; a mapping of the user replaces it.
+    """
     dna = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(dna))
     jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")

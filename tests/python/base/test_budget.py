@@ -107,7 +107,7 @@ def test_curves_of_an_fbx_that_unfold_without_end_are_refused(tmp_path, raw_valu
     path = tmp_path / "keys.fbx"
     path.write_bytes(fbx_files.fbx([("Objects", (), objects), ("Connections", (), links)]))
     assert path.stat().st_size < MB
-    # The first curve is invalid (its times do not ascend), so nothing more is unpacked.
+    # Reading ends at the first curve, whose times do not ascend, so no other array is unpacked.
     peak = refused(path, "key times that ascend were expected")
     assert peak < 40 * keys
 

@@ -64,8 +64,8 @@ KINDS = {
 
 
 READERS = {
-    # Reader, suffix of the test's file, and words of the kinds that the test leaves out, because
-    # the reader reads such files or has a more detailed error for them.
+    # Reader, suffix of the test's file, and words in the names of kinds that the test skips,
+    # because the reader accepts such files or has a more detailed error for them.
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

@@ -85,14 +85,17 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     lines = words(done).splitlines()
     assert done.returncode == 0
     assert all(line.startswith("risorius: warning: ") for line in lines)
-    # Layers that came after 2.3 in the format's table and that are not empty in this file.
+    # Warnings name the layers of this file that version 2.3 of the format lacks.
     named = [line.split("has no layer ")[1].split(";")[0] for line in lines]
     assert named == ["rbfb", "rbfe", "jbmd", "twsw", "mlbe"]
     assert "twsw" in risorius.load(out).layers
 
 
 def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
-    """Version 2.1 stores no networks, so joint groups lose the columns of networks' controls."""
+    """If networks are left out, columns of joint groups for their controls are left out too.
+
+    Version 2.1 and the layer behavior contain no networks.
+    """
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)

@@ -11,7 +11,7 @@ import risorius.cli
 
 ROOT = Path(risorius.cli.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
-# Modules that belong to commands of other names.
+# Module -> the commands that it belongs to, if its name is not the name of a command.
 PARTS = {
     "eval_clip": ["eval"],
     "diff": ["info"],

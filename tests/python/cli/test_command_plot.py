@@ -82,7 +82,10 @@ def test_majority_of_a_group():
 
 
 def chain(**changes) -> risorius.Dna:
-    """A chain of three joints, children first: root, middle above it, tip on the middle."""
+    """A chain of three joints listed children first: tip, its parent middle, whose parent is root.
+
+    Args: changes  properties of the Dna to replace.
+    """
     dna = risorius.Dna()
     dna.rotation_unit, dna.coordinate_system = "degrees", ("right", "up", "front")
     dna.joint_names = ["tip", "middle", "root"]
@@ -95,7 +98,8 @@ def chain(**changes) -> risorius.Dna:
 
 
 def test_world_positions_of_a_known_chain():
-    # A quarter turn about z maps the root's x to y; a quarter turn about x keeps x.
+    # The root's rotation of 90 degrees about z maps x to y. The middle's rotation about x keeps the
+    # tip's offset along x.
     expected = [[10, 25, 30], [10, 22, 30], [10, 20, 30]]
     np.testing.assert_allclose(skeleton.world_positions(chain()), expected, atol=1e-5)
 

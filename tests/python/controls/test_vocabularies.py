@@ -31,8 +31,8 @@ def spelled(kind):
     return out
 
 
-# Numbers of all names; of names that `author` recognises by words alone; of names that the best
-# mapping for clips contains.
+# Vocabulary -> (number of its names, number of names that `author` recognises by words alone,
+# number of names that the best mapping for clips contains).
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conversion of axes and units, compared with matrices, the reference and evaluated poses."""
+"""Conversion of axes and units, compared with matrices, the reference reader and posed faces."""
 
 import gzip
 import itertools
@@ -16,8 +16,8 @@ from coordinates_oracle import System
 
 EPS = float(np.finfo(np.float32).eps)
 FILES = ["tiny_v28", "units", "quatjoints", "medium"]
-# Bound of the rotation error from rounding Euler angles to float32; a chain of joints sums DEPTH
-# errors.
+# Largest rotation error in radians from rounding an Euler angle to float32. A chain of joints adds
+# up to DEPTH such errors.
 ANGLE = 180 * EPS * np.pi / 180
 DEPTH = 40
 
@@ -187,7 +187,10 @@ def test_every_pose_maps_where_the_order_of_rotation_stays(name):
 
 
 def random_rig(seed, joints=7, raw=5):
-    """A chain of joints with rotated neutral poses; controls drive all attributes of one."""
+    """A chain of joints with random neutral poses and axes, and raw controls without effect.
+
+    Returns: the face, and the random generator.
+    """
     rng = np.random.default_rng(seed)
     dna = risorius.Dna(
         lod_count=1,

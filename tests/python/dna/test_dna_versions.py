@@ -38,8 +38,8 @@ def test_between_all_versions(source, target):
     data, words = written(dna, target)
     again = risorius.load(data)
     assert again.version == target
-    # 2.1 stores four layers, other versions all: newer layers are written for readers that know
-    # them.
+    # A file of version 2.1 has four layers. Other versions keep all layers, also newer ones, for
+    # readers that know them.
     kept = set(dna.layers) | known(source)
     expected = known(1) if target == 1 else kept | known(target)
     assert set(again.layers) == expected

@@ -34,9 +34,13 @@ def some_controls(dna, rig, seed):
 
 
 def tolerance(dna, sizes):
-    """Allowed float32 error: 2e-5 times the sum of the parts plus one unit.
+    """Allowed float32 error of each of 9 attributes: 2e-5 times (size + 1 unit).
 
-    For rotations the unit is a radian, because values may be converted through quaternions.
+    The unit of rotations is a radian, because values may be converted through quaternions.
+
+    Args:
+        dna: the face, with the unit of rotations.
+        sizes: float[..., 9], sum of the absolute contributions to each attribute.
     """
     turn = 1.0 if dna.rotation_unit == "radians" else 57.3
     return 2e-5 * np.add(sizes, [1, 1, 1, turn, turn, turn, 1, 1, 1])
@@ -361,7 +365,7 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "CTRL_expressions.browRaiseInnerL=0.5, CTRL_expressions.browRaiseInnerR=0.5" in (
         captured.err
     )
-    # Calculated by hand: 1.5 * 0.5 * 0.75 for corrective 6, and the missing factor of corrective 5.
+    # 0.5625 is 1.5 * 0.5 * 0.75. Corrective 5 is inactive, because one of its factors is 0.
     assert "corrective 6 = 0.5625: browRaiseInnerR 0.5 * jawOpen 0.75, weight 1.5" in captured.out
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 
@@ -418,7 +422,10 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
 
 @pytest.mark.parametrize("name", ["quatjoints", "mlquat"])
 def test_a_rotation_order_that_nobody_knows_is_that_of_the_evaluator(name):
-    """Numbers that the format does not define are read, and evaluated as xyz, right, up, front."""
+    """A rotation order or axis with an undefined number is read, and evaluated as the default.
+
+    The defaults are xyz, right, up and front.
+    """
     dna = risorius.load(GOLDEN / f"{name}.dna")
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
     dna.coordinate_system = ("#7", "up", "#9")

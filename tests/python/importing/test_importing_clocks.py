@@ -178,8 +178,8 @@ def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, ba
             assert "give the timecode rate (clip convert --timecode-rate" in str(error)
             continue
         note = next(note for note in found.notes if note.startswith("the timecode counts"))
-        # Without the seconds' changes, rates of 48 and 50 look like 60, the rate of nearly all
-        # phones.
+        # Without the rows at a change of the second, takes at 48 and 50 frames per second look like
+        # takes at 60, the rate of nearly all phones.
         assert note.split()[3] in (str(base), "60")
 
 

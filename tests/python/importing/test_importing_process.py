@@ -131,7 +131,7 @@ def test_short_clips_and_wrong_widths():
 
 
 def test_one_euro_holds_noise_and_follows_motion():
-    """Compared with the filter of the paper as a plain loop."""
+    """The filter gives the values of the paper's algorithm, written here as a plain loop."""
     rng = np.random.default_rng(2)
     values = np.where(AT > 1.0, 1.0, 0.0) + rng.normal(scale=0.01, size=120)
     out = only(process.one_euro(clip(values), 1.5, 5.0))

@@ -79,7 +79,7 @@ def test_a_base_that_nothing_tells_is_asked_for(tmp_path):
 
 
 def test_drop_frame_timecodes_leave_out_two_numbers_a_minute(tmp_path):
-    """Frames 1798 to 1801 of 29.97 frames per second: 00:00:59;28, ;29, 00:01:00;02, ;03."""
+    """After 00:00:59;29 the next timecode is 00:01:00;02, one frame of 1001 / 30000 s later."""
     codes = ["00:00:59;28", "00:00:59;29", "00:01:00;02", "00:01:00;03"]
     body = "".join(f"{code},2,0.1,0.2\n" for code in codes)
     found = read(tmp_path, "Timecode,BlendShapeCount,JawOpen,JawLeft\n" + body, timecode_rate=29.97)

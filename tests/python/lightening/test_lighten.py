@@ -137,8 +137,8 @@ def test_correctives_that_move_least_leave(face):
     assert light.joint_names == face.joint_names
     assert light.psd_count == 6
     names = [name.replace("CTRL_expressions.", "") for name in report.removed_correctives]
-    # By the formula for correctives, later ones move the face less; but the sixth drives the jaw's
-    # map, and the last moves the face as much as a smile.
+    # Later correctives move the face less and are removed first. The sixth is kept because it
+    # drives the jaw's map, and the last because it moves the face as much as a smile.
     assert all("jawOpen + neck" not in name for name in names)
     assert "eyeBlinkLeft + mouthSmileRight + jawOpen" not in names
     assert len(report.removed_correctives) == 3
@@ -223,5 +223,5 @@ def test_json_says_all(file, tmp_path):
     said = json.loads(done.stdout)
     assert said["lods"] == [1]
     assert said["after"]["levels"] == 1
-    # A single LOD is the same face, without error.
+    # Only LODs are removed, so no expression of the remaining LOD changes.
     assert max(row["largest_mm"] for row in said["expressions"]) < 1e-3

@@ -76,7 +76,7 @@ def test_frames_of_live_link_face_arrive_with_their_times():
 
 
 def test_every_curve_of_a_packet_has_its_name():
-    # The order of values in the packet, and the control of Apple's unit at each index.
+    # The values of a packet have all ARKit units, then the angles, in the app's order.
     units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
@@ -709,7 +709,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
 
 
 def test_smoothing_is_the_one_euro_filter():
-    """Compared with the paper's algorithm, value by value in plain Python."""
+    """Smoothed values equal the one-euro filter of its paper, written here in plain Python."""
     random = np.random.default_rng(3)
     raw = np.clip(
         0.5 + random.normal(0, 0.02, 200) + np.where(np.arange(200) > 120, 0.4, 0.0), 0, 1

@@ -91,7 +91,8 @@ def test_a_fit_finds_the_way_back(sample: tuple[Any, list[str]]) -> None:
 
 
 def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> None:
-    # raw 0 = a + b, raw 1 = a: for (0.9, 0.2) the solution is a = 0.2 and b = 0.7.
+    # The sliders a and b set raw control 0 to a + b and raw control 1 to a. The raw values 0.9 and
+    # 0.2 need a = 0.2 and b = 0.7.
     rows: Rows = [
         (0, 0, 0.0, 1.0, 1.0, 0.0),
         (0, 1, 0.0, 1.0, 1.0, 0.0),
@@ -103,7 +104,7 @@ def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> No
 
 
 def test_what_a_fit_loses_is_said_by_name() -> None:
-    """Up 0.5 and down 0.3 of one slider: the larger value is kept, the other is lost."""
+    """If one slider should be 0.5 up and 0.3 down at once, the loss names the smaller control."""
     rows: Rows = [(0, 0, 0.0, 1.0, 1.0, 0.0), (0, 1, -1.0, 0.0, -1.0, 0.0)]
     table = _of_rows(["a.ty"], rows, 2)
     gui = fitting.fit(table, [[0.5, 0.3]], [[0.0]])

@@ -345,7 +345,8 @@ class TestSpace:
     def test_rotation_carries_points_as_in_the_file(
         self, sequence: str, signs: tuple[int, int, int], axes: tuple[str, str, str]
     ) -> None:
-        # Rotating in the file and converting equals converting and rotating in Blender.
+        # A point that is rotated by the file's rules and then converted to Blender equals the
+        # converted point, rotated in Blender.
         made = _space(rotation_sequence=sequence, rotation_signs=signs, coordinate_system=axes)
         angles = np.array([[20.0, -70.0, 130.0]])
         point = np.array([1.0, 2.0, 3.0])

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The studio: the picture contains head and shoulders.
-
-The lights follow portrait photography.
-"""
+"""The studio's camera shows head and shoulders, and its lights follow portrait photography."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_every_face_mixes_with_a_moved_copy_and_keeps_what_they_share(name):
     for m, mesh in enumerate(mixed.meshes):
         before = np.asarray(face.meshes[m].positions)
         np.testing.assert_allclose(mesh.positions, before + np.float32([0, 0.5, 0]), atol=1e-5)
-    # Except for the moved values, the file equals the face in all layers.
+    # After the moved positions are set back, the mix equals the face byte for byte.
     meshes = []
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):
         mesh.positions = own.positions
@@ -167,7 +167,7 @@ def test_faces_without_some_layers_mix_with_their_like_alone(layers, tmp_path, c
 
 
 def test_a_region_of_teeth_alone_has_a_size():
-    """The skin does not move, so all of it counts as skull."""
+    """A region without vertices of the skin can be mixed, although no skin shows its size."""
     face = risorius.load(GOLDEN / "ml.dna", layers="geometry")
     mixed = mix_faces([face, moved(face)], Mix([0.5, 0.5], {"mouth": {1: 1}}))
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):

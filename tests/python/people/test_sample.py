@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample person: its parts compared with formulas, the whole with its source data."""
+"""Tests of the sample people: parts are compared with formulas, whole people with source data."""
 
 import os
 import sys
@@ -59,7 +59,10 @@ def test_the_mapping_holds_the_52_units_with_weights_up_to_one():
 
 
 def test_catmull_clark_of_a_cube_is_known():
-    """Corner of the unit cube: (F + 2 R + (n - 3) P) / n with n = 3 gives 5 / 9."""
+    """Subdivision moves the corners of a cube from 1 to 5 / 9 along each axis.
+
+    This follows from the formula of Catmull and Clark, (F + 2 R + (n - 3) P) / n with n = 3.
+    """
     finer, operator = polygons.subdivide(CUBE)
     p = operator.apply(CORNERS)
     assert (len(p), len(finer.faces)) == (26, 24)
@@ -137,9 +140,9 @@ class _Nobody:
 
 @pytest.fixture(scope="module", params=["girl", "man"])
 def sample(request):
-    """A real person: (source, dna, parts, shaped positions, person, body).
+    """A sample person: (source, dna, parts, shaped positions, person, body).
 
-    The persons are the one for whom the data are made, and the one that differs most.
+    The people are the man, for whom the source data are made, and the girl, who differs most.
     """
     data, person = sample_people.data(), people.PEOPLE[request.param]
     dna, parts, body = sample_people.assembled(request.param)
@@ -148,7 +151,7 @@ def sample(request):
 
 @pytest.fixture(scope="module")
 def packed():
-    """The sample face in the extension."""
+    """The sample face that is packed into the built Blender extension."""
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
         _not_run.add("the extension's sample face")
@@ -317,10 +320,10 @@ def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
 def test_extra_the_packed_face_gives_back_its_units(sample, packed):
-    """The extension's man reproduces the units within 0.8 mm.
+    """The extension's man shows each ARKit unit with an error below 0.8 mm.
 
-    Also for lips that meet over an open jaw, where five controls and five correctives rotate the
-    same joints.
+    This includes lips that meet under an open jaw, for which five controls and five correctives
+    rotate the same joints.
     """
     data, before, parts, _, _, body = sample
     dna = packed
@@ -423,7 +426,10 @@ def test_extra_each_cheek_flushes_on_its_side(sample):
 
 
 def test_people_are_shares_of_the_data():
-    """The formula of the data's own program: age, muscle and weight are interpolated linearly."""
+    """A person's shape interpolates the data linearly by age, muscle and weight.
+
+    The program for which the data are made uses the same formula.
+    """
     girl = people.PEOPLE["girl"].shape()
     for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # her weight is 0.4
         for age, years in (("child", 0.7), ("baby", 0.3)):

@@ -25,7 +25,7 @@ def _height(points, middle, radius, gaze):
 
 
 def test_the_eye_has_the_measures_of_real_ones():
-    """In millimetres, scaled to the size of a human iris."""
+    """Cornea, iris and pupil have human sizes in mm if the iris is scaled to a human iris."""
     size = LIMBUS / eyeball.IRIS
     assert 12 <= size <= 15.5  # people's eyeballs have a radius of 12 mm, the data's up to 16
     top = size * float(eyeball.surface(np.zeros(1))[0])

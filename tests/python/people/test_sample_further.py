@@ -51,7 +51,7 @@ def test_extra_each_control_moves_something_that_no_other_does(motions):
     flat = moved.reshape(len(names), -1)
     flat = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     alike = np.argwhere(np.triu(flat @ flat.T, 1) > 0.95)
-    # Opening further continues the same motion.
+    # jawOpenExtreme continues the motion of jawOpen, so only these two have the same direction.
     assert [(names[a], names[b]) for a, b in alike] == [("jawOpen", "jawOpenExtreme")]
 
 
@@ -76,8 +76,8 @@ def test_extra_lids_slide_on_the_eye_and_the_tongue_keeps_its_root(man):
     moved = np.linalg.norm(lower, axis=1) > 0.5 * MM
     assert moved.sum() > 30
     along = np.einsum("ij,ij->i", lower, arm)[moved] / np.linalg.norm(arm[moved], axis=1)
-    # Vertices move towards or from the eye's middle only because the cornea bulges;
-    # test_sample_eyes tests the rest.
+    # The lid moves around the eye's middle. Only over the bulge of the cornea its distance from the
+    # middle changes; test_sample_eyes tests the distance itself.
     assert np.abs(along).max() < 1.0 * MM
     assert np.median(np.abs(along)) < 0.1 * MM
     assert lower[moved, 1].max() > 2 * MM

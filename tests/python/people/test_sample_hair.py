@@ -148,7 +148,8 @@ def test_no_straight_hair_is_cut_off_by_a_side_of_its_card(who):
     left, low, width, height, count = TILES["scalp"]
     tiles = cover[low : low + height, left : left + count * width].reshape(height, count, width)
     sides = tiles[:, :, [0, 1, -2, -1]]
-    # Bent hairs may touch a side; if inclined hairs crossed it, the share would be 0.056.
+    # Few pixels at the sides of a card may be opaque, because bent hairs touch the sides. If
+    # inclined hairs crossed them, the share would be 0.056.
     assert (sides > 0.5).mean() < 0.02
 
 
@@ -263,8 +264,8 @@ def test_a_face_that_no_control_makes_alone_counts(stage):
     alone = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, [])
     both = [np.ones(2, np.float32)]
     together = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, both)
-    # At x = 0.17 the skin rises by 0.016, and at three quarters of its length the hair is 0.0225
-    # high.
+    # One step to three quarters is enough: the hair then ends at x = 0.17, 0.0225 above the skin at
+    # rest, and the skin rises there by only 0.016.
     np.testing.assert_allclose(
         together.points[0, -1] - together.points[0, 0],
         0.75 * (alone.points[0, -1] - alone.points[0, 0]),
@@ -396,7 +397,7 @@ def test_metadata_say_where_strands_wind(haired):
         assert wound["man"] == {}
         assert own
         assert set(wound["woman"]) == set(wound["fighter"]) == {f"coil:{n}" for n in own}
-        # Shorter hair has smaller coils.
+        # The hair of the fighter is shorter than the woman's, and has smaller coils.
         for name in wound["woman"]:
             sizes = [float(wound[who][name].split()[0][7:]) for who in ("fighter", "woman")]
             assert 0.3 < sizes[0] <= sizes[1] < 3

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Teeth, lips, shirt, and differences between the sides, with the real data if available."""
+"""Teeth, lips and shirt of the sample people, and differences between the left and right side.
+
+Tests of the real data are skipped if the data are missing.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +35,7 @@ def man():
 
 
 def _pieces(polygons):
-    """The number of connected pieces, which is the same in these meshes' textures."""
+    """The number of connected pieces of a mesh, counted as its UV islands."""
     return len(np.unique(islands(polygons)))
 
 
@@ -63,7 +66,7 @@ def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
     )
     found, shift = rigid.rigid_fit(after, after + way)
     assert found == pytest.approx(turn, abs=1e-3)
-    # For all other vertices the difference is at most the limit of 0.5 mm.
+    # All vertices follow one rigid motion to within the limit of 0.5 mm.
     assert np.abs(after @ found.T + shift - after - way).max() < 0.006
 
 
@@ -89,7 +92,7 @@ def test_extra_lips_rest_on_each_other(data, base, man):
     assert len(gaps) > 15
     assert gaps.max() < 0.25 * MM
     assert gaps.min() > -0.6 * MM
-    # The lips of the original data are open.
+    # In the source data the lips are more than 0.5 mm apart.
     raw = lips.gap_across(mouth, mouth.operator.apply(full.positions))[1]
     assert raw.max() > 0.5 * MM
 
@@ -149,9 +152,9 @@ def test_extra_a_shirt_has_a_collar_and_one_hem(base):
 
 
 def test_extra_skin_in_the_shirt_rests_in_every_expression(base, man):
-    """Otherwise the skin would come through the collar, for example in a shout.
+    """No control except breath moves skin below the shirt.
 
-    Only the controls of breath move it.
+    Otherwise the skin would come through the collar, for example in a shout.
     """
     skin = man.groups["body"]
     skin = skin[np.abs(base.positions[skin, 0]) < 1]

@@ -43,7 +43,10 @@ def sheet():
 
 
 def folds(sheet, change):
-    """The folds of mask blink_L on the deformed sheet, float64[V, 4]; other controls rest."""
+    """float64[V, 4]: folds of the mask blink_L if eyeBlinkL deforms the sheet by `change`.
+
+    All other controls move nothing.
+    """
     part, positions = sheet
     still = Expression(np.zeros_like(positions))
     units = {
@@ -96,7 +99,8 @@ def test_folds_run_along_their_lines(way):
     inner = heights[20:76, 30:86]
     assert inner.min() < -0.9
     assert inner.max() <= 0
-    # way 0: lines along x, so neighbours in x are similar and neighbours in y are not.
+    # `way` is the axis of the folds' lines, 0 for x: neighbours along it are similar, neighbours
+    # across it are not.
     along = np.abs(np.diff(inner, axis=1 - way)).mean()
     across = np.abs(np.diff(inner, axis=way)).mean()
     assert across > 4 * along

@@ -14,7 +14,7 @@ TURN = np.array([[0.9238795, 0.0, 0.3826834, 0.0]], np.float32)  # 45 degrees ab
 
 
 class Face:
-    """The oracle's face with its six joints as bones, in another order, and one bone more."""
+    """The oracle's face, its six joints as bones in another order, and an additional root bone."""
 
     ROWS = (3, 0, 6, 1, 5, 4)
     OTHER = 2  # no joint of the file: a root above all others

@@ -55,7 +55,10 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, angles), ...]}: factors of each joint's quaternion, in order."""
+    """{joint: [(control, [x, y, z]), ...]}: factors of each joint's quaternion, in their order.
+
+    The angles have the file's unit.
+    """
     out = {}
     for group in dna.joint_groups:
         found, order = {}, oracle.column_order(dna, group)
@@ -74,7 +77,7 @@ def turns(dna, lod):
 
 
 def giant(dna):
-    """The face with all rows in one joint group: each LOD contains the coarser ones."""
+    """The face with all rows in one joint group, sorted so that coarser LODs use leading rows."""
     out = copy.deepcopy(dna)
     width = control_count(dna)
     rows = []
@@ -184,7 +187,8 @@ def test_random_faces_with_repeated_rows_and_columns(width):
     out, _ = edit.regroup(dna, timed=0)
     for lod in range(dna.lod_count):
         wide = control_count(dna)
-        # Values of duplicate columns are summed before rounding.
+        # The tolerance is a rounding of float32, because values of duplicate columns are summed
+        # before they are rounded.
         np.testing.assert_allclose(
             matrix(dna, lod, wide), matrix(out, lod, wide), rtol=2**-23, atol=0
         )
@@ -238,8 +242,8 @@ def test_faces_whose_groups_overlap(seed):
         assert rigs[0].joint_indices_written.tolist() == rigs[1].joint_indices_written.tolist()
         for lod in range(dna.lod_count):
             a, b = (rig.evaluate_batch(raw, lod=lod) for rig in rigs)
-            # Values of duplicate columns are summed before rounding: sums of 14 values below 3 *
-            # 1.5.
+            # Values of duplicate columns are summed before they are rounded. A joint's sum has 14
+            # values, each with a size below 3 * 1.5.
             np.testing.assert_allclose(a.joints, b.joints, rtol=0, atol=14 * 4.5 * 14 * oracle.EPS)
             np.testing.assert_array_equal(a.animated_maps, b.animated_maps)
     assert edit.regroup(out, timed=0, combinations=0)[0].to_bytes() == out.to_bytes()
@@ -259,7 +263,7 @@ def test_correctives_that_others_read_are_computed_as_before(seed):
 
 
 def without_turns(dna):
-    """The face without quaternions, for which the order of columns matters."""
+    """The face with Euler angles instead of quaternions, so that the order of columns is free."""
     out = copy.deepcopy(dna)
     out.joint_behavior_metadata = risorius.JointBehaviorMetadata()
     return out
@@ -291,7 +295,10 @@ def test_quaternions_come_out_of_one_group_whole(name):
 
 
 def turning_face(*groups):
-    """Two quaternion joints at 2 LODs; groups: (rows of each LOD, controls, rows, values)."""
+    """A face with two quaternion joints and two LODs.
+
+    Args: groups  joint groups: (rows of each LOD, control indices, output indices, values).
+    """
     dna = risorius.Dna()
     dna.lod_count = 2
     dna.raw_control_names = [f"raw{i}" for i in range(4)]
@@ -309,7 +316,8 @@ def turning_face(*groups):
 
 COARSE, FINE = [0, 0, 20], [[30, 0, 10], [0, 25, 5]]
 TURNING = {
-    # In one group, control 3 of the coarser LOD would be multiplied first.
+    # If both groups were joined, control 3 would be the first factor of the quaternions, because
+    # the coarser LOD reads it.
     "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
     "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
     # The angles of one joint start at two LODs, so the order of its columns must be kept.

@@ -120,7 +120,7 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     dna.save(str(tmp_path / "face.dna"))
     character = load_face(tmp_path / "face.dna")
     (head,) = character.turning
-    # The head's angles for which its joint has the rotation of the pose.
+    # The yaw, pitch and roll with which the head's joint has the rotation of the pose UP.
     x, y, z = np.linalg.inv(head.axes) @ UP[:3]
     turn = rotation_of((x, y, z, UP[3]))
     pitch = -np.arcsin(turn[2, 1])

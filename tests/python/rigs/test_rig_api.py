@@ -233,7 +233,8 @@ def test_morph_is_the_sum_of_transformed_deltas():
         moved_size = np.abs(np.asarray(target.deltas, float)) @ np.abs(matrix.T.astype(float))
         np.add.at(expected, target.vertex_indices, weight * moved)
         np.add.at(size, target.vertex_indices, abs(weight) * moved_size)
-    # Roundings per vertex: 3 products and sums of the matrix, 1 of the weight, 5 terms of the sum.
+    # At most 9 roundings per vertex: 3 in the product with the matrix, 1 in the product with the
+    # weight, and 5 in the sum of targets.
     bound = 9 * np.finfo(np.float32).eps * size
     assert (np.abs(morph.evaluate(weights, base) - expected) <= bound).all()
     assert morph.channel_indices.tolist() == [0, 3, 7]

@@ -32,8 +32,8 @@ SEQUENCES = [(name, tag) for name, tag, _ in EVALUATIONS if tag in (".seq", ".qu
 FILTERED = [
     (name, tag, lods_of(about)) for name, tag, about in EVALUATIONS if lods_of(about) is not None
 ]
-# Interpolation multiplies the float32 error by the condition of its matrix; an arc near 0 has an
-# error of sqrt(8 eps) = 1e-3.
+# Largest condition number of a solver's matrix whose results are compared, because interpolation
+# multiplies the float32 error by it. ARC is the error of an angle near 0, sqrt(8 eps).
 WELL_CONDITIONED = 1e3
 ARC = 1e-3
 
@@ -72,7 +72,10 @@ class Face:
         return out
 
     def stretched(self, record):
-        """Joints of setups whose input is no unit quaternion, so their angles differ."""
+        """Joints of setups whose input quaternion has not unit length.
+
+        For these, Risorius and the reference compute different angles.
+        """
         layer, controls = self.dna.twist_swing_behavior, self.expected_controls(record)
         out = []
         for s in (*layer.twists, *layer.swings):
@@ -105,7 +108,10 @@ class Face:
             )
 
     def bounds(self, pose, record, lod):
-        """Allowed errors [J, 9], from rounding of sums and from differences of controls."""
+        """float64[J, 9]: allowed error of each joint attribute.
+
+        It contains the rounding of sums, and the effect of the controls' deviations.
+        """
         wanted = self.expected_controls(record)
         error = np.abs(pose.controls - wanted)
         if self.converted:
@@ -120,7 +126,7 @@ class Face:
         return out.reshape(-1, 9) + 1e-6
 
     def mixed_twists(self):
-        """Joints of twists whose rotation another twist shares, or a swing with another axis."""
+        """Joints of twists that share a rotation with another twist or a swing of another axis."""
         layer = self.dna.twist_swing_behavior
         axes = {}
         for s in layer.swings:
@@ -155,7 +161,8 @@ class Face:
         sure = np.nonzero(~vague)[0]
         a, b = self.quaternions(actual[sure]), self.quaternions(wanted[sure])
         error = np.minimum(np.abs(a - b).max(1), np.abs(a + b).max(1))
-        # if the cosine of the middle angle is near 0, half of the digits are lost
+        # If the cosine of the middle Euler angle is near 0, half of the digits are lost, so the
+        # allowed error is larger.
         pole = np.where(self.near_pole(wanted[sure]), 1e-3, 0)
         bad = np.nonzero(error > 0.5 * scale * bounds[sure, 3:6].sum(1) + 5e-6 + pole)[0]
         assert bad.size == 0, (
@@ -301,7 +308,10 @@ def test_filtered_loads_are_what_the_reference_loads(name, tag, lods, simd):
 
 
 def reference_joints(name, lods, loaded):
-    """Indices of the reference's joints in our load, which also keeps the joints' ancestors."""
+    """Indices in Risorius' filtered face of the joints that the reference keeps.
+
+    Risorius also keeps ancestors of these joints. None if both keep the same joints.
+    """
     whole = risorius.load(GOLDEN_SET / f"{name}.dna")
     kept = set(range(len(whole.joint_names))) - set(whole.lod_joint_mapping[0].tolist())
     kept |= set().union(*(whole.lod_joint_mapping[lod].tolist() for lod in lods))
@@ -333,7 +343,7 @@ def test_oracle_agrees_and_settled_is_what_repeats_itself(name, rotation):
 
 @pytest.mark.parametrize("rotation", ["euler", "quaternion"])
 def test_euler_angles_of_networks_are_read_by_their_own_system(rotation):
-    """Angles in another order, with other signs and about other axes than the face's."""
+    """Euler angles of networks may have their own order, signs and axes, unlike the face's."""
     dna = risorius.load(GOLDEN / "ml.dna")
     joints = dna.machine_learned_behavior_ext.joints
     assert oracle_behavior.ml_stride(dna) == 9

@@ -233,7 +233,7 @@ def test_a_control_that_is_not_finite_is_named_when_asked(rig):
     raw[1, jaw] = -np.inf
     with pytest.raises(risorius.DnaError, match=f"{JAW} is minus infinite"):
         rig.evaluate(raw[1], check=True)
-    # Values beyond float32 become infinite.
+    # 1e39 is beyond the range of float32 and becomes infinite.
     with pytest.raises(risorius.DnaError, match="is infinite"), np.errstate(over="ignore"):
         rig.evaluate(np.full(4, 1e39), check=True)
 

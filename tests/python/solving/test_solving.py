@@ -66,7 +66,7 @@ def test_a_drag_arrives_with_the_smallest_change(face):
     assert solved.raw.max() <= 1
     assert solved.raw[IDLE] == 0
     assert solved.change == pytest.approx(np.linalg.norm(solved.raw - at), abs=1e-5)
-    # Compared with the pseudo-inverse of the Jacobian, because no limit is reached.
+    # A small drag reaches no limit, so it equals the solution by the Jacobian's pseudo-inverse.
     small = surface.positions(at, 0, [vertex])[0] + [0.0, 0.004, 0.002]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6}
     step = risorius.solve_drag(surface, at, [(0, vertex)], [small], **free).raw - at
@@ -125,7 +125,7 @@ PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_partners_change_alike_and_as_little_as_they_can(face, method):
-    """Compared with the pseudo-inverse for one common number of both partners."""
+    """Both partners change by one number, which the pseudo-inverse of their joint column gives."""
     surface = face[1]
     vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
     here = surface.positions(begin, 0, vertices).astype(float)
@@ -313,9 +313,9 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """Compared with coordinate descent on the penalised problem.
+    """The change costs as much as a solution by coordinate descent with the same error.
 
-    Its penalty is chosen so that both have the same error.
+    The penalty of the coordinate descent is chosen so that the errors are equal.
     """
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2
@@ -342,7 +342,7 @@ def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # the twin moves like the jaw
     alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
     assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
-    # Compared with least squares weighted by the inverse of the squared ease.
+    # A small drag equals the least squares solution with the weight 1 / ease**2 of each control.
     small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
     step = risorius.solve_drag(surface, raw(), points, [small], **free).raw

@@ -38,7 +38,7 @@ def endless(tmp_path):
 
 @pytest.fixture
 def processes(monkeypatch):
-    """The processes that were started."""
+    """The list of the recogniser's processes that the test starts."""
     found, begin = [], apart._started
 
     def spy(said):
