@@ -144,13 +144,13 @@ def run(args: argparse.Namespace) -> int:
     options = replace(options, kept=(*options.kept, *read.kept))
     source = dna
     if asked.most or asked.together:
-        say.line("looking for what goes wrong where expressions meet")
+        say.line("searching for faults of combined expressions")
         found = find_correctives(dna, asked, say)
         dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
         say.line("\n".join(as_found(found)))
     rig = make_joint_rig(dna, options, say)
     if dna is not source and options.shapes and asked.once_more:
-        say.line("looking once more at what joints and shapes do together")
+        say.line("searching again for faults, in the face of joints and shapes")
         rig.dna = correct_again(rig.dna, source, asked, say)
     if options.lighter:
         lighten(rig, source)  # limits deltas to those of the input; found correctives are not input
