@@ -63,7 +63,8 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """A rule: active controls `by` multiply the controls `of` by 1 - amount * measure(by)."""
+    """A rule: controls `by`, while active, weaken the controls `of`: factor 1 - amount *
+    measure(by)."""
 
     name: str
     by: tuple[str, ...]

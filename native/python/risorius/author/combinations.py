@@ -25,8 +25,8 @@ from .work import MM, RigOptions, Work, listed_meshes
 _STEPS = 3  # number of Gauss-Newton steps
 _OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
 _MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
-# Largest number of joints in a step, and smallest weighted error of a joint's vertices relative to
-# the joint with the largest one.
+# Largest number of joints in a Gauss-Newton step. A joint is left out if the weighted squared error
+# of its vertices is below _LEAST_SHARE of the largest such error of a joint.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
@@ -127,7 +127,8 @@ class Combinations:
         self.first = len(work.source.joint_names)
 
     def active(self, column: int) -> list[int]:
-        """The inputs at 1 in a corrective's pose: controls, smaller correctives, the corrective."""
+        """The inputs at 1 in a corrective's pose: its controls, correctives of some of them,
+        itself."""
         on = self.work.combined[column]
         smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
         return [*sorted(on), *smaller, column]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fits the weights of a mesh on the joints of a level. The joints' motions are already known."""
+"""Fits a mesh' skin weights on the joints of a LOD. The joints' motions are already known."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def level_weights(
     wanted: Doubles,
     start: Doubles,
 ) -> Doubles:
-    """float64[V, joints]: weights on the joints of a level.
+    """float64[V, joints]: skin weights on the joints of a LOD.
 
     The fit gets two kinds of additional expressions. The first kind shifts a joint that no
     expression moves, such as the neck, with all its children, so that vertices keep following it.
@@ -45,7 +45,7 @@ def level_weights(
     Args:
         ways: motions of the face; the parents of new joints must be known.
         options: options of the fit.
-        lod: the level. Coarser levels use less smoothness, because their vertices are farther
+        lod: index of the LOD. Coarser LODs use less smoothness, because their vertices are farther
             apart.
         mesh: the mesh with its weights in the source.
         wanted: its displacements float64[E, V, 3].
@@ -108,12 +108,12 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
-    """Move the weights of joints that a level lacks to the joints that replace them.
+    """Move the weights of joints that a LOD lacks to the joints that replace them.
 
     Args:
         work: the face.
-        start: float64[V, joints], weights of the finer level.
-        there: indices of the level's joints.
+        start: float64[V, joints], weights at the next finer LOD.
+        there: indices of the joints in the LOD.
     """
     rows = start.copy()
     for joint in np.flatnonzero(rows.any(axis=0)).tolist():

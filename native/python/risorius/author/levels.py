@@ -18,8 +18,8 @@ from .. import Dna
 from ..base.errors import ArgumentError
 from .geometry.skeleton import Doubles, Ints
 
-# Fraction of LOD 0's joints at each level, about as in hand-made faces. It falls more slowly than
-# the number of vertices does.
+# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. It falls more slowly
+# than the number of vertices does.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
@@ -40,7 +40,8 @@ class LodOptions:
     vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
 
     def check(self) -> None:
-        """Raise ValueError if `count` is invalid, or a budget has not `count` numbers or grows."""
+        """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has another length
+        or rises."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -201,12 +202,12 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
 
 
 def mesh_budget(name: str, vertices: int, share: float) -> int:
-    """The number of vertices of a mesh at a level; 0 leaves the mesh out.
+    """The number of vertices of a mesh at a LOD; 0 leaves the mesh out.
 
     Args:
         name: name of the mesh.
-        vertices: number of vertices of the fine mesh.
-        share: number of vertices of the level relative to the fine level.
+        vertices: number of vertices of the mesh at LOD 0.
+        share: number of all vertices at the LOD, divided by the number at LOD 0.
     """
     wanted = round(share * vertices)
     if wanted >= _LEAST_VERTICES:

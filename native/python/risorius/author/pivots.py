@@ -39,7 +39,7 @@ def find_pivots(
     *,
     jaw: bool,
 ) -> list[Pivot]:
-    """Find the middles of the eyes, as pivots of the lids, and the hinge of the jaw.
+    """Find the centre of each eye, as the pivot of its lids, and the hinge of the jaw.
 
     Args:
         names: names of the E expressions.
@@ -95,7 +95,8 @@ def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The fixed point of the jaw's rotation nearest to the jaw; None if the jaw only shifts."""
+    """The point on the jaw's rotation axis that is nearest to the jaw; None if the jaw only
+    shifts."""
     length = np.linalg.norm(displacement, axis=1)
     held = length > 0.7 * length.max()
     before, after = positions[held], positions[held] + displacement[held]

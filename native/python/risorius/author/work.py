@@ -19,8 +19,8 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift of a resting joint in carried_shifts(), so the error of a vertex that follows another neck
-# joint than in the source. A rotated head separates vertices of different neck joints this far.
+# Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than
+# in the source gets this error, because a rotated head separates such vertices about this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
@@ -152,8 +152,8 @@ def require_sizes(dna: Dna) -> None:
         dna: the face.
 
     Raises:
-        ArgumentError: the face has no mesh, all vertices are in one point, or coordinates are not
-            finite or larger than FARTHEST, so that their squares could overflow.
+        ArgumentError: the face has no mesh, all vertices are in one point, or a coordinate is
+            infinite, NaN, or so large (above FARTHEST) that its square could overflow.
     """
     if not dna.meshes:
         raise ArgumentError("a face with meshes was expected")
@@ -199,7 +199,7 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint with the largest weights on moved vertices."""
+    """The resting joint with the largest sum of its weights times the motion of the vertices."""
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -360,7 +360,7 @@ def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
 
 
 def listed_meshes(dna: Dna, lod: int) -> list[int]:
-    """Indices of the meshes of a level; all meshes if the file does not list the level.
+    """Indices of the meshes of a LOD; all meshes if the file does not list the LOD.
 
     Args:
         dna: the face.

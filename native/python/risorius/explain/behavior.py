@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Explains active controls, correctives, networks, twist and swing setups, channels and maps."""
+"""Explains active controls, correctives, networks, twist and swing setups, blend shape channels and
+animated maps."""
 
 from __future__ import annotations
 
@@ -117,7 +118,8 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives, inactive ones that lack only one factor, and ones that nothing reads.
+    """Active correctives, inactive ones of which only one control is 0, and ones that nothing
+    reads.
 
     Args:
         dna: the face.

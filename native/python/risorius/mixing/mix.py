@@ -265,7 +265,7 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
     ):
         return
     entries = [sk.skin_entries(mesh) for mesh in parents]
-    # One key per pair of vertex and joint, sorted by vertex, then joint.
+    # One integer per pair of vertex and joint; it sorts pairs by vertex, then joint.
     keys = np.concatenate([vertex << 16 | joint for vertex, joint, _ in entries])
     parts = [weight * weights[vertex, p] for p, (vertex, _, weight) in enumerate(entries)]
     keys, place = np.unique(keys, return_inverse=True)
@@ -287,7 +287,7 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
 
 
 def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
-    """float64[J, regions]: mean mask of the vertices of each joint, weighted, at LOD 0.
+    """float64[J, regions]: mean of the masks of each joint's vertices at LOD 0, by skin weight.
 
     Args:
         dna: the first parent.

@@ -147,7 +147,8 @@ def _regions_of_controls(dna: Dna) -> dict[int, int]:
 
 
 def _below_head(dna: Dna) -> list[int]:
-    """Indices of the joints of neck and spine, and of their descendants but not below a head."""
+    """Indices of the joints of neck and spine, and of their descendants that are not below a head
+    joint."""
     names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
     below = [False] * len(names)
     for joint in sk.parent_order(dna):

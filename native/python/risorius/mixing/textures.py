@@ -135,7 +135,7 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The key in WHY of the reason why images cannot be mixed; empty if they can."""
+    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can."""
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"

@@ -21,8 +21,8 @@ _STUCK = 1.5  # factor of the vertex budget above which seams of the texture are
 # _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
-# Exponent of the fraction of kept hair cards. It is below 1, because missing cards are more visible
-# than a coarser skin.
+# The fraction of kept hair cards is the fraction of kept vertices to this power. It is below 1, so
+# that more cards stay, because missing cards are more visible than a coarser skin.
 _THINNED = 0.6
 
 Floats = npt.NDArray[np.float32]
@@ -153,7 +153,7 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
     out = np.maximum(np.minimum(counts, _LEAST_OF_PIECE), np.round(share * counts))
     if share * counts[small].sum() < _GONE * small.sum():
         out[small] = 0
-    # Hair keeps an even selection of whole cards.
+    # Hair keeps whole cards, selected at equal steps.
     among = min(len(cards), round(share**_THINNED * len(cards)))
     out[cards] = 0
     stay = cards[np.arange(among) * len(cards) // max(1, among)]

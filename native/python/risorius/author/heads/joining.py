@@ -298,7 +298,7 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Add the jaw's joint. Without a rotation by jawOpen, the jaw's meshes follow the head."""
+        """Add the jaw's joint. If jawOpen rotates nothing, the jaw's meshes follow the head."""
         turn = None
         if opening is not None:
             points, whole = self.face.mesh.positions, list(self.became.expressions)
@@ -333,7 +333,8 @@ class _Joining:
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
 
     def _in_order(self, names: Mapping[str, None]) -> list[str]:
-        """The names of all shapes: shapes of the face first, each group in the file's order."""
+        """The names of all shapes: first the face's shapes, then others, both in the file's
+        order."""
         return list(dict.fromkeys([*self.face.shapes, *names]))
 
 

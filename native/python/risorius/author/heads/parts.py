@@ -98,7 +98,7 @@ class Wishes:
 
 
 def meaning(name: str) -> tuple[str, ...]:
-    """A key that is equal for names with the same meaning: raw controls, expression, or name."""
+    """A tuple that is equal for names with the same meaning: raw controls, expression, or name."""
     controls = guess(name)
     if controls:
         return tuple(sorted(controls))

@@ -32,7 +32,7 @@ def moves(part: HeadPart) -> bool:
 
 
 def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
-    """Choose the mesh of the face: the named one, or the one with the most shape vertices.
+    """Choose the mesh of the face: the named mesh, or the mesh with most shapes times vertices.
 
     Args:
         where: name of the file in error messages.
@@ -41,7 +41,8 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
         rather: name of the mesh that is preferred if the file has several heads, or "".
 
     Raises:
-        ShapeFileError: no mesh moves, none has the name, or the file has several heads.
+        ShapeFileError: no mesh has shapes that move it, no such mesh has the wanted name, or the
+            file has several heads.
     """
     able = [part for part in parts if moves(part)]
     named = [part for part in able if part.source == wanted] if wanted else able

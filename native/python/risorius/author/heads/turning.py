@@ -158,7 +158,8 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give the islands of a part inside the eyes' spheres to the eyes. Returns the rest.
+    """Give a part's islands that lie inside an eye's sphere to that eye. Returns the other islands
+    as parts.
 
     Args:
         part: the part.
@@ -201,8 +202,8 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         eye: the eye. Its parts keep only the shapes that do not turn it, such as a pupil's.
         controls: shape -> raw controls without prefix.
 
-    Returns: the joint; and for each shape that turns the eye, its name -> the largest displacement
-        that differs from the rotation.
+    Returns: the joint; and for each shape that turns the eye, its name -> the largest distance of a
+        vertex from its position after the rotation alone.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}

@@ -74,7 +74,7 @@ def open_document(path: Path) -> Document:
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
-    """Index of the mesh with a name; with "", of the mesh with the most morph target vertices."""
+    """Index of the mesh with the wanted name; "": the mesh with the most morph target vertices."""
     rows = document.json.get("meshes")
     found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):

@@ -27,7 +27,7 @@ _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as restin
 
 @dataclass
 class ShapeSet:
-    """A mesh with y up and its expressions, in one unit; `parts` are its meshes."""
+    """A joined mesh (y is up) and its expressions, in one unit; `parts` are the original meshes."""
 
     name: str
     mesh: ObjMesh
@@ -40,7 +40,7 @@ class ShapeSet:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Beginnings of the names of meshes that follow an eye's joint only."""
+        """Beginnings of the names of meshes that follow only the joint of an eye."""
         return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
 
 
@@ -111,7 +111,7 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
 
 
 def take_combined(shapes: ShapeSet) -> dict[str, Doubles]:
-    """Remove and return the sculpts of combined expressions, whose names join names by +.
+    """Remove and return the sculpts of combined expressions, which are named like smile+jawOpen.
 
     Args:
         shapes: the mesh and its expressions; it is changed.
