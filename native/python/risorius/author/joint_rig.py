@@ -251,7 +251,8 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit joints and dense weights of the finest meshes. Sets parents and levels in `work`."""
+    """Fit joints and dense weights of the meshes of LOD 0. Sets parents, new, mirrored and heirs in
+    `work`."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)

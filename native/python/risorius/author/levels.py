@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Chooses the joints and vertex counts of a joint rig's levels of detail.
 
-A coarser level has a subset of the finer level's joints with the same motions. So a joint group
-needs only fewer rows, and one clip plays at every level.
+A coarser LOD has a subset of the finer LOD's joints with the same motions. So a joint group needs
+only fewer rows, and one clip plays at every LOD.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _LEAST_VERTICES = 24
 
 @dataclass(frozen=True)
 class LodOptions:
-    """The number of levels, and the numbers of joints and vertices of each level.
+    """The number of LODs, and the numbers of joints and vertices of each LOD.
 
-    Levels that the source face already has are not simplified again.
+    LODs that the source face already has are not simplified again.
     """
 
     count: int = 8
@@ -57,7 +57,7 @@ class LodOptions:
 
 
 def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
-    """The number of new joints of each level.
+    """The number of new joints of each LOD.
 
     Args:
         options: budgets, if given.
@@ -147,7 +147,7 @@ def joint_order(
         translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
-        fixed: number of first joints that all levels keep and that the result does not contain.
+        fixed: number of first joints that all LODs keep and that the result does not contain.
 
     Returns: the order, and joint -> joint that took its vertices.
     """
@@ -187,12 +187,12 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each level.
+    """The number of vertices of each LOD.
 
     Args:
         options: budgets, if given.
         levels: number of levels.
-        existing: numbers of vertices of the source's levels.
+        existing: numbers of vertices of the source's LODs.
     """
     out = list(existing)
     while len(out) < levels:
@@ -218,11 +218,11 @@ def mesh_budget(name: str, vertices: int, share: float) -> int:
 
 
 def level_name(name: str, lod: int) -> str:
-    """The name of a mesh at another level: head_lod0_mesh -> head_lod3_mesh.
+    """The name of a mesh at another LOD: head_lod0_mesh -> head_lod3_mesh.
 
     Args:
         name: name of the fine mesh.
-        lod: the level.
+        lod: index of the LOD.
     """
     if re.search(r"lod\d+", name):
         return re.sub(r"lod\d+", f"lod{lod}", name)

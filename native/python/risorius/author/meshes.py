@@ -49,7 +49,7 @@ class Made:
             work: the face; it must already have the new joints.
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes.
-            coarse: triangles of the coarser levels.
+            coarse: triangles of the coarser LODs.
             like: reference to reuse, or None.
             whole: whether to make blend shapes and measure errors.
         """
@@ -131,12 +131,12 @@ class Made:
         """Add a mesh with its own weights, or fit new weights that start with `rows`.
 
         Args:
-            lod: the level.
+            lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
             wanted: its displacements float64[E, V, 3].
             rows: dense weights to start with; None keeps the mesh unchanged.
-            finest: index of the mesh of the source if coarser levels start with its new weights.
+            finest: index of the mesh of the source if coarser LODs start with its new weights.
         """
         self.listed[lod].append(len(self.meshes))
         self.names.append(name)

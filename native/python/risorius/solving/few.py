@@ -197,7 +197,8 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """The pose `every` without its weakest controls, as many as BEHIND_MM / 2 allows."""
+    """The pose `every` without its weakest controls: as many as leave the distance from the targets
+    at most `aim` - BEHIND_MM / 2."""
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Places handles for dragging: few vertices that control as many controls as possible.
+"""Places handles for dragging: few vertices by which as many controls as possible can be set.
 
 The idea is from Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
 Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles

@@ -46,28 +46,31 @@ class Drag:
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: the weighted distances. Args: positions: float64[P, 3], of the points."""
+        """float64[m]: the weighted distances to the targets. Args: positions: float64[P, 3], of the
+        points."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 
     def left(self, raw: Doubles) -> float:
-        """The sum of squared weighted distances. Args: raw: float64[R], a pose."""
+        """The sum of the squared residuals. Args: raw: float64[R], a pose."""
         missing = self.residual(self.positions(raw))
         return float(missing @ missing)
 
     def far(self, raw: Doubles) -> float:
-        """Weighted root mean square distance in mm. Args: raw: float64[R], a pose."""
+        """Weighted root mean square distance to the targets, mm. Args: raw: float64[R], a pose."""
         return self.error(self.residual(self.positions(raw))) * self.mm
 
     def jacobian(self, raw: Doubles) -> Doubles:
-        """float64[m, R]: derivatives by the controls. Args: raw: float64[R], a pose."""
+        """float64[m, R]: derivatives by the controls of the weighted positions along the
+        directions. Args: raw: float64[R], a pose."""
         self.probe.linearise(raw, self.high, self.free)
         out = self.probe.jacobian()
         along = np.einsum("pki,pir->pkr", self.axes, out) * self.roots[:, None, None]
         return np.asarray(along.reshape(-1, len(raw)))
 
     def error(self, residual: Doubles) -> float:
-        """Weighted root mean square in the file's unit. Args: residual: float64[m]."""
+        """Weighted root mean square of residuals, in the file's unit. Args: residual:
+        float64[m]."""
         return float(np.sqrt(residual @ residual / max(1e-300, float(self.roots @ self.roots))))
 
 

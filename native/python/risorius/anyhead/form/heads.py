@@ -38,7 +38,8 @@ class TeethForm:
 
 @dataclass(frozen=True)
 class HeadForm:
-    """A mean head plus weighted parts, in cm, y up, face towards +z, origin between the eyes.
+    """A mean head plus weighted principal components (parts), in cm, y up, face towards +z. The
+    origin is midway between the eyes.
 
     The last four vertices belong to no triangle: the centre and the foremost point of the left
     eyeball, then of the right eyeball.

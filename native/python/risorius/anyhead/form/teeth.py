@@ -17,7 +17,7 @@ from .fitting import Pose, Target, form_normals
 from .heads import head_form
 from .standing import SURE, find_standing
 
-_NEAR = 1.0  # cm of the form: largest distance of a vertex of the model from the face
+_NEAR = 1.0  # cm of the model: largest distance of a vertex of the model from the face
 _LEAST = 0.9  # least fraction of the vertices of the regression that must be on the face
 _BEYOND = 3.0  # limit of each predicted value in standard deviations
 _OTHER_SIZE = 0.1  # teeth with a larger relative difference from the predicted size are ignored

@@ -19,11 +19,11 @@ from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
 _HELD, _EYE = 60.0, 8.0  # weights of a landmark by the user and of the centre of an eyeball
-_NEAR_EYE = 2.0  # cm of the form: eyeballs farther from the model's eyes are ignored
-_ON = 0.4  # cm of the form: landmarks farther from the surface are left out
+_NEAR_EYE = 2.0  # cm of the model: eyeballs farther from the model's eyes are ignored
+_ON = 0.4  # cm of the model: landmarks farther from the surface are left out
 _LARGE, _TRIED = 0.3, 4  # smallest piece / largest piece that may be a head; most pieces tried
 _LOOKED, _FITTED, _REFINED = 0.8, 0.85, 0.95  # progress after each step
-_AWAY = 20.0  # cm of the form: pieces farther from a face belong to another head
+_AWAY = 20.0  # cm of the model: pieces farther from a face belong to another head
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Found:
     Attributes:
         landmarks: the landmarks of the head.
         pose: the head model fitted to the head.
-        error: error of the fit in cm of the form, see form.standing.Standing.
+        error: error of the fit in cm of the model, see form.standing.Standing.
         lips_apart: whether the lips are separate; connected lips cannot open.
     """
 
