@@ -58,7 +58,7 @@ class Between:
         self.weights = sk.dense_weights(mesh, len(ways.work.source.joint_names))
 
     def truth(self, row: int, wanted: Doubles, shares: Sequence[float]) -> list[Doubles]:
-        """The wanted displacements float64[V, 3] at each share.
+        """The wanted displacements float64[V, 3] at each control value in `shares`.
 
         Args:
             row: row of the expression.

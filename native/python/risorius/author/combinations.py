@@ -269,7 +269,7 @@ class Combinations:
         """Add blend shapes for the joints' errors, and return the errors of the finest meshes.
 
         Args:
-            lods: number of levels of the source.
+            lods: number of LODs of the source.
         """
         work = self.work
         self.after = _Side(work.dna, self.columns)

@@ -146,7 +146,7 @@ def fit_weights(
     start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
-    """Fit weights of a mesh on joints with known motions, for example at a coarser level.
+    """Fit the skin weights of a mesh on joints with known motions, for example at a coarser LOD.
 
     Args:
         neutral: float64[V, 3], neutral vertices.

@@ -230,13 +230,13 @@ def level_name(name: str, lod: int) -> str:
 
 
 def extend_levels(dna: Dna, levels: int) -> None:
-    """Add levels of detail that list the same items as the last level.
+    """Add LODs that list the same items as the last LOD of the face.
 
-    New levels have no blend shapes. Callers replace the lists of meshes and joints.
+    New LODs have no blend shapes. Callers replace the lists of meshes and joints.
 
     Args:
         dna: the face to change.
-        levels: wanted number of levels; nothing changes if the face has as many.
+        levels: wanted number of LODs; nothing changes if the face has at least as many.
     """
     had = max(1, dna.lod_count)
     more = levels - had

@@ -364,7 +364,7 @@ def listed_meshes(dna: Dna, lod: int) -> list[int]:
 
     Args:
         dna: the face.
-        lod: the level.
+        lod: index of the LOD.
     """
     mapping = dna.lod_mesh_mapping
     return [int(m) for m in mapping[lod]] if lod < len(mapping) else list(range(len(dna.meshes)))

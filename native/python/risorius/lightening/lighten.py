@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes a finished face lighter: fewer joints, correctives and levels of detail.
 
-Order of the steps: levels, correctives, joints with refitted weights, blend shapes.
+Order of the steps: LODs, correctives, joints with refitted weights, blend shapes.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes textures of mixed faces: blends the parents' textures if all have them.
+"""Makes textures of mixed faces: blends a texture if all parents have it.
 
 Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of eyes
 use the shares of their region. Only images written by this package are mixed, and no hair textures,

@@ -111,7 +111,8 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """float64[U], bool[U]: the price of each unknown by its ease, and whether it belongs elsewhere.
+    """float64[U], bool[U]: the price of each unknown by its ease, and whether the unknown belongs
+    to another part of the face than the points.
 
     Args:
         drag: equations of the drag.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Predicts the lower teeth of a head from its skin, and their change between two heads.
 
-The size and the place of the lower teeth determine the motion of the jaw, but the skin hides them.
-The statistical head model contains the teeth of many heads and predicts them from the skin.
+The size and the place of the lower teeth determine the motion of the jaw, but the skin hides the
+teeth. The statistical head model contains the teeth of many heads and predicts the teeth from the
+skin.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     """Append correctives to a face. Returns the new face.
 
     If a combination already has a corrective, the displacements are added to its shapes. Lashes and
-    coarser levels get the displacements of the nearest skin.
+    coarser LODs get the displacements of the nearest skin.
 
     Args:
         dna: a face of shapes; it is not changed.

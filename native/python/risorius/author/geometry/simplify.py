@@ -168,7 +168,7 @@ def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: i
     places = np.asarray(mesh.layout_positions, np.int64)[used]
     points = np.asarray(mesh.positions, np.float64)[places]
     # Attributes are relative to the mesh' size, but the simplifier compares them with the piece's
-    # size. So they are divided by the ratio of the sizes.
+    # size. So they are divided by the piece's size relative to the mesh.
     share = float(np.ptp(points, axis=0).max()) / _size(mesh)
     attributes = attributes[used] / np.float32(max(share, 1e-6))
     points = points.astype(np.float32)

@@ -85,7 +85,7 @@ def metadata_of(
     """The metadata of a DNA file that assigns textures to meshes.
 
     Args:
-        meshes: names of the meshes of all levels.
+        meshes: names of the meshes of all LODs.
         materials: name of a mesh of LOD 0 -> its material.
         textures: result of textures_of().
     """
