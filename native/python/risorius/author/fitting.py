@@ -32,8 +32,8 @@ class FitOptions:
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric
     threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
-    # A joint takes no part in an expression if it moves no vertex by this distance, in the mesh'
-    # unit.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance, in the mesh' unit.
     least_effect: float = 0.0
     # The result is the round with the smallest maximum error: among the second half of the rounds
     # if True, among the last four rounds if False.

@@ -276,7 +276,8 @@ def _combine(
             raise DnaError("stopped")
 
     found.solve(tell)
-    # One group for expressions and correctives, because all values of a joint must be in one group.
+    # Expressions and correctives share one joint group, because all values of a joint must be in
+    # one group.
     before = len(work.source.joint_names)
     columns = sk.column_deltas(work.dna, sk.column_count(work.source))[work.columns, before:, :6]
     values = np.concatenate([columns.transpose(1, 2, 0), found.values()], axis=2)
@@ -520,7 +521,7 @@ def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGr
         columns: indices of the inputs.
     """
     count = len(values)
-    # Joints of the coarsest LOD come first, because a LOD uses the first rows of a group.
+    # Joints of the coarsest LOD come first, because a LOD uses the first rows of a joint group.
     last = np.array([sum(joint in level for level in work.new) for joint in range(count)])
     order = np.argsort(-last, kind="stable")
     rows = values[order].reshape(6 * count, -1)

@@ -77,8 +77,8 @@ def level_weights(
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
     """Additional expressions that shift resting joints, so that vertices keep following them.
 
-    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the joints of the source that
-        take part.
+    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
+        the source that the fit uses.
     """
     still, shares = resting(work), carried_shares(work, mesh)
     used = set(carriers(work)[len(work.source.joint_names) :].tolist())

@@ -44,7 +44,8 @@ class RigOptions:
     # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint takes no part in an expression if it moves no vertex by this distance in mm.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
     # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which

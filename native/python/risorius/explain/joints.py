@@ -57,7 +57,7 @@ def contributions(
 
 
 def _replace_rotation(out: Contributions, joint: int, parts: dict[Key, Doubles]) -> None:
-    """Replace all contributions to the rotation of a joint by these parts."""
+    """Replace all contributions to the rotation of a joint by the contributions in `parts`."""
     mine = out.setdefault(joint, {})
     for v in mine.values():
         v[3:6] = 0

@@ -44,7 +44,8 @@ _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 @dataclass
 class Size:
-    """Numbers of parts of a face, its file size, and the duration of an evaluation."""
+    """Counts of joints, meshes and other items of a face, its file size, and its evaluation
+    time."""
 
     joints: int
     correctives: int
@@ -58,7 +59,7 @@ class Size:
 
     @classmethod
     def of(cls, dna: Dna, file_bytes: int, rig: Rig) -> Size:
-        """Counts the parts of a face and measures its speed.
+        """Counts the joints, meshes and other items of a face, and measures its evaluation time.
 
         Args:
             dna: the face.

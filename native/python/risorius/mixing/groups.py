@@ -76,7 +76,8 @@ def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
 
 
 def _together(parts: Sequence[Part]) -> list[list[Part]]:
-    """Collects groups that share joints, directly or indirectly, by ascending first joint."""
+    """Collects joint groups that share joints, directly or indirectly, sorted by their first
+    joint."""
     above: dict[int, int] = {}  # joint -> a smaller or equal joint of the same set (union-find)
 
     def root(joint: int) -> int:
@@ -104,7 +105,8 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Merges groups into one, or into one for each set of rows with the same source groups."""
+    """Merges joint groups into one, or into one for each set of rows with the same source
+    groups."""
     levels_of: dict[int, int] = {}  # row -> number of LODs that evaluate it
     of_row: dict[int, list[int]] = {}  # row -> indices of the source groups that have it
     used: list[_Source] = []
@@ -148,7 +150,8 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """Merges rows into one group with all columns of the sources; empty without columns."""
+    """Merges rows into one joint group with all columns of the sources; [] if there is no
+    column."""
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

@@ -168,7 +168,7 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> lis
 
 
 def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> None:
-    """Write translation columns of a joint; a column that two groups have is written once.
+    """Write translation columns of a joint; a column that two joint groups have is written once.
 
     Args:
         groups: copies, changed in place.

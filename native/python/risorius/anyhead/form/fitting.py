@@ -262,7 +262,7 @@ def _round(
 
 class _System:
     """The normal equations of a round. Unknowns: rotation (3), translation (3), log scale (1), then
-    the weights of parts and of expressions."""
+    the weights of principal components and of expressions."""
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:
         self.form, self.shaped, self.step = form, shaped, step

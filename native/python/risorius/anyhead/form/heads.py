@@ -73,7 +73,7 @@ class HeadForm:
         """float64[V, 3]: vertex positions of a head with given weights.
 
         Args:
-            parts: float64[K], weights of the parts in standard deviations.
+            parts: float64[K], weights of the principal components in standard deviations.
             expressions: float64[E], weights of the expressions.
         """
         out = self.mean + np.tensordot(parts, self.parts, 1)

@@ -101,7 +101,7 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
 
 
 def _strange(pose: Pose) -> float:
-    """The penalty of a fit for unlikely weights of parts and expressions, in cm."""
+    """The penalty of a fit for unlikely weights of components and expressions, in cm."""
     return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
 
 

@@ -143,12 +143,12 @@ class _Joining:
         return assign([name for name in names if "+" not in name], self.edited)
 
     def turn_and_size(self) -> None:
-        """Turn all parts upright, and scale them to the size of a face."""
+        """Turn all meshes of the head upright, and scale them to the size of a face."""
         self._turn()
         self._size()
 
     def take_standing(self) -> None:
-        """Keep the parts unchanged, because they are upright and have the right size."""
+        """Keep the meshes unchanged, because they are upright and have the right size."""
         self.left = 1
         points, shapes = self.face.mesh.positions, self.face.shapes
         self.height = face_height(points, shapes, self.became.controls)
@@ -184,7 +184,7 @@ class _Joining:
         return self._joined(hanging, turns)
 
     def _turn(self) -> None:
-        """Turn all parts so that x points to the left, y up and z to the front."""
+        """Rotate all meshes so that x points to the left, y up and z to the front."""
         face = self.face
         found = find_direction(face.mesh, face.shapes, self.became.controls, self.wishes)
         left = found.left
@@ -220,7 +220,7 @@ class _Joining:
         return out
 
     def _size(self) -> None:
-        """Scale all parts to the result's unit, and centre the face if it is far from x = 0."""
+        """Scale all meshes to the result's unit, and centre the face if it is far from x = 0."""
         wishes = self.wishes
         height = face_height(self.face.mesh.positions, self.face.shapes, self.became.controls)
         unit = wishes.unit or self.unit
@@ -350,7 +350,7 @@ def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
 
 
 def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: int = 1) -> HeadPart:
-    """A copy of a part, transformed.
+    """A transformed copy of a mesh with its shapes.
 
     Args:
         part: the part.

@@ -127,7 +127,7 @@ def first_vertices(part: HeadPart) -> Ints:
 
 
 def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[HeadPart]:
-    """Divide a part by labels of polygons. Vertices on a cut are duplicated.
+    """Divide a mesh by labels of its polygons. Vertices on a cut are duplicated.
 
     Args:
         part: the part; it is not changed.

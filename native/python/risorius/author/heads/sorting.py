@@ -26,7 +26,7 @@ _ALIKE = 3  # smallest number of common expressions of another head
 
 
 def moves(part: HeadPart) -> bool:
-    """Whether a shape of the part moves a vertex."""
+    """Whether at least one shape of the mesh moves a vertex."""
     size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
     return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
 
@@ -81,7 +81,7 @@ def is_other_head(face: HeadPart, part: HeadPart) -> bool:
 
 
 def is_coarse(part: HeadPart) -> bool:
-    """Whether the part's name denotes a coarser level of detail, such as LOD1."""
+    """Whether the mesh's name denotes a coarser level of detail, such as LOD1."""
     return _COARSE.search(part.name) is not None
 
 

@@ -246,7 +246,7 @@ def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
 def _add_meshes(
     dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[Doubles]
 ) -> None:
-    """Add a mesh with blend shape targets for each part."""
+    """Add a mesh with blend shape targets for each entry of `parts`."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
     joints, meshes, mapping = list(dna.joint_names), [], []
     for number, part in enumerate(parts):
