@@ -266,7 +266,7 @@ def _new_joints(
 def _combine(
     work: Work, options: RigOptions, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
-    """Add joint values and blend shapes for the correctives. Returns their errors."""
+    """Add joint values and blend shapes for the correctives. Returns the correctives' errors."""
     if not work.combined:
         return []
     found = Combinations(work, options)

@@ -148,7 +148,8 @@ class Unknowns:
         return np.asarray(change[self.first] / self.scale)
 
     def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:
-        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], of a change."""
+        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], limits of the
+        change of each control."""
         lowest = np.maximum(low[self.first], low[self.second]) / self.scale
         return lowest, np.minimum(high[self.first], high[self.second]) / self.scale
 

@@ -303,8 +303,8 @@ def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
 
 
 def _between_rows(out: Fittings, place: _Place) -> float:
-    """The height of the line between upper and lower teeth; without two rows, the mouth's
-    height."""
+    """The y of the line between upper and lower teeth; without two rows of teeth, the y of the
+    mouth."""
     middles = [_heights(row.part)[1] for row in out.of(TEETH)]
     every = np.concatenate(middles) if middles else np.zeros(0)
     apart = float(np.ptp(every)) if len(every) > 1 else 0.0

@@ -87,8 +87,8 @@ class Target:
             farthest: largest distance of a pair.
 
         Returns:
-            bool[n], False for points without a partner or with one at a border of the surface;
-            float64[n, 3], the partners; float64[n, 3], their normals.
+            bool[n], False for points without a partner or with a partner at a border of the
+            surface; float64[n, 3], the partners; float64[n, 3], their normals.
         """
         triangle, shares, _ = self.closest.nearest(points, normals, least_cosine, farthest)
         at = np.maximum(triangle, 0)

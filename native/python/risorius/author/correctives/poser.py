@@ -121,7 +121,7 @@ def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
 def skin_and_solids(
     dna: Dna, solids: Sequence[str] = SOLIDS, lod: int = 0
 ) -> tuple[int, list[int]]:
-    """Index of the skin, and indices of the solids. The skin has the most vertices in its LOD.
+    """Index of the skin, and indices of the solids. The skin is the largest mesh by vertex count.
 
     Args:
         dna: the face.

@@ -287,9 +287,10 @@ def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     """Choose the combinations to repair, so that all kinds of faults decrease similarly.
 
     A single measure would neglect a kind of fault, because the pairs with large volumes differ from
-    the pairs with many folds. For each kind, the chosen combinations have a fraction of the total.
-    The smallest of the three fractions is maximised by weights of the kinds (Arora, Hazan and Kale,
-    "The Multiplicative Weights Update Method", 2012), which start with the weights of severity().
+    the pairs with many folds. For each kind, the chosen combinations contain a fraction of all
+    faults of this kind. The smallest of the three fractions is maximised by weights of the kinds
+    (Arora, Hazan and Kale, "The Multiplicative Weights Update Method", 2012), which start with the
+    weights of severity().
 
     Args:
         sums: combination -> its faults.

@@ -34,7 +34,7 @@ class Motion(NamedTuple):
 
 
 def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Motion]:
-    """Yields the motion of each given input; its arrays are empty if the input moves no joint.
+    """Yields a Motion for each input; the arrays of the Motion are empty if no joint moves.
 
     Args:
         dna: the face.

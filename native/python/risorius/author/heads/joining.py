@@ -339,7 +339,8 @@ class _Joining:
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """Append a mesh. All corners of a mesh without texture coordinates share one coordinate."""
+    """Append a mesh. The corners of a mesh without texture coordinates all get the same
+    coordinate."""
     base = sum(map(len, uvs))
     own, uv_faces = mesh.uvs, mesh.uv_faces
     if not len(own) or not all(uv_faces):
