@@ -233,7 +233,8 @@ class Clip:
         return out
 
     def selected(self, names: Sequence[str]) -> Clip:
-        """The clip with only the named controls, in the order of `names`. Raises: KeyError."""
+        """The clip with only the named controls, in this order. Raises KeyError for an unknown
+        name."""
         rows = [self._index[name] for name in names]
         return self.replaced(names=names, curves=self.curves[rows])
 

@@ -63,8 +63,10 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """A rule: active controls `by` weaken each control in `of` by a factor.The factor is 1 -
-    amount * measure(by)."""
+    """A rule: active controls `by` weaken each control in `of` by a factor.
+
+    The factor is 1 - amount * measure(by).
+    """
 
     name: str
     by: tuple[str, ...]

@@ -127,8 +127,8 @@ class Combinations:
         self.first = len(work.source.joint_names)
 
     def active(self, column: int) -> list[int]:
-        """The inputs at 1 in a corrective's pose: its controls, correctives of some of them,
-        itself."""
+        """The inputs at 1 in a corrective's pose: its controls, the correctives of subsets of its
+        controls, and the corrective itself."""
         on = self.work.combined[column]
         smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
         return [*sorted(on), *smaller, column]
@@ -164,7 +164,8 @@ class Combinations:
         return out
 
     def _waves(self) -> list[list[int]]:
-        """The correctives in their order, divided into runs of independent correctives."""
+        """The correctives in their order, divided into runs of correctives that do not depend on
+        each other."""
         out: list[list[int]] = []
         for column in self.order:
             on = self.work.combined[column]

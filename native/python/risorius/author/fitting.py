@@ -41,7 +41,8 @@ class FitOptions:
 
 
 def bounded(options: FitOptions) -> FitOptions:
-    """The options with at least 200 rounds and `bound`, for a smaller largest error."""
+    """The options with at least 200 rounds and `bound` True, so that the largest error is
+    smaller."""
     return replace(options, rounds=max(options.rounds, 200), bound=True)
 
 

@@ -23,8 +23,8 @@ from .work import (
     resting,
 )
 
-# Weight in the fit of the displacements by expressions along an arc at the value 0.5. Displacements
-# at the value 1 have the weight 1.
+# Expressions that move vertices along an arc are also fitted at the value 0.5: the weight of their
+# displacements there. Displacements at the value 1 have the weight 1.
 _HALVES = 1.5
 
 

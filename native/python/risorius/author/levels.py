@@ -40,8 +40,8 @@ class LodOptions:
     vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
 
     def check(self) -> None:
-        """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has another length
-        or rises."""
+        """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has not `count`
+        numbers or its numbers increase."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):

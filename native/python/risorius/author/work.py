@@ -265,7 +265,8 @@ def resting(work: Work) -> Ints:
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: for each joint, itself if it rests, or the nearest resting joint above it.
+    """int64[joints]: for each joint, its own index if it rests, otherwise the index of the nearest
+    resting joint above it.
 
     Args:
         work: the face. New joints are included if their parents are chosen.

@@ -218,7 +218,7 @@ def _all() -> dict[str, Vocabulary]:
 
 
 def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A row unchanged, or one row for each side if its name contains a *."""
+    """A row of a vocabulary table, or one row for each side if the name contains a *."""
     if "*" not in name:
         yield name, value
         return

@@ -93,7 +93,7 @@ class ExpressionError:
 
 @dataclass
 class LightenReport:
-    """The sizes before and after `lighten`, the removed parts, and the remaining errors."""
+    """The sizes before and after `lighten`, the removed joints and correctives, and the errors."""
 
     before: Size
     after: Size
@@ -238,7 +238,8 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A function that reports progress from `begin` to `end`. Raises: DnaError: it was stopped."""
+    """A function that reports progress from `begin` to `end`. It raises DnaError if the caller
+    stops the work."""
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:

@@ -20,9 +20,9 @@ Part = tuple[int, JointGroup]  # (index of a parent face, one of its joint group
 def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     """The joint groups of a mix.
 
-    If all parents have groups with equal rows and columns, so has the mix. Otherwise groups that
-    share a joint are merged into one group with all their rows and columns, or into several if one
-    would have far more coefficients.
+    If all parents have joint groups with equal rows and columns, the mix has these groups too.
+    Otherwise joint groups that share a joint are merged into one group with all their rows and
+    columns, or into several if one would have far more coefficients.
 
     Args:
         parents: compatible faces.

@@ -203,7 +203,7 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
     Args:
         parents: meshes with the same topology.
-        share: weights of the mesh's vertices.
+        share: the parents' weights for the vertices of the mesh.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -315,7 +315,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
             held[parent] += 1e-9
     rest = np.eye(len(REGIONS))[-1]
     out = np.where(held[:, None] > 0, sums / np.maximum(held, 1e-30)[:, None], rest)
-    # Removes rounding errors from masks that are 0 or 1.
+    # Masks within 1e-9 of 0 or 1 become exactly 0 or 1.
     return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
 
 

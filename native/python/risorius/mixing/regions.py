@@ -3,7 +3,7 @@
 of the vertices of its joints.
 
 The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
-the skin (lashes, films) have the mask of the nearest skin.
+the skin (lashes, clear films on the eyes) have the mask of the nearest skin.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def _rigid(name: str) -> str | None:
 
 
 def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
-    """float64[V, regions] of each skin mesh."""
+    """The masks of each skin mesh, float64[V, regions]."""
     regions = _regions_of_controls(dna)
     most = [np.zeros((len(mesh.positions), len(REGIONS))) for mesh in meshes]
     movers = [Mover(dna, mesh) for mesh in meshes]

@@ -103,7 +103,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """Measures a control. Args: curve: float64[frames]; rate: per second; name: the control."""
+    """Measures a control. Args: curve: float64[frames]; rate: frames per second; name: its name."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)

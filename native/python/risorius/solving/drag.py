@@ -142,7 +142,7 @@ def _solved(
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
-    """int64[N, 2]: checked pairs of indices of controls."""
+    """int64[N, 2]: the pairs of opposite controls (their indices), after a check."""
     found = wholes("opposites", opposites)
     pairs = found if found.size else np.empty((0, 2), np.int64)
     if pairs.shape[1:] != (2,) or not ((pairs >= 0) & (pairs < count)).all():

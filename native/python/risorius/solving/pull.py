@@ -61,8 +61,8 @@ class Drag:
         return self.error(self.residual(self.positions(raw))) * self.mm
 
     def jacobian(self, raw: Doubles) -> Doubles:
-        """float64[m, R]: derivatives by the controls of the weighted positions along the
-        directions. Args: raw: float64[R], a pose."""
+        """float64[m, R]: derivatives of the weighted positions along the directions, by each
+        control. Args: raw: float64[R], a pose."""
         self.probe.linearise(raw, self.high, self.free)
         out = self.probe.jacobian()
         along = np.einsum("pki,pir->pkr", self.axes, out) * self.roots[:, None, None]

@@ -60,7 +60,7 @@ class Similar:
 
 @dataclass(frozen=True)
 class Hold:
-    """Points bound to a skin: a triangle, a point on it, and the offset from there.
+    """Points bound to a skin: for each, a triangle, a point on it, and the offset from that point.
 
     Attributes:
         triangle: int64[n], a triangle of the skin for each point.

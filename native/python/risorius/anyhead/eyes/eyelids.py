@@ -283,7 +283,7 @@ class Eyelids:
         return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
-        """float64[n]: the fraction of an angle by which each vertex rotates, 0 to 1.
+        """float64[n], 0 to 1: the fraction of the edge's rotation by which each lid vertex rotates.
 
         most: the largest angle of an edge in radians; it widens the fade.
         """

@@ -293,7 +293,7 @@ def _divide_mouth(out: Fittings, place: _Place) -> None:
 
 
 def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
-    """int64[V]: the island of each vertex; float64[islands]: the middle height of each island."""
+    """int64[V]: the island of each vertex; float64[islands]: the y of the middle of each island."""
     labels: Ints = islands_of(part.mesh)
     heights, count = part.mesh.positions[:, 1], int(labels.max()) + 1
     low, high = np.full(count, np.inf), np.full(count, -np.inf)

@@ -160,7 +160,8 @@ def _add_targets(
 
 
 def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarget:
-    """The target plus a shape float64[V, 3]. Args: mm  length of the unit in mm."""
+    """The target with the displacements float64[V, 3] of a shape added. Args: mm: length of the
+    unit in mm."""
     sums = np.array(shape)
     np.add.at(sums, np.asarray(target.vertex_indices, np.int64), target.deltas)
     moved = np.flatnonzero(np.linalg.norm(sums, axis=1) * mm > _LEAST_MM)

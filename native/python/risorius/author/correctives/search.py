@@ -244,7 +244,8 @@ def find_correctives(
 def correct_again(
     rig: Dna, source: Dna, options: CorrectiveOptions, progress: Progress | None = None
 ) -> Dna:
-    """Check and repair the pairs of a finished rig once more by shapes. Returns the new face.
+    """Check the pairs of controls of a finished rig again, and repair them by blend shapes. Returns
+    the new face.
 
     A rig's small errors matter where lips or lids touch. And rotations of joints do not add up like
     the shapes that were checked first. Existing correctives of pairs are extended; other pairs get

@@ -103,10 +103,10 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
 def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
     """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
-    The simplification preserves texture coordinates and displacements by expressions in addition
-    to the form. Borders and seams stay in place. If seams prevent the reduction, they are welded,
-    and each vertex keeps one texture coordinate. Each connected piece keeps some vertices, or all
-    small pieces are removed.
+    The simplification preserves the shape of the surface, its texture coordinates and its
+    displacements by expressions. Borders and seams stay in place. If seams prevent the reduction,
+    they are welded, and each vertex keeps one texture coordinate. Each connected piece keeps some
+    vertices, or all small pieces are removed.
 
     Args:
         mesh: the mesh; it is not changed.
@@ -162,7 +162,8 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
 
 
 def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: int) -> Ints:
-    """int64[n, 3]: simplify one piece as a whole. Welds texture seams if they block progress."""
+    """int64[n, 3]: triangles of one piece, simplified as a whole. Welds texture seams if they block
+    progress."""
     used, own = np.unique(triangles, return_inverse=True)
     triangles = own.reshape(-1, 3).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)[used]

@@ -27,8 +27,8 @@ _NONE = np.zeros(0, np.int64)
 _FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
 _LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
 _NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
-# Vertices that jawOpen moves by more than _HELD of its maximum count as rigid parts of the jaw. The
-# lowest fraction _CHIN of them is the chin.
+# Vertices that jawOpen moves by more than _HELD of its largest displacement count as rigid parts of
+# the jaw. The lowest fraction _CHIN of them is the chin.
 _HELD, _CHIN = 0.7, 0.4
 _FOLLOWS = 0.05  # smallest motion of the chin by a shape, relative to jawOpen
 
@@ -128,7 +128,8 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The largest pair of spheres that may be left and right eye, with their parts' indices."""
+    """The largest pair of spheres that may be left and right eye, each with the index of its
+    mesh."""
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
         for j, right in found:
@@ -158,11 +159,11 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give a part's islands that lie inside an eye's sphere to that eye. Returns the other islands
-    as parts.
+    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns the other
+    islands as a mesh.
 
     Args:
-        part: the part.
+        part: the mesh.
         islands: int64[V], island of each vertex.
         eyes: both eyes.
         own: for each eye, a vertex of its sphere if the sphere belongs to this part.

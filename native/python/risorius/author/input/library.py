@@ -32,7 +32,7 @@ def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
 
 
 def about_library(became: Assignment, folder: Path) -> list[str]:
-    """A sentence on the folder of the expressions; an empty list if there are none.
+    """A sentence on the folder of the expressions; an empty list if `became` has no expressions.
 
     Args:
         became: result of matching.assign().

@@ -102,7 +102,7 @@ def parse(content: str) -> dict[str, Said]:
 
 
 def row(name: str, value: Said) -> str:
-    """A line of the table.
+    """The line of the table [controls] for a shape.
 
     Args:
         name: name of the shape.
