@@ -164,7 +164,8 @@ def _mended(
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:
-    """The head with expressions as a face of blend shapes, in the form of author.input.spec.Read.
+    """The head with expressions as a face of blend shapes: the same type as spec.read_face()
+    returns.
 
     Args:
         made: the head with expressions; its shapes are changed.

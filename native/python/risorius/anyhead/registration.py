@@ -19,7 +19,7 @@ Pair = tuple[int, Sequence[float]]
 
 
 class RegistrationError(RisoriusError):
-    """Surfaces, pairs or options cannot be used, or no surface of the target is near the start."""
+    """Surfaces, pairs or options cannot be used, or the target is not near the start positions."""
 
     code = "registration"
 

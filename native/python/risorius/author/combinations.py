@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Solves the joint values of correctives, because joint rotations do not add up like blend shapes.
 
-With all controls of a corrective at 1, the face of joints must have the form of the face of shapes.
-The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes store the
-remaining displacements.
+With all controls of a corrective at 1, the face of joints must have the same shape as the face of
+shapes. The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes
+store the remaining displacements.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3]: the face of joints with its blend shapes, before skinning."""
+        """float64[V, 3]: vertices in the face of joints with its blend shapes, before skinning."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)

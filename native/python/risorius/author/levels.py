@@ -23,7 +23,7 @@ from .geometry.skeleton import Doubles, Ints
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
-# Names of small meshes (clear films, lashes, mouth); coarse levels leave them out.
+# Parts of the names of small meshes (clear films, lashes, mouth), which coarse LODs leave out.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
@@ -96,7 +96,7 @@ class _Merging:
             self._price(int(joint))
 
     def _price(self, joint: int) -> None:
-        """Compute the squared errors if each other joint takes a joint's vertices."""
+        """For each other joint, compute the squared error if it takes the vertices of `joint`."""
         held = np.flatnonzero(self.weights[:, joint])
         rows = self.weights[held, joint, None] * self.points[held]
         values, axes = np.linalg.eigh(rows.T @ rows)

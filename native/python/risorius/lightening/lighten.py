@@ -386,7 +386,7 @@ class _Thinning:
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of one mesh after its removed joints' heirs took over."""
+    """float64[V, J]: weights of one mesh after other joints took over removed joints' vertices."""
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))

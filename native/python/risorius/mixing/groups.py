@@ -34,7 +34,8 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     lists = [[_lists(g) for g in own] for own in groups]
     if all(own == lists[0] for own in lists[1:]):
         return [_mean(row, share) for row in zip(*groups, strict=True)]
-    # The order of columns matters for joints with quaternion rotation. It is equal in all parents.
+    # The order of columns matters for joints with quaternion rotation. All parents have the same
+    # order.
     turned = [turned_groups(p) for p in parents]
     out = [
         _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)

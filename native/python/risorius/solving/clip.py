@@ -268,7 +268,8 @@ def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) 
 
 
 def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
-    """float64[F, R]: all frames with a price on sudden changes, in overlapping chunks.
+    """float64[F, R]: controls of all frames, solved together in overlapping chunks, with a price on
+    sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
     controls that the frames solved alone use may change, and their values have no price here.

@@ -129,11 +129,12 @@ class Unknowns:
     scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
-        """The same unknowns with equal ease."""
+        """The same unknowns, all with the same ease (see ControlSharing)."""
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
-        """float64[m, U]: derivatives by the unknowns. Args: jacobian: float64[m, R]."""
+        """float64[m, U]: derivatives by the unknowns. Args: jacobian: float64[m, R], derivatives by
+        the controls."""
         both = jacobian[:, self.second] * (self.first != self.second)
         return np.asarray((jacobian[:, self.first] + both) * self.scale)
 
@@ -144,7 +145,8 @@ class Unknowns:
         return out
 
     def values(self, change: Doubles) -> Doubles:
-        """float64[U]: the unknowns. Args: change: float64[R], equal for partners."""
+        """float64[U]: values of the unknowns. Args: change: float64[R], change of the controls,
+        equal for partners."""
         return np.asarray(change[self.first] / self.scale)
 
     def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:

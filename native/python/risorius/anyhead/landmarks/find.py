@@ -166,7 +166,7 @@ def _at_end(tell: Progress) -> Progress:
 
 
 def _off(part: Surface, pose: Pose) -> bool:
-    """Whether a piece is away from the head at a pose, and large enough to be another head."""
+    """Whether a piece is far from the head at `pose`, and large enough to be another head."""
     inside = pose.back(part.points[np.unique(part.triangles)])
     middle = (inside.min(axis=0) + inside.max(axis=0)) / 2
     large = float(np.ptp(inside, axis=0).max()) > 0.5 * _AWAY

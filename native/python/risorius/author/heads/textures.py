@@ -28,7 +28,7 @@ class Textures:
     Attributes:
         files: path -> bytes.
         names: (id() of a Material, role) -> file name.
-        notes: sentences on left-out parts and on the folder of the files.
+        notes: sentences on left-out parts of materials, and on the folder of the files.
     """
 
     files: dict[Path, bytes] = field(default_factory=dict)

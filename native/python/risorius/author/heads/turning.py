@@ -64,7 +64,7 @@ class Eye:
 def take_eyes(
     parts: Sequence[HeadPart], height: float, lids: Mapping[str, Doubles]
 ) -> tuple[list[HeadPart], list[Eye]]:
-    """Find the eyes: two spheres in one or two meshes. Returns the other parts, and the eyes.
+    """Find the eyes: two spheres in one or two meshes. Returns the other meshes, and the eyes.
 
     Args:
         parts: parts of the head, upright and centred; x points to the left.

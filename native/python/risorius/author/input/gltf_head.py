@@ -155,7 +155,7 @@ def _all_numbers(values: list[Any]) -> bool:
 
 
 def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Material) -> None:
-    """Add the picture of a role to a material, or a note if it cannot be read."""
+    """Add the picture of a role to a material, or a note if the picture cannot be read."""
     texture = document.item("textures", use.get("index"), f"{out.name}.{role}")
     extra = texture.get("extensions")
     extensions = extra if isinstance(extra, dict) else {}

@@ -114,7 +114,7 @@ def row(name: str, value: Said) -> str:
 
 
 def text_of(said: Mapping[str, Said]) -> str:
-    """The text of a file with the table [controls]. Args: said  shape -> its meaning."""
+    """The text of a file with the table [controls]. Args: said: shape -> its meaning."""
     return "\n".join([f"[{TABLE}]", *(row(name, value) for name, value in said.items()), ""])
 
 
