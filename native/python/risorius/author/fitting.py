@@ -118,7 +118,8 @@ def fit_motions(
             all expressions.
         weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
-        at: index of the pivot of each new joint; None: the middle of its vertices.
+        at: index of the pivot of each new joint; None: the joint is placed in the middle of its
+            vertices.
         options: options of the fit; only emphasis, threads and least_effect are used.
 
     Raises:

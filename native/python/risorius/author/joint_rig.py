@@ -461,7 +461,8 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
 
 
 def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
-    """float64[new joints, 3]: weighted middle of each joint's vertices, or the joint's position."""
+    """float64[new joints, 3]: weighted mean of the positions of each joint's vertices, or the
+    position of a joint without vertices."""
     rows = held**2
     total = rows.sum(axis=0)[:, None]
     middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)

@@ -68,7 +68,7 @@ def joint_names(
 
 
 def _side(x: float) -> str:
-    """The side of a joint without a mirrored joint.
+    """The side of a joint that has no mirrored joint: L, R, or C for the middle.
 
     Args:
         x: its place to the character's left, as a fraction of the face's width.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Finds the points about which lids and jaws turn, and computes arcs about them.
 
-A blend shape moves a vertex along a line, but a lid slides around the eyeball. Joints in the middle
+A blend shape moves a vertex along a line, but a lid slides around the eyeball. Joints at the centre
 of the eye move lids along arcs. The points come from existing joints or from the expressions.
 """
 
@@ -77,7 +77,8 @@ def _side(joint: str) -> str:
 
 
 def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The middle of the sphere on which the open and the shut lid lie; None if they do not."""
+    """The centre of the sphere on which the open and the shut lid lie; None if there is no such
+    sphere."""
     length = np.linalg.norm(displacement, axis=1)
     edge = length > 0.5 * length.max()
     if np.count_nonzero(edge) < 6:

@@ -90,7 +90,8 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads are at rest there.
+    """Controls that something reads at a LOD; correctives that nothing reads are at rest at this
+    LOD.
 
     Args:
         dna: the face.

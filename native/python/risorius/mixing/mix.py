@@ -3,7 +3,7 @@
 
 Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
 weights of its vertices. A region from another face is scaled to the size of the mixed face and
-moved to the region's position there, so that a tall face's brow fits a small face.
+moved to the region's position in the mixed face, so that a tall face's brow fits a small face.
 """
 
 from __future__ import annotations
@@ -260,7 +260,7 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Sets the mixed skin weights; they stay unchanged if all parents have the same."""
+    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights."""
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))

@@ -89,7 +89,8 @@ def completed(surface: Surface) -> list[Surface]:
 
     Returns:
         For each side of the bounding box at which the surface has a flat cut: the surface together
-        with its mirror image at this side. A flat cut of the neck counts too. Empty without a cut.
+        with its mirror image at this side. A flat cut of the neck counts too. The list is empty if
+        there is no flat cut.
     """
     points = surface.points
     border = points[surface.border()]

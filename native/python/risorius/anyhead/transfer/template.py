@@ -168,7 +168,8 @@ def _jaw(
     points: Doubles,
     ways: dict[Pose, Floats],
 ) -> Jaw | None:
-    """The jaw from the jaw joint; without a moving joint, from the displacements of jawOpen."""
+    """The jaw from the motion of the jaw joint, or from the displacements of jawOpen if no joint
+    moves."""
     if JAW in dna.joint_names:
         found = _jaw_of_joint(dna, sets, names, axes)
         if found.turns:

@@ -269,7 +269,8 @@ class _Joining:
         return next((delta for delta in found if delta.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
-        """Side -> the weighted middle float64[3] of the vertices that a blink moves."""
+        """Side -> float64[3], the mean position of the vertices that a blink moves, weighted by
+        motion."""
         out = {}
         for name, controls in self.became.controls.items():
             delta = self.face.shapes.get(name)

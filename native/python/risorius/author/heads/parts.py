@@ -67,7 +67,7 @@ class HeadPart:
 
     @property
     def center(self) -> Doubles:
-        """float64[3]: the middle of the bounding box."""
+        """float64[3]: the centre of the bounding box."""
         points = self.mesh.positions
         return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2)
 

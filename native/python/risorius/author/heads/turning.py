@@ -69,7 +69,7 @@ def take_eyes(
     Args:
         parts: parts of the head, upright and centred; x points to the left.
         height: height of the face.
-        lids: L or R -> float64[3], the middle of the vertices that a blink moves.
+        lids: L or R -> float64[3], the mean position of the vertices that a blink moves.
     """
     labels = [islands_of(part.mesh) for part in parts]
     found = [

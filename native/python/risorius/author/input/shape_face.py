@@ -300,8 +300,8 @@ def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doub
     """float64[V, 1] for each control: its fraction of an expression. The fractions sum to 1.
 
     Controls that end in L and R get the left and right half. Controls of lips such as ...UL and
-    ...DL get the upper and lower part, divided at the weighted middle of the displacements. The
-    edges are soft.
+    ...DL get the upper and lower part, divided at the mean height of the vertices, weighted by
+    their motion. The edges are soft.
     """
     if len(named) == 1:
         return [1.0]
