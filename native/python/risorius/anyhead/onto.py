@@ -216,7 +216,7 @@ def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:
-    """Copy the GUI controls of a template that drive raw controls of the face."""
+    """Copy from a template the GUI controls that drive raw controls of the face."""
     names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
     table = template.gui_to_raw
     led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]

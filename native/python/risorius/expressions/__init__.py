@@ -54,7 +54,7 @@ class Expression:
 
 
 class Lack(NamedTuple):
-    """The controls of an expression that a rig lacks."""
+    """The controls that an expression uses and that a rig lacks."""
 
     missing: tuple[str, ...]
     """Controls that the rig lacks."""

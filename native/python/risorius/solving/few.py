@@ -157,7 +157,7 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """Fixes the opposites of controls that are on in the pose `every`.
+    """For each control that is on in the pose `every`, fixes its opposite.
 
     Returns: the drag, and the pose `few` in which each fixed control has the smaller of its values
         in `few` and `every`.

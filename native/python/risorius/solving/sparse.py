@@ -222,7 +222,7 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """float64[n]: the first point of a path whose residual has at most the length `aim`."""
+    """float64[n]: the first point on a path at which the residual is at most `aim` long."""
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

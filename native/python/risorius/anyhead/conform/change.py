@@ -139,8 +139,7 @@ class Change:
         return out
 
     def _spread(self, rows: Doubles) -> Doubles:
-        """float64[V, n]: for each vertex, the sum of the rows of all vertices with Gaussian
-        weights."""
+        """float64[V, n]: for each vertex, the Gaussian-weighted sum of the rows of all vertices."""
         points = self.before.points
         at = np.floor((points - points.min(axis=0)) / (_CELL * self.reach)).astype(np.int64)
         at = np.ravel_multi_index(tuple(at.T), tuple(at.max(axis=0) + 1))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Fits the statistical head model to a surface by iterative closest points.
 
-Each round pairs vertices of the model with the closest points of the surface with a similar normal.
-A Gauss-Newton step then solves rotation, translation, scale and weights of the model together.
+Each round pairs vertices of the model with the closest surface points that have a similar normal. A
+Gauss-Newton step then solves rotation, translation, scale and weights of the model together.
 """
 
 from __future__ import annotations

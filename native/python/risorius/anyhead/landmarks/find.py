@@ -133,7 +133,7 @@ def find_form(
 
 
 def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, Pose, float]:
-    """The piece of a surface that is a head, the fitted head model, and the error of the fit."""
+    """The head (a piece of the surface), the fitted head model, and the error of the fit."""
     seen = Target(target)
     best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Interpolates values at the template's vertices to the vertices of another head.
 
-Each vertex takes the value of the nearest point of the template with a similar normal. Vertices
+Each vertex takes the value of the nearest template point that has a similar normal. Vertices
 without such a point (the back of a throat, hair, a collar, a hole of a scan) get a smooth
 continuation of their neighbours' values over the head's triangles.
 """

@@ -59,7 +59,8 @@ class CorrectiveOptions:
 
 @dataclass
 class Corrective:
-    """A combination, and the displacements of the skin with all its controls at 1."""
+    """A combination of controls, its faults, and the displacements that repair it with all controls
+    at 1."""
 
     controls: Controls
     displacement: Doubles  # [V, 3] displacements of the posed skin, in the file's unit

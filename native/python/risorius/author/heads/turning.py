@@ -89,7 +89,7 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a part that have the form and the size of eyes."""
+    """The islands of a mesh that have the form and the size of eyes."""
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
