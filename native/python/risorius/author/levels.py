@@ -96,7 +96,8 @@ class _Merging:
             self._price(int(joint))
 
     def _price(self, joint: int) -> None:
-        """For each other joint, compute the squared error if it takes the vertices of `joint`."""
+        """For each other joint, compute the squared error if that joint takes the vertices of
+        `joint`."""
         held = np.flatnonzero(self.weights[:, joint])
         rows = self.weights[held, joint, None] * self.points[held]
         values, axes = np.linalg.eigh(rows.T @ rows)

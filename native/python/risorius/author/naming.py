@@ -71,7 +71,8 @@ def _side(x: float) -> str:
     """The side of a joint that has no mirrored joint: L, R, or C for the middle.
 
     Args:
-        x: its place to the character's left, as a fraction of the face's width.
+        x: position of the joint, positive to the character's left, as a fraction of the face's
+            width.
     """
     if abs(x) < 1e-3:
         return "C"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Stores joints, weights and LODs of a joint rig for other faces of the same topology.
 
-The joints are fitted once. For another person, only their motions are fitted. All these people
-have the same joints, so that they can be mixed.
+The joints are fitted once. For another person, only the motions of these joints are fitted. All
+these people have the same joints, so that they can be mixed.
 """
 
 from __future__ import annotations

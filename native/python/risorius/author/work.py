@@ -308,8 +308,8 @@ def carried_shift(work: Work) -> float:
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
 
-    The fits use them as additional expressions, so that vertices keep following the same joint of
-    neck and head.
+    The fits use these shifts as additional expressions, so that vertices keep following the same
+    joint of neck and head.
 
     Args:
         work: the face; the parents of new joints must be known.

@@ -260,7 +260,7 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with deltas added to the blend shapes of a control; None if it has none."""
+    """The face with deltas added to the blend shapes of a control; None if the control has none."""
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]

@@ -173,7 +173,7 @@ def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> No
     Args:
         groups: copies, changed in place.
         joint: its index.
-        shifts: float64[columns, 3], in the axes of its parent.
+        shifts: float64[columns, 3], translations in the axes of the joint's parent.
     """
     left = shifts.copy()
     for group in groups:
