@@ -19,8 +19,8 @@ from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames that are resampled at a time
-# Bytes that the result of one read may take, in addition to BYTES_PER_BYTE times the file's size.
-# They suffice for 75 minutes of 1,000 controls at 60 frames per second.
+# Memory that the clip from one read may take, in bytes, in addition to BYTES_PER_BYTE times the
+# file's size. It suffices for 75 minutes of 1,000 controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -203,7 +203,8 @@ class Clip:
         return self.replaced(curves=curves, start=start, times=None)
 
     def _even_count(self, rate: float, rounding: float) -> int:
-        """The number of frames at `rate` from the first to the last time. Raises: BudgetError."""
+        """The number of frames at `rate` from the first to the last time, rounded down after adding
+        `rounding`. Raises BudgetError if they need too much memory."""
         frames = self.duration * rate
         budget = Budget.of(self.curves.nbytes + 8 * self.frame_count)
         each = 4 * len(self.names) + 8  # float32 of each control, and a time
@@ -232,7 +233,8 @@ class Clip:
         return out
 
     def selected(self, names: Sequence[str]) -> Clip:
-        """The clip with only the named controls, in the order of `names`. Raises: KeyError."""
+        """The clip with only the named controls, in this order. Raises KeyError for an unknown
+        name."""
         rows = [self._index[name] for name in names]
         return self.replaced(names=names, curves=self.curves[rows])
 
@@ -370,7 +372,7 @@ class ClipReader:
     def read(
         self, frames: tuple[int, int] | None = None, controls: Sequence[str] | None = None
     ) -> Clip:
-        """Read frames begin to end - 1 of the named controls, or of all.
+        """Read the named controls (None: all) in `frames` (begin, exclusive end; None: all).
 
         Returns:
             A clip that starts at the time of its first frame. It has the events within its time

@@ -76,7 +76,8 @@ class Life:
 
 
 class Blink(NamedTuple):
-    """A blink: times in seconds, and `amount`, the closing of the lids from 0 to 1."""
+    """A blink: its start and the durations of its phases in seconds, and `amount`, the closing of
+    the lids from 0 to 1."""
 
     start: float
     close: float
@@ -322,7 +323,8 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """The next point to look at, in degrees: often near the middle if the gaze is far from it."""
+    """The next point to look at, in degrees. A gaze far from straight ahead often returns near
+    it."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale

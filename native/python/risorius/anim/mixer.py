@@ -213,7 +213,7 @@ class Mixer:
         return self._core.fire(self._reaction_index[name], time, strength)
 
     def fire_events(self, events: Iterable[Event], offset: float = 0.0) -> int:
-        """Fire every event with the name of a reaction; returns their number.
+        """Start a reaction for each event that has the name of a reaction; return how many started.
 
         Args:
             events: events of a clip; an event's value is the strength if it is a number.
@@ -261,7 +261,7 @@ class Mixer:
 
         Args:
             start: time of the first frame in seconds.
-            end: time in seconds; the last frame is at it, or less than one frame before.
+            end: time in seconds; the last frame is at `end`, or less than one frame before `end`.
             rate: frames per second.
         """
         count = max(math.floor((end - start) * rate + 1e-6) + 1, 0)

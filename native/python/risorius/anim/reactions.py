@@ -51,7 +51,7 @@ class Reaction:
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:
-        """The parts as the native mixer expects them, without controls that the face lacks."""
+        """The parts as the native mixer expects them. Controls that the face lacks are left out."""
         out = []
         for p in self.parts:
             there = {index[name]: weight for name, weight in p.weights.items() if name in index}
@@ -63,7 +63,10 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """A rule: active controls `by` multiply the controls `of` by 1 - amount * measure(by)."""
+    """A rule: active controls `by` weaken each control in `of` by a factor.
+
+    The factor is 1 - amount * measure(by).
+    """
 
     name: str
     by: tuple[str, ...]
@@ -82,7 +85,7 @@ class Exclusives:
     """Pairs; the common amount is subtracted from both."""
 
     def rules_of(self, index: Index) -> tuple[list[_Yield], list[tuple[int, int]]]:
-        """The rules as the native mixer expects them, without controls that the face lacks."""
+        """The rules as the native mixer expects them. Controls that the face lacks are left out."""
 
         def there(names: tuple[str, ...]) -> npt.NDArray[np.uint32]:
             return np.array([index[name] for name in names if name in index], np.uint32)

@@ -55,7 +55,7 @@ def _is_complete(path: Path) -> bool:
 
 
 def _remove_earlier(folder: Path) -> None:
-    """Removes the templates that other code of the same version built."""
+    """Removes templates that earlier code with the same version number built."""
     for path in folder.parent.glob(f"template-{__version__}-*"):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

@@ -164,7 +164,8 @@ def _mended(
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:
-    """The head with expressions as a face of blend shapes, in the form of author.input.spec.Read.
+    """The head with expressions as a face of blend shapes: the same type as spec.read_face()
+    returns.
 
     Args:
         made: the head with expressions; its shapes are changed.
@@ -215,7 +216,7 @@ def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:
-    """Copy the GUI controls of a template that drive raw controls of the face."""
+    """Copy from a template the GUI controls that drive raw controls of the face."""
     names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
     table = template.gui_to_raw
     led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Computes the joints' errors, and the wanted positions, at control values between 0 and 1."""
+"""Computes where vertices should be at control values between 0 and 1, and the joints' errors."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ class Ways:
 class Between:
     """Measures a mesh's errors with an input at SHARES: its distance from the wanted positions.
 
-    These are on straight lines, on arcs about a pivot, or on the arcs of the source's joints.
+    The wanted positions are on straight lines, on arcs about a pivot, or on the arcs of the
+    source's joints.
     """
 
     def __init__(self, ways: Ways, mesh: Mesh) -> None:
@@ -57,7 +58,7 @@ class Between:
         self.weights = sk.dense_weights(mesh, len(ways.work.source.joint_names))
 
     def truth(self, row: int, wanted: Doubles, shares: Sequence[float]) -> list[Doubles]:
-        """The wanted displacements float64[V, 3] at each share.
+        """The wanted displacements float64[V, 3] at each control value in `shares`.
 
         Args:
             row: row of the expression.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Solves the joint values of correctives, because joint rotations do not add up like blend shapes.
 
-With all controls of a corrective at 1, the face of joints must have the form of the face of shapes.
-The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes store the
-remaining displacements.
+With all controls of a corrective at 1, the face of joints must have the same shape as the face of
+shapes. The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes
+store the remaining displacements.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from .work import MM, RigOptions, Work, listed_meshes
 _STEPS = 3  # number of Gauss-Newton steps
 _OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
 _MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
-# Largest number of joints in a step, and smallest weighted error of a joint's vertices relative to
-# the joint with the largest one.
+# Largest number of joints in a Gauss-Newton step. A joint is left out if the weighted squared error
+# of its vertices is below _LEAST_SHARE of the largest such error of a joint.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
@@ -90,7 +90,7 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3]: the face of joints with its blend shapes, before skinning."""
+        """float64[V, 3]: vertices in the face of joints with its blend shapes, before skinning."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
@@ -127,7 +127,8 @@ class Combinations:
         self.first = len(work.source.joint_names)
 
     def active(self, column: int) -> list[int]:
-        """The inputs at 1 in a corrective's pose: controls, smaller correctives, the corrective."""
+        """The inputs at 1 in a corrective's pose: its controls, the correctives of subsets of its
+        controls, and the corrective itself."""
         on = self.work.combined[column]
         smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
         return [*sorted(on), *smaller, column]
@@ -163,7 +164,8 @@ class Combinations:
         return out
 
     def _waves(self) -> list[list[int]]:
-        """The correctives in their order, divided into runs of independent correctives."""
+        """The correctives in their order, divided into runs of correctives that do not depend on
+        each other."""
         out: list[list[int]] = []
         for column in self.order:
             on = self.work.combined[column]
@@ -268,7 +270,7 @@ class Combinations:
         """Add blend shapes for the joints' errors, and return the errors of the finest meshes.
 
         Args:
-            lods: number of levels of the source.
+            lods: number of LODs of the source.
         """
         work = self.work
         self.after = _Side(work.dna, self.columns)

@@ -32,8 +32,8 @@ class FitOptions:
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric
     threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
-    # A joint takes no part in an expression if it moves no vertex by this distance, in the mesh'
-    # unit.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance, in the mesh' unit.
     least_effect: float = 0.0
     # The result is the round with the smallest maximum error: among the second half of the rounds
     # if True, among the last four rounds if False.
@@ -41,7 +41,8 @@ class FitOptions:
 
 
 def bounded(options: FitOptions) -> FitOptions:
-    """The options with at least 200 rounds and `bound`, for a smaller largest error."""
+    """The options with at least 200 rounds and `bound` True, so that the largest error is
+    smaller."""
     return replace(options, rounds=max(options.rounds, 200), bound=True)
 
 
@@ -117,7 +118,8 @@ def fit_motions(
             all expressions.
         weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
-        at: index of the pivot of each new joint; None: the middle of its vertices.
+        at: index of the pivot of each new joint; None: the joint is placed in the middle of its
+            vertices.
         options: options of the fit; only emphasis, threads and least_effect are used.
 
     Raises:
@@ -146,7 +148,7 @@ def fit_weights(
     start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
-    """Fit weights of a mesh on joints with known motions, for example at a coarser level.
+    """Fit the skin weights of a mesh on joints with known motions, for example at a coarser LOD.
 
     Args:
         neutral: float64[V, 3], neutral vertices.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fits the weights of a mesh on the joints of a level. The joints' motions are already known."""
+"""Fits a mesh' skin weights on the joints of a LOD. The joints' motions are already known."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from .work import (
     resting,
 )
 
-# Weight in the fit of the displacements by expressions along an arc at the value 0.5. Displacements
-# at the value 1 have the weight 1.
+# Expressions that move vertices along an arc are also fitted at the value 0.5: the weight of their
+# displacements there. Displacements at the value 1 have the weight 1.
 _HALVES = 1.5
 
 
@@ -36,7 +36,7 @@ def level_weights(
     wanted: Doubles,
     start: Doubles,
 ) -> Doubles:
-    """float64[V, joints]: weights on the joints of a level.
+    """float64[V, joints]: skin weights on the joints of a LOD.
 
     The fit gets two kinds of additional expressions. The first kind shifts a joint that no
     expression moves, such as the neck, with all its children, so that vertices keep following it.
@@ -45,7 +45,7 @@ def level_weights(
     Args:
         ways: motions of the face; the parents of new joints must be known.
         options: options of the fit.
-        lod: the level. Coarser levels use less smoothness, because their vertices are farther
+        lod: index of the LOD. Coarser LODs use less smoothness, because their vertices are farther
             apart.
         mesh: the mesh with its weights in the source.
         wanted: its displacements float64[E, V, 3].
@@ -77,8 +77,8 @@ def level_weights(
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
     """Additional expressions that shift resting joints, so that vertices keep following them.
 
-    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the joints of the source that
-        take part.
+    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
+        the source that the fit uses.
     """
     still, shares = resting(work), carried_shares(work, mesh)
     used = set(carriers(work)[len(work.source.joint_names) :].tolist())
@@ -108,12 +108,12 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
-    """Move the weights of joints that a level lacks to the joints that replace them.
+    """Move the weights of joints that a LOD lacks to the joints that replace them.
 
     Args:
         work: the face.
-        start: float64[V, joints], weights of the finer level.
-        there: indices of the level's joints.
+        start: float64[V, joints], weights at the next finer LOD.
+        there: indices of the joints in the LOD.
     """
     rows = start.copy()
     for joint in np.flatnonzero(rows.any(axis=0)).tolist():

@@ -61,8 +61,8 @@ def choose_parents(
         held += held[mirrored]  # all resting joints are in the middle, so pairs get the same parent
     out = np.where(held.any(axis=1), still[held.argmax(axis=1)], work.head)
     if jaw is not None:
-        # Joints whose parent is the neck keep it: jaw controls move the throat, but it turns with
-        # the neck.
+        # Joints whose parent is the neck keep this parent: jaw controls move the throat, but the
+        # throat turns with the neck.
         own = out == carriers(work)[jaw]
         out[own & _follow(work, meshes, fit, rows, mirrored, jaw)] = jaw
     return [int(joint) for joint in out]

@@ -19,8 +19,8 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift of a resting joint in carried_shifts(), so the error of a vertex that follows another neck
-# joint than in the source. A rotated head separates vertices of different neck joints this far.
+# Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than
+# in the source gets this error, because a rotated head separates such vertices about this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
@@ -44,7 +44,8 @@ class RigOptions:
     # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint takes no part in an expression if it moves no vertex by this distance in mm.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
     # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
@@ -152,8 +153,8 @@ def require_sizes(dna: Dna) -> None:
         dna: the face.
 
     Raises:
-        ArgumentError: the face has no mesh, all vertices are in one point, or coordinates are not
-            finite or larger than FARTHEST, so that their squares could overflow.
+        ArgumentError: the face has no mesh, all vertices are in one point, or a coordinate is
+            infinite, NaN, or so large (above FARTHEST) that its square could overflow.
     """
     if not dna.meshes:
         raise ArgumentError("a face with meshes was expected")
@@ -199,7 +200,7 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint with the largest weights on moved vertices."""
+    """The resting joint with the largest sum of its weights times the motion of the vertices."""
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -264,7 +265,8 @@ def resting(work: Work) -> Ints:
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: for each joint, itself if it rests, or the nearest resting joint above it.
+    """int64[joints]: for each joint, its own index if it rests, otherwise the index of the nearest
+    resting joint above it.
 
     Args:
         work: the face. New joints are included if their parents are chosen.
@@ -306,8 +308,8 @@ def carried_shift(work: Work) -> float:
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
 
-    The fits use them as additional expressions, so that vertices keep following the same joint of
-    neck and head.
+    The fits use these shifts as additional expressions, so that vertices keep following the same
+    joint of neck and head.
 
     Args:
         work: the face; the parents of new joints must be known.
@@ -360,11 +362,11 @@ def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
 
 
 def listed_meshes(dna: Dna, lod: int) -> list[int]:
-    """Indices of the meshes of a level; all meshes if the file does not list the level.
+    """Indices of the meshes of a LOD; all meshes if the file does not list the LOD.
 
     Args:
         dna: the face.
-        lod: the level.
+        lod: index of the LOD.
     """
     mapping = dna.lod_mesh_mapping
     return [int(m) for m in mapping[lod]] if lod < len(mapping) else list(range(len(dna.meshes)))

@@ -65,7 +65,7 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
 
 def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, float]]]:
-    """The meanings of each kind of match, the best kind first."""
+    """Yields, for each kind of match, the meanings that match the text; the best kind is first."""
     known = set(names)
     units = {u: row for u, row in arkit.mapping().items() if known.issuperset(row)}
     wanted = text.lower()

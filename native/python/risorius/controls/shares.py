@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
-# Below this jaw opening the share is the amount divided by LEAST; otherwise noise of a face at rest
-# would make the share jump between 0 and 1. The error is at most a quarter of LEAST, 0.2 mm between
-# the lips.
+# Smaller values of the other control (such as jawOpen) count as LEAST in the division; otherwise
+# noise of a face at rest would make the fraction jump between 0 and 1. The error is at most a
+# quarter of LEAST, 0.2 mm between the lips.
 LEAST = 0.02
 
 

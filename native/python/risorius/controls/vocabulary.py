@@ -82,7 +82,7 @@ class Vocabulary:
     """The names that a program or protocol uses.
 
     Attributes:
-        name, title, description: key of the vocabulary, and texts for display.
+        name, title, description: identifier of the vocabulary, and texts for display.
         meanings: name in its usual spelling -> Meaning.
         is_loose: True: letter case, "_" and the difference of Left and L at the end are ignored.
     """
@@ -218,7 +218,7 @@ def _all() -> dict[str, Vocabulary]:
 
 
 def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A row unchanged, or one row for each side if its name contains a *."""
+    """A row of a vocabulary table, or one row for each side if the name contains a *."""
     if "*" not in name:
         yield name, value
         return
@@ -255,7 +255,8 @@ def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
 
 
 def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
-    """The controls of one part of a meaning; its units are added to `units`."""
+    """Control -> weight for one entry of a meaning. ARKit units of the entry are added to
+    `units`."""
     if key.startswith("@"):
         return {}
     if not key.startswith("="):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Reads expressions (named poses of the standard raw controls) from files that users can edit.
 
-The files in this folder contain six emotions, fifteen visemes and more. Any file of the same form
+The files in this folder contain six emotions, fifteen visemes and more. Any file of the same format
 can be loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the
-four lip quarters. A file may state the version of its form: `format = 1`.
+four lip quarters. A file may state the version of its format: `format = 1`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Expression:
 
 
 class Lack(NamedTuple):
-    """The controls of an expression that a rig lacks."""
+    """The controls that an expression uses and that a rig lacks."""
 
     missing: tuple[str, ...]
     """Controls that the rig lacks."""
@@ -150,7 +150,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
 
 
 def text_of(expression: Expression) -> str:
-    """The text of a TOML file with one expression, for load, with the version of its form.
+    """The text of a TOML file with one expression and the version of the format, for load().
 
     Raises:
         ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
@@ -181,7 +181,8 @@ def text_of(expression: Expression) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A string as TOML: JSON escapes the same characters except DEL."""
+    """A TOML string. The JSON encoder escapes the same characters, except DEL, which is
+    replaced."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes a finished face lighter: fewer joints, correctives and levels of detail.
 
-Order of the steps: levels, correctives, joints with refitted weights, blend shapes.
+Order of the steps: LODs, correctives, joints with refitted weights, blend shapes.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 @dataclass
 class Size:
-    """Numbers of parts of a face, its file size, and the duration of an evaluation."""
+    """Counts of joints, meshes and other items of a face, its file size, and its evaluation
+    time."""
 
     joints: int
     correctives: int
@@ -58,7 +59,7 @@ class Size:
 
     @classmethod
     def of(cls, dna: Dna, file_bytes: int, rig: Rig) -> Size:
-        """Counts the parts of a face and measures its speed.
+        """Counts the joints, meshes and other items of a face, and measures its evaluation time.
 
         Args:
             dna: the face.
@@ -92,7 +93,7 @@ class ExpressionError:
 
 @dataclass
 class LightenReport:
-    """The sizes before and after `lighten`, the removed parts, and the remaining errors."""
+    """The sizes before and after `lighten`, the removed joints and correctives, and the errors."""
 
     before: Size
     after: Size
@@ -237,7 +238,8 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A function that reports progress from `begin` to `end`. Raises: DnaError: it was stopped."""
+    """A function that reports progress from `begin` to `end`. It raises DnaError if the caller
+    stops the work."""
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:
@@ -384,7 +386,7 @@ class _Thinning:
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of one mesh after its removed joints' heirs took over."""
+    """float64[V, J]: weights of one mesh after other joints took over removed joints' vertices."""
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))

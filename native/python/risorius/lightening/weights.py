@@ -24,7 +24,7 @@ class Refit:
     def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
         """Args:
         products: float64[J, 4, J, 4] at the LOD, see joints.Leaving.
-        places: float64[J, 3], rest positions of the joints relative to the face's middle.
+        places: float64[J, 3], rest positions of the joints relative to the face's centre.
         parents: int64[J], parent of each joint.
         kept: indices of the remaining joints that the LOD lists, ascending.
         """
@@ -38,7 +38,7 @@ class Refit:
 
         Args:
             mesh: the mesh with its old weights.
-            points: float64[V, 3], vertices relative to the face's middle.
+            points: float64[V, 3], vertices relative to the face's centre.
             rows: float64[V, J], weights after other joints took over vertices of removed joints.
         """
         had = sk.dense_weights(mesh, len(self.places))

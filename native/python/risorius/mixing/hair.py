@@ -23,7 +23,7 @@ _STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
-    """Numbers of the hair and beard meshes, found by name at the end of the list of meshes.
+    """Indices of the hair and beard meshes, found by name at the end of the list of meshes.
 
     Args:
         dna: a face.
@@ -87,7 +87,7 @@ def give_hair(out: Dna, leading: Dna) -> None:
 
 
 def _skin(dna: Dna, listed: list[int]) -> int | None:
-    """Number of the mesh under the hair among the listed ones: the head, else the largest."""
+    """Index of the mesh under the hair, one of `listed`: the head, or else the largest mesh."""
     own = set(hair_meshes(dna))
     there = [m for m in listed if m not in own]
     heads = [m for m in there if "head" in dna.mesh_names[m].lower()]

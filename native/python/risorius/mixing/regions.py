@@ -3,7 +3,7 @@
 of the vertices of its joints.
 
 The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
-the skin (lashes, films) have the mask of the nearest skin.
+the skin (lashes, clear films on the eyes) have the mask of the nearest skin.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def _rigid(name: str) -> str | None:
 
 
 def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
-    """float64[V, regions] of each skin mesh."""
+    """The masks of each skin mesh, float64[V, regions]."""
     regions = _regions_of_controls(dna)
     most = [np.zeros((len(mesh.positions), len(REGIONS))) for mesh in meshes]
     movers = [Mover(dna, mesh) for mesh in meshes]
@@ -147,7 +147,8 @@ def _regions_of_controls(dna: Dna) -> dict[int, int]:
 
 
 def _below_head(dna: Dna) -> list[int]:
-    """Indices of the joints of neck and spine, and of their descendants but not below a head."""
+    """Indices of the joints of neck and spine, and of their descendants that are not below a head
+    joint."""
     names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
     below = [False] * len(names)
     for joint in sk.parent_order(dna):

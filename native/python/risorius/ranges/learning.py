@@ -103,7 +103,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """Measures a control. Args: curve: float64[frames]; rate: per second; name: the control."""
+    """Measures a control. Args: curve: float64[frames]; rate: frames per second; name: its name."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)
@@ -168,7 +168,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # Rounded down, so that the extreme maps to 1 and not slightly below.
+    # The extreme is rounded down, so that it maps to 1 and not slightly below.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

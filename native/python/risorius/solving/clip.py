@@ -97,8 +97,8 @@ class _Frame:
     def linearise(self, raw: Doubles, within: float) -> bool:
         """Computes derivatives at a pose, unless they exist for a pose within a distance.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of
-        raw."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest distance of a
+            control."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -210,7 +210,7 @@ def _curves(job: _Job, count: int, workers: int) -> Doubles:
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
-    """First frame of a chunk -> float64[R], its controls; chunks are solved in sequence."""
+    """Index of the first frame of each chunk -> float64[R], the controls in this frame."""
     frame, at, out = _Frame(job), job.rest, {}
     for begin in range(0, count, _CHUNK):
         at = out[begin] = _nearest(job, frame, begin, at, 12)
@@ -268,7 +268,8 @@ def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) 
 
 
 def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
-    """float64[F, R]: all frames with a price on sudden changes, in overlapping chunks.
+    """float64[F, R]: controls of all frames, solved together in overlapping chunks, with a price on
+    sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
     controls that the frames solved alone use may change, and their values have no price here.

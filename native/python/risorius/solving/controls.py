@@ -58,7 +58,8 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class ControlSharing:
-    """How a drag is distributed over the controls of a face: ease, partners and opposites."""
+    """How a drag is distributed over the controls: ease (how readily each changes), partners
+    (controls that change equally) and opposites (controls that exclude each other)."""
 
     ease: npt.ArrayLike | None = None
     """float[R] above 0, how readily each control changes: 0.1 costs ten times as much as 1. Two

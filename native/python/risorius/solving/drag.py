@@ -80,7 +80,8 @@ def solve_drag(
             the two axes of a screen, which leave the depth free; None: all three axes.
         weights: float[P], importance of each point; None: 1.
         limits: the controls that may change, and their ranges; None: all, from 0 to 1.
-        sharing: ease, partners and opposites of the controls; None: all controls are equal.
+        sharing: ease, partners and opposites of the controls; None: all controls have the same
+            ease, and none has a partner or an opposite.
         method: "least_squares"; "transpose", which changes controls in proportion to their effect
             on the points and moves less elsewhere; or "sparse", which changes few controls, about
             one per direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
@@ -141,7 +142,7 @@ def _solved(
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
-    """int64[N, 2]: checked pairs of indices of controls."""
+    """int64[N, 2]: the pairs of opposite controls (their indices), after a check."""
     found = wholes("opposites", opposites)
     pairs = found if found.size else np.empty((0, 2), np.int64)
     if pairs.shape[1:] != (2,) or not ((pairs >= 0) & (pairs < count)).all():

@@ -111,7 +111,8 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """float64[U], bool[U]: the price of each unknown by its ease, and whether it belongs elsewhere.
+    """float64[U], bool[U]: the price of each unknown by its ease, and whether the unknown belongs
+    to another part of the face than the points.
 
     Args:
         drag: equations of the drag.
@@ -156,7 +157,7 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """Fixes the opposites of controls that are on in the pose `every`.
+    """For each control that is on in the pose `every`, fixes its opposite.
 
     Returns: the drag, and the pose `few` in which each fixed control has the smaller of its values
         in `few` and `every`.
@@ -197,7 +198,8 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """The pose `every` without its weakest controls, as many as BEHIND_MM / 2 allows."""
+    """The pose `every` without its weakest controls: as many as leave the distance from the targets
+    at most `aim` - BEHIND_MM / 2."""
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))

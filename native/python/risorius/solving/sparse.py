@@ -57,7 +57,8 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: size of the gradient; 0 for unknowns that move or cannot follow it."""
+        """float64[n]: size of the gradient; 0 for unknowns that move or cannot follow the
+        gradient."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
@@ -121,7 +122,8 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """The price's decrease until each resting unknown begins to move, and its direction."""
+        """For each resting unknown, the price's decrease until it begins to move, and its
+        direction."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -220,7 +222,7 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """float64[n]: the first point of a path whose residual has at most the length `aim`."""
+    """float64[n]: the first point on a path at which the residual is at most `aim` long."""
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

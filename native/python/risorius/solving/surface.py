@@ -126,7 +126,8 @@ class Surface:
         return self._far().max(axis=0, initial=0.0)
 
     def spread(self) -> Doubles:
-        """float64[R]: root mean square displacement of the vertices of strongest(), per unit."""
+        """float64[R]: root mean square displacement of the vertices that strongest() measures, per
+        unit of each control."""
         far = self._far()
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 

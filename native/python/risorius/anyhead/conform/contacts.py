@@ -162,7 +162,8 @@ def _gaps(face: _Posed, posed: Doubles, touch: Touch, change: Change) -> Doubles
 
 
 def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V]: fraction by which the motion of each vertex must grow; None without a gap."""
+    """float64[V]: fraction by which the motion of each vertex must grow; None if there is no
+    gap."""
     posed = face.at(control)
     ways = posed - face.rest
     way = ways[touch.vertex] - np.einsum("nk,nkd->nd", touch.shares, ways[touch.corners])
@@ -185,7 +186,7 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 
 
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V, 3]: motion that each vertex needs in addition; None without a gap.
+    """float64[V, 3]: motion that each vertex needs in addition; None if there is no gap.
 
     The gap is divided between both lids in proportion to their motion by the control. The
     correction fades out behind the rims.
@@ -259,7 +260,7 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with deltas added to the blend shapes of a control; None if it has none."""
+    """The face with deltas added to the blend shapes of a control; None if the control has none."""
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]

@@ -168,12 +168,12 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> lis
 
 
 def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> None:
-    """Write translation columns of a joint; a column that two groups have is written once.
+    """Write translation columns of a joint; a column that two joint groups have is written once.
 
     Args:
         groups: copies, changed in place.
         joint: its index.
-        shifts: float64[columns, 3], in the axes of its parent.
+        shifts: float64[columns, 3], translations in the axes of the joint's parent.
     """
     left = shifts.copy()
     for group in groups:

@@ -121,7 +121,8 @@ class Eyelids:
         return self.vertices[own], self._height[own]
 
     def apart(self, points: Doubles) -> float:
-        """The mean distance between the upper and the lower edge, divided by the edge's width.
+        """The mean distance between the upper and the lower edge, divided by the upper edge's
+        width.
 
         Args:
             points: float64[V, 3], vertex positions of the target in any pose or shape.
@@ -255,15 +256,16 @@ class Eyelids:
         return float(self._seen(points, turn).max(initial=0.0))
 
     def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: height of the visible eye between the edges, in the target's unit."""
+        """float64[columns]: height of the visible eye in each column of the opening, target's
+        unit."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         beside = _BESIDE * self.mm / self.ball.radius
         edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
         return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: the angle, in radians, by which the edges have to approach each other;
-        negative if they overlap by more than closed lids may."""
+        """float64[columns]: for each column of the opening, the angle in radians by which the edges
+        have to approach each other; negative if they overlap by more than closed lids may."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
@@ -281,7 +283,7 @@ class Eyelids:
         return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
-        """float64[n]: the fraction of an angle by which each vertex rotates, 0 to 1.
+        """float64[n], 0 to 1: the fraction of the edge's rotation by which each lid vertex rotates.
 
         most: the largest angle of an edge in radians; it widens the fade.
         """
@@ -319,8 +321,8 @@ class Eyelids:
         self, points: Doubles, turn: Doubles | None, *, upper: bool
     ) -> tuple[Doubles, Doubles]:
         """float64[columns] each: angle up of a lid's edge, and distance of the edge from the eye's
-        centre. The edge is the lowest point of the upper lid, or the highest point of the lower
-        lid, among points outside the eye; NaN if there is none.
+        centre, in each column of the opening. The edge is the lowest point of the upper lid, or the
+        highest point of the lower lid, among points outside the eye; NaN if there is none.
         """
         across, up, away = self.opening.frame.angles(points)
         own = self._above == upper
@@ -366,7 +368,8 @@ class Eyelids:
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
-        # The rim of a moved lid stays as high above the eye as at rest, at most _SKIN.
+        # The rim of a moved lid stays as high above the eye as at rest, but need not be higher than
+        # _SKIN.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Fits a small statistical model of the form of heads to a surface."""
+"""Fits a small statistical model of the shape of heads to a surface."""

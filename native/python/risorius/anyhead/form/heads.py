@@ -38,7 +38,8 @@ class TeethForm:
 
 @dataclass(frozen=True)
 class HeadForm:
-    """A mean head plus weighted parts, in cm, y up, face towards +z, origin between the eyes.
+    """A mean head plus weighted principal components (parts), in cm, y up, face towards +z. The
+    origin is midway between the eyes.
 
     The last four vertices belong to no triangle: the centre and the foremost point of the left
     eyeball, then of the right eyeball.
@@ -72,7 +73,7 @@ class HeadForm:
         """float64[V, 3]: vertex positions of a head with given weights.
 
         Args:
-            parts: float64[K], weights of the parts in standard deviations.
+            parts: float64[K], weights of the principal components in standard deviations.
             expressions: float64[E], weights of the expressions.
         """
         out = self.mean + np.tensordot(parts, self.parts, 1)

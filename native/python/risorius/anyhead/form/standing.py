@@ -23,7 +23,7 @@ _OBLIQUE = 48  # number of rotations
 SURE, NO_FACE = 0.13, 0.21  # largest error of a certain head; larger errors than NO_FACE: no head
 _GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
 _CELLS = 9000  # largest number of vertices of a coarsened surface
-_FAR = 1.5  # cm of the form: larger distances count as this distance
+_FAR = 1.5  # cm of the model: larger distances count as this distance
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Standing:
 
     Attributes:
         pose: the fitted model.
-        error: the result of `misfit` plus a penalty for unlikely weights, in cm of the form.
+        error: the result of `misfit` plus a penalty for unlikely weights, in cm of the model.
     """
 
     pose: Pose
@@ -40,7 +40,7 @@ class Standing:
 
 
 def turns(up: Doubles | None, front: Doubles | None) -> list[Doubles]:
-    """float64[3, 3] each: rotations from the form to the surface that map axes to axes.
+    """float64[3, 3] each: rotations from the model to the surface that map axes to axes.
 
     Args:
         up, front: float64[3], the head's directions in the axes of the surface; rotations more than
@@ -61,7 +61,7 @@ def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -
 
     Args:
         points: float64[n, 3], points of the surface.
-        turn: float64[3, 3], the rotation from the form to the surface.
+        turn: float64[3, 3], the rotation from the model to the surface.
         shares: heights of the heads as fractions of the surface's height.
     """
     stood = points @ turn
@@ -81,7 +81,7 @@ def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -
 
 
 def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> float:
-    """Distance from the surface within which 3/4 of the model's face vertices are, cm of the form.
+    """Distance from the surface within which 3/4 of the model's face vertices are, cm of the model.
 
     The remaining quarter may be at holes, hair and inner sides of the surface.
 
@@ -101,7 +101,7 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
 
 
 def _strange(pose: Pose) -> float:
-    """The penalty of a fit for unlikely weights of parts and expressions, in cm."""
+    """The penalty of a fit for unlikely weights of components and expressions, in cm."""
     return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
 
 
@@ -117,7 +117,7 @@ def find_standing(
     Args:
         target: the surface.
         up, front: float64[3], the head's directions in the axes of the surface; None: unknown.
-        held: vertices of the form with known positions.
+        held: vertices of the model with known positions.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Predicts the lower teeth of a head from its skin, and their change between two heads.
 
-The size and the place of the lower teeth determine the motion of the jaw, but the skin hides them.
-The statistical head model contains the teeth of many heads and predicts them from the skin.
+The size and the place of the lower teeth determine the motion of the jaw, but the skin hides the
+teeth. The statistical head model contains the teeth of many heads and predicts the teeth from the
+skin.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from .fitting import Pose, Target, form_normals
 from .heads import head_form
 from .standing import SURE, find_standing
 
-_NEAR = 1.0  # cm of the form: largest distance of a vertex of the model from the face
+_NEAR = 1.0  # cm of the model: largest distance of a vertex of the model from the face
 _LEAST = 0.9  # least fraction of the vertices of the regression that must be on the face
 _BEYOND = 3.0  # limit of each predicted value in standard deviations
 _OTHER_SIZE = 0.1  # teeth with a larger relative difference from the predicted size are ignored

@@ -19,11 +19,11 @@ from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
 _HELD, _EYE = 60.0, 8.0  # weights of a landmark by the user and of the centre of an eyeball
-_NEAR_EYE = 2.0  # cm of the form: eyeballs farther from the model's eyes are ignored
-_ON = 0.4  # cm of the form: landmarks farther from the surface are left out
+_NEAR_EYE = 2.0  # cm of the model: eyeballs farther from the model's eyes are ignored
+_ON = 0.4  # cm of the model: landmarks farther from the surface are left out
 _LARGE, _TRIED = 0.3, 4  # smallest piece / largest piece that may be a head; most pieces tried
 _LOOKED, _FITTED, _REFINED = 0.8, 0.85, 0.95  # progress after each step
-_AWAY = 20.0  # cm of the form: pieces farther from a face belong to another head
+_AWAY = 20.0  # cm of the model: pieces farther from a face belong to another head
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Found:
     Attributes:
         landmarks: the landmarks of the head.
         pose: the head model fitted to the head.
-        error: error of the fit in cm of the form, see form.standing.Standing.
+        error: error of the fit in cm of the model, see form.standing.Standing.
         lips_apart: whether the lips are separate; connected lips cannot open.
     """
 
@@ -133,7 +133,7 @@ def find_form(
 
 
 def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, Pose, float]:
-    """The piece of a surface that is a head, the fitted head model, and the error of the fit."""
+    """The head (a piece of the surface), the fitted head model, and the error of the fit."""
     seen = Target(target)
     best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]
@@ -166,7 +166,7 @@ def _at_end(tell: Progress) -> Progress:
 
 
 def _off(part: Surface, pose: Pose) -> bool:
-    """Whether a piece is away from the head at a pose, and large enough to be another head."""
+    """Whether a piece is far from the head at `pose`, and large enough to be another head."""
     inside = pose.back(part.points[np.unique(part.triangles)])
     middle = (inside.min(axis=0) + inside.max(axis=0)) / 2
     large = float(np.ptp(inside, axis=0).max()) > 0.5 * _AWAY

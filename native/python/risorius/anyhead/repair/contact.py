@@ -223,7 +223,7 @@ class Contacts:
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
             arm = points - surface.at(triangle.astype(np.int64), shares)
-            # Excludes points next to the open border of gums, which are not inside.
+            # Excludes points next to the open border of gums, because these points are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
             deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)

@@ -63,7 +63,7 @@ class Lips:
         expressions: Mapping[str, Doubles],
         corners: Doubles | None = None,
     ) -> None:
-        """Find the lips; `found` is False if the face has none that part.
+        """Find the lips; `found` is False if the face has no lips that part.
 
         Args:
             skin: the skin of the target at rest.

@@ -117,7 +117,8 @@ def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose,
 def _together(
     pose: Pose, expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]
 ) -> Doubles:
-    """float64[V, 3]: the displacements of a pose, summed from its controls and their pairs."""
+    """float64[V, 3]: the displacements of a pose, summed from its controls and from the correctives
+    of pairs of these."""
 
     def alone(name: str) -> Doubles:
         return np.asarray(expressions.get(name, 0.0), np.float64)

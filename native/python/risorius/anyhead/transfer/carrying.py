@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Computes the displacements of the template's vertices in each expression on another head.
 
-Vertices that the jaw moves are rotated by the same angle on all heads, about the hinge of this
-head's jaw. The remaining motion is transformed by the deformation gradients between both heads.
+Vertices that the jaw moves are rotated by the same angle as on the template, about the hinge of the
+other head's jaw. The remaining motion is transformed by the deformation gradients between both
+heads.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     """Append correctives to a face. Returns the new face.
 
     If a combination already has a corrective, the displacements are added to its shapes. Lashes and
-    coarser levels get the displacements of the nearest skin.
+    coarser LODs get the displacements of the nearest skin.
 
     Args:
         dna: a face of shapes; it is not changed.
@@ -63,7 +63,7 @@ def _channels(dna: Dna) -> dict[frozenset[int], int]:
 
 
 def _whole_levels(dna: Dna) -> list[int]:
-    """The levels that use all blend shape channels."""
+    """The LODs that use all blend shape channels."""
     lods, rows = dna.blend_shape_channels.lods, len(dna.blend_shape_channels.input_indices)
     return [lod for lod in range(min(len(lods), max(1, dna.lod_count))) if int(lods[lod]) == rows]
 
@@ -81,8 +81,8 @@ def _with_channels(dna: Dna, combinations: Sequence[Controls]) -> Dna:
         *dna.blend_shape_channel_names,
         *("_x_".join(names[c] for c in controls) for controls in combinations),
     ]
-    # A level uses the first rows of the channels. The new rows come last, so only levels that use
-    # all other channels can use them.
+    # A LOD uses the first rows of the channel table. The new rows come last, so only LODs that use
+    # all other channels can use the new ones.
     whole, channels = _whole_levels(dna), out.blend_shape_channels
     lods = [int(n) + count * (lod in whole) for lod, n in enumerate(channels.lods)]
     new = range(first_channel, first_channel + count)
@@ -119,7 +119,8 @@ def _add_targets(
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
     for m in sorted(meshes):
         mesh = copy.copy(made[m])
-        # Skin and lashes may have no shapes yet, if joints do all of their motion.
+        # Skin and lashes get targets even if they have none yet because joints do all of their
+        # motion.
         shaped = mesh.blend_shape_targets or m in skins or "lash" in dna.mesh_names[m].lower()
         if m in solids or not shaped:
             continue
@@ -159,7 +160,8 @@ def _add_targets(
 
 
 def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarget:
-    """The target plus a shape float64[V, 3]. Args: mm  length of the unit in mm."""
+    """The target with the displacements float64[V, 3] of a shape added. Args: mm: length of the
+    unit in mm."""
     sums = np.array(shape)
     np.add.at(sums, np.asarray(target.vertex_indices, np.int64), target.deltas)
     moved = np.flatnonzero(np.linalg.norm(sums, axis=1) * mm > _LEAST_MM)

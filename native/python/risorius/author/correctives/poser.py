@@ -121,15 +121,15 @@ def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
 def skin_and_solids(
     dna: Dna, solids: Sequence[str] = SOLIDS, lod: int = 0
 ) -> tuple[int, list[int]]:
-    """Index of the skin, the mesh with the most vertices of a level, and indices of its solids.
+    """Index of the skin, and indices of the solids. The skin is the largest mesh by vertex count.
 
     Args:
         dna: the face.
         solids: parts of the names of meshes that the skin must not intersect.
-        lod: the level.
+        lod: index of the LOD.
 
     Raises:
-        ArgumentError: the level has no meshes.
+        ArgumentError: the LOD has no meshes.
     """
     meshes = listed_meshes(dna, lod)
     if not meshes:

@@ -89,7 +89,7 @@ def column_count(dna: Dna) -> int:
     """The number of inputs of joint groups and blend shape channels."""
     lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
     most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
-    # The file's own column count is not used, because no reader checks it against the groups.
+    # The file's own column count is not used, because no reader checks it against the joint groups.
     return max(most, len(dna.raw_control_names))
 
 

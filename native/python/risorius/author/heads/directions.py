@@ -218,7 +218,7 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Indices of the vertices near the shapes' middles, so without the back of the head."""
+        """Indices of the vertices near the centres of the shapes; excludes the back of the head."""
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle
@@ -226,7 +226,8 @@ class _Look:
         return np.flatnonzero(np.linalg.norm(away, axis=1) < reach)
 
     def _unlike(self, axis: Doubles) -> float:
-        """The mean distance of the mesh from its mirror image across an axis."""
+        """The mean distance of the mesh from its mirror image; the mirror is perpendicular to an
+        axis."""
         step = max(1, len(self.points) // _POINTS)
         points = self.points[::step] - (self.points.min(axis=0) + self.points.max(axis=0)) / 2
         other = points * (1 - 2 * np.abs(axis))
@@ -246,7 +247,7 @@ class _Look:
 
 
 def _sided(name: str, controls: Sequence[str]) -> tuple[str, str]:
-    """A key that both sides of a pair of shapes share, and the shape's side: L, R or ""."""
+    """A name that a left shape shares with its right shape, and the shape's side: L, R or ""."""
     sides = {side_of(control) for control in controls}
     if len(sides) == 1 and sides <= {"L", "R"}:
         return "|".join(control[:-1] for control in controls), sides.pop()

@@ -21,7 +21,7 @@ _ROUND = 0.12  # largest standard deviation of a sphere's vertices from the radi
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere: indices of its vertices, its middle float64[3] and its radius."""
+    """A sphere: indices of its vertices, its centre float64[3] and its radius."""
 
     vertices: Ints
     middle: Doubles

@@ -26,13 +26,13 @@ _ALIKE = 3  # smallest number of common expressions of another head
 
 
 def moves(part: HeadPart) -> bool:
-    """Whether a shape of the part moves a vertex."""
+    """Whether at least one shape of the mesh moves a vertex."""
     size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
     return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
 
 
 def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
-    """Choose the mesh of the face: the named one, or the one with the most shape vertices.
+    """Choose the mesh of the face: the named mesh, or the mesh with most shapes times vertices.
 
     Args:
         where: name of the file in error messages.
@@ -41,7 +41,8 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
         rather: name of the mesh that is preferred if the file has several heads, or "".
 
     Raises:
-        ShapeFileError: no mesh moves, none has the name, or the file has several heads.
+        ShapeFileError: no mesh has shapes that move it, no such mesh has the wanted name, or the
+            file has several heads.
     """
     able = [part for part in parts if moves(part)]
     named = [part for part in able if part.source == wanted] if wanted else able
@@ -80,7 +81,7 @@ def is_other_head(face: HeadPart, part: HeadPart) -> bool:
 
 
 def is_coarse(part: HeadPart) -> bool:
-    """Whether the part's name denotes a coarser level of detail, such as LOD1."""
+    """Whether the mesh's name denotes a coarser level of detail, such as LOD1."""
     return _COARSE.search(part.name) is not None
 
 

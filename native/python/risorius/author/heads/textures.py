@@ -28,7 +28,7 @@ class Textures:
     Attributes:
         files: path -> bytes.
         names: (id() of a Material, role) -> file name.
-        notes: sentences on left-out parts and on the folder of the files.
+        notes: sentences on left-out parts of materials, and on the folder of the files.
     """
 
     files: dict[Path, bytes] = field(default_factory=dict)
@@ -85,7 +85,7 @@ def metadata_of(
     """The metadata of a DNA file that assigns textures to meshes.
 
     Args:
-        meshes: names of the meshes of all levels.
+        meshes: names of the meshes of all LODs.
         materials: name of a mesh of LOD 0 -> its material.
         textures: result of textures_of().
     """

@@ -74,7 +74,7 @@ def open_document(path: Path) -> Document:
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
-    """Index of the mesh with a name; with "", of the mesh with the most morph target vertices."""
+    """Index of the mesh with the wanted name; "": the mesh with the most morph target vertices."""
     rows = document.json.get("meshes")
     found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):
@@ -89,7 +89,7 @@ def name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
 
     Args:
         document: the open file.
-        row: the mesh' table of the JSON.
+        row: the JSON object of the mesh.
         number: index of the mesh.
     """
     world = _World(document)
@@ -104,7 +104,7 @@ def primitives(document: Document, row: object, number: int) -> list[dict[str, A
 
     Args:
         document: the open file.
-        row: the mesh' table of the JSON.
+        row: the JSON object of the mesh.
         number: index of the mesh, for error messages.
 
     Raises:
@@ -307,7 +307,7 @@ def _uvs(
 
 
 def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The table of the colour texture of a primitive's material; empty if there is none."""
+    """The JSON object of the colour texture of a primitive's material; empty if there is none."""
     if "material" not in primitive:
         return {}
     material = document.item("materials", primitive["material"], "primitives.material")
@@ -376,7 +376,7 @@ class _World:
                     self._parents[child] = number
 
     def of_mesh(self, mesh: int) -> int:
-        """Index of the first node with a mesh; -1 if there is none."""
+        """Index of the first node that shows the mesh; -1 if no node shows it."""
         return next((n for n, row in enumerate(self.rows) if row.get("mesh") == mesh), -1)
 
     def above(self, node: int) -> list[int]:

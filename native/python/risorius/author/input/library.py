@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes files of expressions that a face has as single shapes, in a folder next to its DNA."""
+"""Makes a file for each expression that one shape of a face makes, in a folder next to its DNA."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def library_folder(dna: Path) -> Path:
 
 
 def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
-    """Path -> bytes of a file for each expression of the shapes; expressions.load() reads them.
+    """Path -> bytes of the file for each expression in `became`; expressions.load() reads them.
 
     Args:
         became: result of matching.assign().
@@ -32,7 +32,7 @@ def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
 
 
 def about_library(became: Assignment, folder: Path) -> list[str]:
-    """A sentence on the folder of the expressions; an empty list if there are none.
+    """A sentence on the folder of the expressions; an empty list if `became` has no expressions.
 
     Args:
         became: result of matching.assign().

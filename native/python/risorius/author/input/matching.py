@@ -100,7 +100,7 @@ def guess(name: str) -> list[str]:
 
 
 def _guess(name: str, order: Sequence[str] | None) -> _Guess:
-    """The meaning of a name. Args: order  names of vocabularies, see vocabulary.find()."""
+    """The meaning of a name. Args: order: names of vocabularies, see vocabulary.find()."""
     said = vocabulary.find(name, order)
     words = tuple(_by_words(vocabulary.parts_of(name)[-1]))
     if said is None:

@@ -73,6 +73,7 @@ def _is_known(name: str) -> bool:
 
 
 def _other(path: Path, count: int) -> ObjMesh | None:
-    """The mesh of a file if its number of vertices is not `count`; None if it is a shape."""
+    """The mesh of a file whose number of vertices is not `count`; None for a file with `count`
+    vertices, which is a shape."""
     mesh = read_obj(path)
     return mesh if len(mesh.positions) != count else None

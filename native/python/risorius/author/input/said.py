@@ -102,7 +102,7 @@ def parse(content: str) -> dict[str, Said]:
 
 
 def row(name: str, value: Said) -> str:
-    """A line of the table.
+    """The line of the table [controls] for a shape.
 
     Args:
         name: name of the shape.
@@ -114,7 +114,7 @@ def row(name: str, value: Said) -> str:
 
 
 def text_of(said: Mapping[str, Said]) -> str:
-    """The text of a file with the table [controls]. Args: said  shape -> its meaning."""
+    """The text of a file with the table [controls]. Args: said: shape -> its meaning."""
     return "\n".join([f"[{TABLE}]", *(row(name, value) for name, value in said.items()), ""])
 
 

@@ -149,7 +149,7 @@ def _spec_of(path: Path, table: dict[str, Any]) -> Spec:
 
 
 def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
-    """Read the options of a SPEC.toml without [source], [controls] and name.
+    """Read a SPEC.toml that contains only options: no [source], no [controls] and no name.
 
     Raises:
         ShapeFileError: as read_spec(), or the file has a source, controls or a name.
