@@ -22,8 +22,8 @@ using Indices = std::vector<std::uint16_t>;
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 28;
 constexpr std::size_t kMost = 65535;  // rows or columns
 
-// The key of a new joint group. Groups are written in ascending order of keys, because of two
-// groups that write a row the later one wins.
+// The key of a new joint group. Groups are written in ascending order of keys. If two groups
+// write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // higher layers come first
   // levels: number of LODs of the units if their group must not have other numbers of LODs, because

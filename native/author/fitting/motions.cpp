@@ -18,7 +18,7 @@ namespace {
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-/// Work is split into this many ranges, because its costs differ: given joints cost nothing, an
+/// Work is split into this many ranges, because costs differ: given joints cost nothing, an
 /// expression that rotates joints far costs as much as ten others.
 constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms are used
