@@ -76,7 +76,7 @@ class DirectFace {
   /// Makes the next frame write every mesh.
   void forget() noexcept;
 
-  // The steps of evaluate_faces.
+  // The following functions are the steps of evaluate_faces.
   /// Evaluates the rig and the bones, and finds the changes. Allocates nothing.
   void begin(const FaceFrame& frame) noexcept;
   /// Whether the target must be written. Call it after begin.
