@@ -115,7 +115,7 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> layers[2];         // input and output of a network layer
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
-  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in any frame
+  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in some frame
   core::AlignedVector<float> frame_weights;  // [controls, kFrames]: their values; those of
                                              // correctives and networks are 0 between calls
 };

@@ -227,8 +227,8 @@ bool any_negative_0(const float* values, std::size_t count) noexcept {
   return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
 }
 
-// Lists the raw controls that are not 0 in all frames. Out: signs  whether any value has its sign
-// bit set
+// Lists the raw controls that are not 0 in at least one frame.
+// Out: signs  whether any value has its sign bit set
 std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   const float* values = work.frame_weights.data();
   std::uint64_t all = 0;

@@ -35,7 +35,7 @@ bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
 /// In:  raw       [count, raw controls]
 ///      work      of make_batch_workspace
 /// Out: controls  [count, controls]
-///      work      frame_weights; active: the controls that are not 0 in all frames
+///      work      frame_weights; active: the controls that are not 0 in at least one frame
 ///      false, and nothing is done, if a raw control is -0: its channels would get -0 if every
 ///      channel reads its control, but +0 if only the channels of active controls are written
 bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
