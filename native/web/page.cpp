@@ -16,7 +16,7 @@ namespace {
 
 using Four = float __attribute__((vector_size(16), aligned(16)));
 
-// A mesh of the page. skin.js writes this struct, 22 words of 32 bits, into memory.
+// A mesh of the page. skin.js writes this struct, 19 words of 32 bits, into memory.
 struct PageMesh {
   std::uint32_t positions, vertices, triangles, targets;
   const Four* rest;               // [positions]
