@@ -280,7 +280,7 @@ def test_what_does_not_go_together_is_said(faces, change, why):
 
 @pytest.fixture
 def files(faces, tmp_path):
-    """Files of the faces, each with a skin texture of one colour and a wrinkle mask."""
+    """A folder with the faces' files, each with a one-coloured skin texture and a wrinkle mask."""
     for number, dna in enumerate(faces):
         own = copy.copy(dna)
         own.metadata = {f"texture:{dna.mesh_names[0]}:color": "skin.png"}
