@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A face on a body of the user's own: its place, the body's meshes and bones, and bad files.
+"""Tests a face on a user's body: its place, the body's meshes and bones, and bad files.
 
-packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
+packaging/ship/gameface.sh tests such files in three-vrm and Blender's VRM reader.
+"""
 
 import numpy as np
 import pytest

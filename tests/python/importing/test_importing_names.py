@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The vocabulary of a file's names: VRM as in live captures; never by single letters."""
+"""Tests which vocabulary a file's names belong to; single letters alone do not decide it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VRM_1 = ["aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "look
 
 
 def table(names, moving=None):
-    """A CSV with a frame at rest, then a frame for each moving name in which it is 1."""
+    """CSV text: a frame at rest, then frames in which one name is 1: each in `moving`, or each."""
     rows = [["0"] * len(names)]
     for i, name in enumerate(names):
         if moving is None or name in moving:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values in other scales and heads in degrees are refused with a question.
+"""Tests values in other scales and heads in degrees: they are refused with a question.
 
 Options convert them.
 """
