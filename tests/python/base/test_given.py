@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers and files from users: of any size or kind, or without an end."""
+"""Tests numbers and files from users: of any size or kind, or without an end."""
 
 import os
 import threading
@@ -136,7 +136,7 @@ def test_tables_of_a_spec_are_tables(top, words, tmp_path):
 
 
 def _moved(positions, faces, folder, deltas):
-    """Write the egg's files with other positions."""
+    """Write the files of face_shapes with other positions."""
     face_shapes.write_obj(folder / "neutral.obj", positions, faces)
     for name, delta in deltas.items():
         face_shapes.write_obj(folder / "shapes" / f"{name}.obj", positions + delta, faces)
