@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig has at most as many deltas as its input, and its last line states the trade."""
+"""Tests that a rig has at most as many deltas as its input, and that its last line says so."""
 
 import re
 
@@ -40,7 +40,7 @@ def face_of(shapes):
 
 
 def deltas(dna):
-    """The number of nonzero deltas of LOD 0, counted in the file."""
+    """The number of nonzero deltas at LOD 0, counted in the file."""
     read = dna_bytes.Face(dna.to_bytes())
     meshes = [dna.meshes[m] for m in read.lod_meshes[0]]
     return sum(int(np.asarray(t.deltas).any(axis=1).sum()) for m in meshes
