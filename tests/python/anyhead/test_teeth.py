@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The jaw of a head by its skin and by its own teeth; eyeballs before a head stands; stopping."""
+"""Tests a head's jaw, from its skin and from its teeth; eyeballs of lying heads; stopping."""
 
 from __future__ import annotations
 
