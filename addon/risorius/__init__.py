@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Risorius: faces from DNA files in Blender. All work is done in `registration`."""
+"""Entry points of the add-on that Blender calls; the module `registration` does their work."""
 
 from collections.abc import Mapping
 

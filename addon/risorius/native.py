@@ -188,7 +188,7 @@ def part(name: str) -> ModuleType:
 
 @cache
 def regions() -> FaceRegions:
-    """The regions of a face; without regions if the native module is missing."""
+    """The regions of a face; the object has no regions if the native module is missing."""
     if problem():
         return FaceRegions({}, lambda _: "", lambda _: "")
     known, sides = part("controls.regions"), part("controls.sides")
@@ -219,12 +219,12 @@ def live_sources() -> dict[str, LiveSource]:
 
 
 def dna_error() -> type[Exception]:
-    """The class of errors about bad DNA files; a class that is never raised without the module."""
+    """The class of errors about bad DNA files; without the native module nothing raises it."""
     return _risorius.DnaError if _risorius is not None else _Never
 
 
 def user_errors() -> tuple[type[Exception], ...]:
-    """The errors that an operator reports: mendable errors of add-on, package and system.
+    """The errors that an operator reports, because a user can mend them.
 
     Any other exception is a fault of the program and must stay visible.
     """

@@ -3,8 +3,8 @@
 
     python blender_tests/support/make_past.py ZIP FOLDER [--record]
 
-Run by a Python with bpy. With --record ZIP plays the existing files of FOLDER and writes their
-values to FOLDER/values.npz.
+Run by a Python with bpy. With --record, the build ZIP plays the existing files of FOLDER, and their
+values are written to FOLDER/values.npz.
 """
 
 import argparse

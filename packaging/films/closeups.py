@@ -107,7 +107,7 @@ def pictures(path, args):
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
-        # EEVEE draws strands at least one pixel wide, so brows would look too heavy.
+        # EEVEE renders cards: it draws strands at least one pixel wide, so brows would look heavy.
         bpy.ops.risorius.set_strands(enable=engine == "cycles" and not args.cards)
         for view in args.view:
             begin = time.monotonic()

@@ -9,8 +9,8 @@ Measures the faults of all pairs of expressions that move common vertices and ar
 repairs the pairs, and measures them again with their correctives, for several numbers of
 correctives.
 
-*Bound*: the fraction by which the three totals (volume, torn, folded) can all fall at most if this
-number of pairs is repaired completely.
+*Bound*: an upper bound of the fraction by which all three totals (volume, torn, folded) can fall if
+this number of pairs is repaired completely.
 *Undone*: vertices without a fault that the linear sum moves by more than 0.5 mm, and that keep
 less than 0.9 of this motion with the corrective.
 *Worse*: pairs whose greatest depth grows by more than 0.1 mm with the corrective, or whose most

@@ -211,7 +211,7 @@ def row(way, times, note, base=None):
 
 
 def measure_full(path, package, frames, clip, active):
-    """Measure all rows of the full-scale face. The plain way is first: it is the others' base."""
+    """Measure all rows of the full-scale face, first the plain way, as base of the others."""
     print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
     base = None
     for loops in (False, True):

@@ -131,7 +131,7 @@ def pulls(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
 
 
 def drag(face: Skin, case: Case, method: str, ease: bool = False):
-    """The solved raw controls, and the CPU seconds of the solver without local_ease."""
+    """The raw controls of a solved drag, and the solver's CPU seconds, excluding local_ease."""
     zero = np.zeros(len(face.names))
     reach = face.surface.jacobian(zero, face.mesh, np.array(case.vertices[:1]))
     free = np.ones(len(zero), bool)

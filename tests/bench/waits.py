@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Measures waiting times in Blender with the add-on, and those of Blender alone in the same scene.
+"""Measures waiting times in Blender with the add-on, and without it in the same scene.
 
     python tests/bench/waits.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--faces 1 2 4 8]
 

@@ -260,7 +260,7 @@ def entries(files: Mapping[str, str]) -> list[str]:
 
 
 def found(files: Mapping[str, str]) -> list[str]:
-    """`path:line: reason` for all mutable state outside the registry.
+    """`path:line: reason` for all mutable state that is not kept in the session.
 
     Args:
         files: path below addon/risorius -> text, for all Python files of the add-on.

@@ -122,7 +122,7 @@ def say(text: str, **values: object) -> str:
 
 
 def _local_value(name: str, value: object) -> object:
-    """A value of a sentence: a Sentence and an error message of the package are translated."""
+    """The value; a Sentence or an error message of the package is translated."""
     if isinstance(value, Sentence):
         return say(value)
     if name in _REASONS and isinstance(value, str):
@@ -137,7 +137,7 @@ def name_of_new(text: str) -> str:
 
 
 def of_error(error: Exception) -> str:
-    """The text of an error, translated if it has a Sentence."""
+    """The text of an error, translated if it is a Sentence or a known message of the package."""
     first = error.args[0] if error.args else ""
     if isinstance(first, Sentence):
         return say(first)

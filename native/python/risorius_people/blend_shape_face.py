@@ -90,7 +90,8 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """The blend shape delta that, added before skinning, gives the displacement with the joints.
+    """The blend shape delta that, added before skinning, moves the vertices by the displacement of
+    the expression after its joints have moved.
 
     Args:
         positions: float64[v, 3], positions at rest in decimetres.
@@ -166,12 +167,12 @@ def add_definition(
     raw: list[str],
     channels: list[str],
 ) -> None:
-    """Fills the descriptor and the definition: names, skeleton, the lists of each LOD.
+    """Fills the layers descriptor and definition: names, the skeleton, the indices for each LOD.
 
     Args:
         dna: the face; changed.
         person: the person, with name, gender and age.
-        parts: the meshes, those of LOD 0 first.
+        parts: the meshes; LOD 0 comes first.
         joints: name of a joint -> float64[3], its position in decimetres.
         raw: names of the raw controls without their prefix.
         channels: names of the blend shape channels.
@@ -332,7 +333,8 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # CLOSED has no shape: its corrective completes joint rotations, which do not add up.
+    # The corrective of CLOSED (jaw open, lips together) has no shape here. The joint fit uses it,
+    # because the joint rotations of its controls do not add up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)

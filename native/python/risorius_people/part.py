@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A mesh of a sample person at one LOD, with its operators from the base mesh."""
+"""Defines a mesh of a sample person at one LOD, computed from the vertices of the base mesh."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the transfer of expressions to heads on which a formula gives the right result."""
+"""Tests of the transfer of expressions to heads for which the right result can be computed."""
 
 from __future__ import annotations
 

@@ -206,8 +206,8 @@ def test_extra_the_references_fixture_by_lod_1():
         dna.joint_groups[1].values.ravel(), np.float32(np.arange(1, 11) / 100)
     )
     maps = dna.animated_maps
-    # The first six entries drive AA AB AB AC AD AD; only AC remains. The reference keeps the old
-    # indices 0 1 1 2 3 3, which now mean other maps.
+    # Six entries drive the maps AA AB AB AC AD AD, of which only AC remains, with the new index 0.
+    # The reference keeps the old indices, although they mean other maps after the filter.
     assert maps.lods.tolist() == [1]
     assert maps.conditionals.output_indices.tolist() == [0]
     (mesh,) = dna.meshes

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Tests values in other scales and heads in degrees: they are refused with a question.
 
-Options convert them.
+Options of the import convert them.
 """
 
 from __future__ import annotations

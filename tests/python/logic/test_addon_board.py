@@ -91,7 +91,8 @@ def test_a_fit_finds_the_way_back(sample: tuple[Any, list[str]]) -> None:
 
 
 def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> None:
-    # raw 0 = a + b, raw 1 = a: for (0.9, 0.2) the solution is a = 0.2 and b = 0.7.
+    # The sliders a and b set raw control 0 to a + b and raw control 1 to a. The raw values 0.9 and
+    # 0.2 need a = 0.2 and b = 0.7.
     rows: Rows = [
         (0, 0, 0.0, 1.0, 1.0, 0.0),
         (0, 1, 0.0, 1.0, 1.0, 0.0),

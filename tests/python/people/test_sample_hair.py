@@ -248,7 +248,7 @@ def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, 
 
 
 def test_a_face_that_no_control_makes_alone_counts(stage):
-    """Two controls of a fifth of the height do no harm alone, but together make a slope."""
+    """Each of two controls raises the skin too little to reach a hair; together they reach it."""
     head = stage.meshes[0]
     target = head.blend_shape_targets[0]
     low = 0.2 * np.asarray(target.deltas)  # 0.02 each; the ends are 0.03 high

@@ -183,7 +183,7 @@ def test_partners_change_as_readily_as_the_readier_one(face, eases):
 
 
 def test_of_opposites_one_alone_is_used(face):
-    """The left smile and the puff both raise this vertex; both together fit slightly better."""
+    """Two opposites, left smile and puff, raise a vertex; only one of them is used."""
     surface, vertex = face[1], 14 * 5 + 6
     target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
     drag = [(0, vertex)], target

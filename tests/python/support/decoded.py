@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Converts a Dna to the JSON form of the reference's golden files, by index or by name.
 
-A LOD filter of the reference keeps some indices of the complete file (design ruling 1), so filtered
-files are compared by the names of the elements.
+A LOD filter of the reference does not renumber some indices of the complete file, so filtered files
+are compared by the names of the elements.
 """
 
 import gzip

@@ -78,7 +78,7 @@ class Posed:
         return raws
 
     def _own(self, mesh, raw):
-        # The sample has the axes of glTF, but centimetres instead of metres.
+        # The sample face has glTF's axes and centimetres, so only its unit is converted to metres.
         found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
         return found * self._sides / 100
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times, keys, layers and tracks without Blender."""
+"""Computes times, keys, layers and NLA tracks of animation without importing Blender."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
-TOLERANCE = 0.005  # of the range 0 to 1 of a control
+TOLERANCE = 0.005  # largest error of a control, whose range is 0 to 1
 _LONGEST = 1000  # most samples between two keys
 _BETWEEN = 4.0  # factor of the tolerance that is allowed at midpoints between samples
 _HALVES = 0.1  # weight of a midpoint in the fit; a sample weighs 1
@@ -24,8 +24,8 @@ class Bezier:
 
     Attributes:
         co: float64[keys, 2], frames and values.
-        left, right: float64[keys, 2], the ends of the handles. Each lies a third of the way to the
-            next key: a curve's frame grows evenly along it, and its value is a cubic of the frame.
+        left, right: float64[keys, 2], the ends of the handles. In frames, each is a third of the
+            way to the neighbouring key, so that the value is a cubic polynomial of the frame.
     """
 
     co: Float
@@ -48,9 +48,9 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """Values of the Bernstein polynomials that all curves of the same frames share.
+    """Values of the cubic Bernstein polynomials; curves with the same frames share them.
 
-    float64[m]: at the inner samples first, then at the midpoints between samples.
+    Each is float64[m]: values at the inner samples, then at the midpoints between samples.
     """
 
     near: Float
@@ -62,7 +62,7 @@ class _Basis(NamedTuple):
 
 
 class Fitter:
-    """Fits many curves; the matrix for n equally spaced samples is computed once."""
+    """Fits many curves; for each number of equally spaced samples, the matrix is computed once."""
 
     def __init__(self, tolerance: float) -> None:
         """Args: tolerance  largest distance of a curve from a sample, above 0."""
@@ -73,8 +73,8 @@ class Fitter:
     def keys(self, frames: Float, values: Float) -> Bezier:
         """Fits keys and handles to samples.
 
-        From each key a cubic extends while it stays within the tolerance of all samples, and within
-        four times the tolerance of straight lines at midpoints.
+        From each key, a cubic covers later samples as long as it differs from each sample by at
+        most the tolerance, and midway between samples from their mean by at most four times that.
 
         Args:
             frames: float64[n], ascending, n at least 1.
@@ -96,7 +96,7 @@ class Fitter:
         return self.between(frames, values)
 
     def between(self, frames: Float, values: Float) -> Bezier:
-        """As `keys`, with a key at the first and the last sample, also if the values are constant.
+        """Like `keys`, but the first and the last sample have keys also if all values are equal.
 
         Args:
             frames: float64[n], ascending, n at least 2.

@@ -73,7 +73,8 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
         values: float64[n] or float64[n, width].
 
     Returns:
-        Whole frames float64[m] and the values there; the first and the last value are held.
+        Whole frames float64[m] and the values there. Frames before the first sample or after the
+        last one get the value of that sample.
     """
     near = np.rint(frames)
     frames = np.where(np.abs(frames - near) < 1e-4, near, frames)
@@ -84,7 +85,7 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
 
 @dataclass
 class Curve:
-    """Keys of one F-curve: frames float64[n] and values float64[n]; one key where constant."""
+    """Keys of one F-curve: frames float64[n] and values float64[n]; one key if all are equal."""
 
     name: str
     frames: Float
@@ -93,13 +94,13 @@ class Curve:
 
 @dataclass
 class Keys:
-    """The keys of the action that a clip becomes.
+    """The keys of the action that is made from a clip.
 
     Attributes:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
             the control armature.
-        unknown: names of the clip without a control of this face.
+        unknown: names of curves in the clip for which this face has no control.
         dropped: number of samples that were not finite.
     """
 
@@ -112,7 +113,7 @@ class Keys:
 def property_names(dna_names: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
     """Curve name -> slider, for names of the DNA file and Blender's shortened names.
 
-    If the DNA file has a name twice, it means the first control.
+    If the DNA file contains a name twice, the curve drives the first control of that name.
 
     Args:
         dna_names: names of the controls in the DNA file.

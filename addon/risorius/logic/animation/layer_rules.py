@@ -18,7 +18,7 @@ Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
 _LIMIT = 100_000  # most samples of one source
-_NEAR = 1e-7  # frames
+_NEAR = 1e-7  # times that differ by fewer frames are merged
 
 
 def masked(
@@ -60,8 +60,8 @@ class Span:
         scale: factor of the duration; 2 plays at half speed.
         repeat: number of repeats.
         reverse: True: plays from `last` to `first`.
-        warp: frames of the scene and frames of the source, float64[n] each, which replace the other
-            settings; or None.
+        warp: frames of the scene and the frames of the source that play at them, float64[n] each;
+            replaces all other settings. None: no warp.
     """
 
     start: float
@@ -94,10 +94,10 @@ class Span:
 
 
 def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
-    """The frames of a source to sample, so that straight lines between them reproduce it.
+    """The frames at which a source is sampled, so that straight lines between samples replace it.
 
-    Samples on whole frames of the scene are exact. Sources with curves that are not straight
-    between keys get four samples per frame, for subframes.
+    On whole frames of the scene, the lines equal the source. If a curve is not straight between
+    keys, four samples per frame keep the error on subframes small.
 
     Args:
         span: time of the layer.

@@ -256,9 +256,9 @@ class Board:
     def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
         """Find the current marker of each sound by frame and name, which is all that markers store.
 
-        An unchanged marker belongs to its sound. Next come a marker with another name at its frame
-        (renamed), a marker with its name at another frame (moved), and a marker named like a sound
-        between its neighbours.
+        An unchanged marker belongs to its sound. Another sound gets, in this order, a marker with
+        another name at its frame (renamed), a marker with its name at another frame (moved), or a
+        marker named like a sound between its neighbours.
 
         Args:
             named: converts a mouth shape's name to a phoneme, or None.
@@ -349,7 +349,7 @@ def _renamed(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> Sound:
-    """The sound with the word and mouth shape of a marker's name; raises SpokenError if unknown."""
+    """The sound with the word and mouth of a marker's name. Raises: SpokenError  unknown mouth."""
     if mark.name == before.name:
         return sound
     word, colon, _ = mark.name.rpartition(":")

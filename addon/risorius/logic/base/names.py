@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names as labels: shortened to Blender's limit and numbered if they repeat."""
+"""Makes labels of names: shortens them to Blender's limit, and numbers repeated ones."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Space:
         radians: radians per file angle unit.
         sequence: axis numbers in the order in which rotations are applied.
         signs: float64[3], +1 or -1 per Euler angle.
-        flip_faces: whether corner order must be reversed.
+        flip_faces: True: the order of the corners of each face must be reversed.
     """
 
     axes: Float

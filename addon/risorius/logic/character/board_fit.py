@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fits GUI controls to wanted raw controls.
 
-Several settings may give the same raw controls. The fit minimises squared differences within the
-controls' ranges: it sets one GUI control after another to its best value, which a formula gives for
-each linear piece. So no step makes the fit worse.
+Several settings of the GUI controls may give the same raw controls. The fit minimises squared
+differences within the controls' ranges: it sets one GUI control after another to its best value,
+which a formula gives for each linear piece. So no step makes the fit worse.
 """
 
 from __future__ import annotations
@@ -82,9 +82,10 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
 
 
 def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
-    """Retry two GUI controls with a common output; one may hold a value that the other needs.
+    """Refit two GUI controls that drive the same raw control, if that improves a pose.
 
-    Both are set to 0, and each of them is fitted first once. Args: gui changed in place if better.
+    One of them can drive the raw control so far that the other has no effect. So both are set to 0
+    and fitted in both orders. Args: gui  is changed in the poses that improve.
     """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):

@@ -23,7 +23,7 @@ Line = list[Point]
 RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
 Direction = tuple[int, int]
 
-_TEXT, _TITLE = 0.29, 0.46  # heights of letters
+_TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board units
 _TRACK = 0.34  # width of a slider's frame
 _GAP = 0.3  # between sliders
 _MARGIN = 0.6  # around the board
@@ -104,8 +104,9 @@ class Board:
     height: float
 
 
-# Title, columns for each side, middle columns. Side columns are ordered from the outer side of the
-# face inwards, and the handles of a column from the top down.
+# _FACE has a row for each block of the board: title, columns of handles for each side of the
+# face, columns in the middle. A column lists handles from the top down. The columns of a side are
+# ordered from the outer edge of the face inwards.
 _Columns = tuple[tuple[str, ...], ...]
 _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
     (
@@ -195,7 +196,7 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Handles above a common label, each with the offset of its rest place from the corner."""
+    """Handles above a common label; each has the offset of its rest place from the upper left."""
 
     width: float
     height: float
@@ -303,7 +304,7 @@ def handles_of(
 
 
 def _upright(handle: Handle) -> Handle:
-    """The handle with y upwards if both axes would be horizontal."""
+    """The same handle; if both of its axes are horizontal, its y axis is made vertical."""
     if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
         return handle
     return replace(handle, y=replace(handle.y, way=UP))
@@ -554,7 +555,7 @@ def _moved(line: Sequence[Point], by: Point) -> Line:
 
 
 def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
-    """float64[H, 2] each: lowest and highest place of every handle along its own two axes."""
+    """Lowest and highest location of each handle along its x and y axis, float64[H, 2] each."""
     ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
     both = np.array(ends, np.float64).reshape(-1, 2, 2)
     return both[:, :, 0], both[:, :, 1]

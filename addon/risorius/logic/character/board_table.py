@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of GUI controls: which raw controls each drives, and its range.
 
-The table comes from the file. For a file without GUI controls it is made from the names of raw
-controls: one GUI control for each, or one for two opposites (Up and Down, Wide and Narrow), and a
-shared handle for all four directions.
+A DNA file with GUI controls contains the table. For other files it is made from the names of raw
+controls. Each raw control has a GUI control; two opposites (Up and Down, Wide and Narrow) share
+one. GUI controls for Up, Down, Left and Right of one name share a handle.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class BoardTable:
         return [raw for raw, _rows in self._pieces[gui]]
 
     def breaks_of(self, gui: int) -> list[float]:
-        """Values at which a GUI control's lines begin or end, and 0.
+        """Values of a GUI control at which the range of one of its rows begins or ends, and 0.
 
         Args: gui  index of the control.
         """
@@ -152,7 +152,7 @@ class BoardTable:
 
     @cached_property
     def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
-        """Arrays of rows for own_raw: GUI and raw indices, lowest and highest values, slopes."""
+        """The fields gui, raw, low, high and slope of all rows as arrays, for own_raw."""
         rows = self.rows
         numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
         low, high, slopes = numbers.reshape(-1, 3).T

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-SLACK = 0.1  # share of a distance: the viewport switches levels this much beyond it
+SLACK = 0.1  # the viewport changes the level 10 % beyond a threshold distance
 
 
 def default_distances(count: int, size: float) -> list[float]:

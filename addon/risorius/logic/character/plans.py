@@ -111,7 +111,7 @@ class ControlPlan:
 
 @dataclass(frozen=True)
 class Anchors:
-    """The joints that bones of the control armature rotate; empty or None if missing."""
+    """Indices of the joints that bones of the control armature rotate; empty or None if missing."""
 
     neck: tuple[int, ...]
     head: int | None
@@ -152,7 +152,7 @@ def layer_warnings(layers: Sequence[str]) -> list[str]:
 
 
 def space_of(dna: DnaData, unit_scale: float) -> Space:
-    """The Space of a face in a scene.
+    """The conversion from a face's coordinates and units to the scene's.
 
     Args:
         dna: the face.
@@ -309,7 +309,7 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # A very short bone loses the direction of its axis in float32.
+    # In float32, a very short bone loses its direction, so 3 % of the skeleton is the minimum.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:
@@ -431,7 +431,7 @@ def _faces(
 def _corner_values(
     values: NDArray[np.float32], layout: NDArray[np.uint32], corners: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Values of the face corners, or None if the file has none or the layout leaves its array."""
+    """Values of the face corners; None if the file has none or an index is out of range."""
     if not len(values) or not len(corners) or int(corners.max()) >= len(layout):
         return None
     indices = np.asarray(layout, np.int64)[corners]

@@ -105,7 +105,10 @@ PARTS = (
 
 @dataclass(frozen=True)
 class _Way:
-    """An axis of a handle: name of its GUI control, raw control -> weight of its two halves."""
+    """An axis of a handle: its GUI control, and weights of raw controls.
+
+    `rises` is for values above 0, `falls` for values below 0: index of a raw control -> weight.
+    """
 
     name: str
     rises: dict[int, float]

@@ -38,7 +38,7 @@ def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bo
     Args:
         names: names of the region's controls, in their order.
         region: name of the region.
-        regions: regions of the face, which know partners.
+        regions: regions of the face; they find the partner of a control.
         as_seen: True: left is the viewer's left; False: the character's left. Titles and order of
             the sliders follow it.
 

@@ -10,7 +10,7 @@ from ..base.face_regions import FaceRegions
 
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
-# Meanings of endings of names: upper and lower, centre, inner and outer, phase, forward.
+# Abbreviation at the end of a control's name -> word in the title of its slider.
 _WORDS = {
     **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
     **{"Ph": "Phase ", "Fwd": "Forward"},
@@ -26,7 +26,7 @@ def short_name(control: str) -> str:
 
 
 def title(control: str) -> str:
-    """Words for a slider: `CTRL_expressions.mouthCornerPullL` gives `Mouth Corner Pull L`."""
+    """The title of a slider: `CTRL_expressions.mouthCornerPullL` gives `Mouth Corner Pull L`."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|_", " ", short_name(control)).split()
     return " ".join(w[:1].upper() + w[1:] for w in words) or control
 

@@ -135,8 +135,8 @@ def has_neck(apart: float, low: float) -> bool:
     """Whether the mesh of a face includes a neck.
 
     Args:
-        apart: distance between the eyes.
-        low: height of the lowest point relative to the eyes.
+        apart: distance between the eyes, in Blender units.
+        low: height of the lowest vertex above the eyes, in Blender units; below 0 if it is lower.
     """
     return -low > _NECK * apart / GROWN
 
@@ -149,6 +149,6 @@ def _lamp(row: _Row, unit: float) -> Lamp:
         -far * math.cos(lift) * math.cos(turn),
         far * math.sin(lift),
     )
-    # A softbox of W watts emits W / pi along its axis, and W / (pi far^2) arrive at the face.
+    # A softbox of W watts emits W / pi along its axis; W / (pi far^2) per unit area reach the face.
     watts = share * _EXPOSURE * math.pi * far * far
     return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

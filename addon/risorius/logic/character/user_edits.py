@@ -2,7 +2,7 @@
 """Finds the user's edits of positions and shape keys, and prepares their transfer.
 
 A number counts as edited if it differs bit for bit from the import of the original file. If Blender
-moved a shape key together with the basis, rounding of two float32 additions is allowed.
+moved a shape key together with the basis, the rounding of four float32 additions is allowed.
 """
 
 from __future__ import annotations

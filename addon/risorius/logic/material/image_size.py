@@ -75,7 +75,8 @@ def _webp(_read: Read, head: bytes) -> tuple[int, int, int] | None:
 def _tiff(read: Read, head: bytes) -> tuple[int, int, int] | None:
     order = "<" if head[:2] == b"II" else ">"
     (kind,) = struct.unpack_from(f"{order}H", head, 2)
-    # Formats of the first directory's offset and of its tag count, and the bytes per tag.
+    # BigTIFF, then TIFF: format and place of the first directory's offset, format of its tag count,
+    # and bytes per tag.
     at_form, at, count_form, step = ("Q", 8, "Q", 20) if kind == 43 else ("I", 4, "H", 12)
     (start,) = struct.unpack_from(order + at_form, head, at)
     count_size = struct.calcsize(count_form)

@@ -15,8 +15,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Points = Float | Float32
 
-# Area -> ellipses (x, z, half width, half height), mirrored in x. The origin is between the eyes;
-# the unit is the distance between the eyes, or below the eyes in z the distance to the mouth.
+# Area -> ellipses (x, z, half width, half height) in face_coordinates, each also mirrored in x.
 _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
     "forehead": ((0.0, 0.82, 0.75, 0.42),),
     "glabella": ((0.0, 0.36, 0.26, 0.32),),
@@ -75,6 +74,9 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
 def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
     """float64[V, 3]: x, depth and height of points relative to the point between the eyes.
 
+    The unit is the distance between the eyes. Below the eyes, the unit of the height is the
+    distance from the eyes down to the mouth.
+
     Args:
         points: float[V, 3], in Blender units.
         frame: place and size of the face.
@@ -112,7 +114,7 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth.
+    """float32[V, 3]: x and height of face_coordinates, distance from the mouth in their units.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -126,7 +128,7 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils are not counted as borders, because light may pass there.
+    Rims of lids, lips and nostrils do not count, so that they keep their subsurface scattering.
 
     Args:
         points: float[V, 3], in Blender units.

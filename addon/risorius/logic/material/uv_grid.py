@@ -14,7 +14,7 @@ _RIM = 0.08  # of a cell, empty on each side, so that no face shows its neighbou
 
 
 def spread(points: Float32) -> Float32 | None:
-    """Stretch a UV layout over the unit square if it uses little of it or leaves it.
+    """Stretch a UV layout over the unit square, unless it is inside and covers half of it.
 
     Args:
         points: float[N, 2], UV coordinates of all face corners of one texture.

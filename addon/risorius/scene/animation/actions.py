@@ -34,8 +34,8 @@ class Track:
         path: data path of the property.
         group: name of the group of its F-curves.
         values: float32[frames, width].
-        now: the current value of the original property, [width]. A property with this value at all
-            frames needs no curve. None: always make a curve.
+        now: float[width], current value of the property in the scene. A property that has this
+            value at all frames needs no curve. None: always make a curve.
         first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
@@ -50,7 +50,7 @@ class Track:
 
 @dataclass
 class Counts:
-    """Totals of written F-curves: keys, keys before the reduction, largest error, curves."""
+    """Totals of written F-curves: keys, keys before the reduction, its largest error, curves."""
 
     keys: int = 0
     all_keys: int = 0
@@ -73,10 +73,10 @@ def write(
     error: float,
     counts: Counts,
 ) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
-    """Make an action with one curve for each value that moves.
+    """Make an action from baked tracks. A track that stays at its current value gets no F-curve.
 
     Args:
-        name: of the action.
+        name: name of the action.
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
@@ -163,7 +163,8 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
     points = curve.keyframe_points
     points.add(len(times))
     places = np.stack([times, values], axis=1).ravel()
-    # Straight lines need no handles; computing them would cost most of the time.
+    # Linear keys ignore their handles. Placing these at the key saves Blender their slow
+    # computation.
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
@@ -200,7 +201,7 @@ def play(
     """Let a datablock play a baked action alone, and keep its earlier animation.
 
     Args:
-        owner: object or Key, see `restore`.
+        owner: object or shape keys whose animation `restore` brings back later.
         action, slot: the results of `write`.
         muted: data paths whose drivers are muted, since they are baked.
         strip: put the action on a new NLA track instead of making it the active one.
@@ -296,7 +297,7 @@ def _set(owner: Animated, path: str, number: float) -> None:
 
 
 def restore(owner: Animated) -> None:
-    """Restore the animation of a datablock before `play`.
+    """Restore the animation that a datablock had before `play`.
 
     Baked actions are removed, unless another datablock uses them, or the user protected or edited
     them. An action that the user assigned since `play` stays in the file.
@@ -358,12 +359,12 @@ def _is_used(action: bpy.types.Action) -> bool:
 
 
 def _noted(track: bpy.types.NlaTrack, mute: bool | int, solo: bool | int) -> str:
-    """The stored line of a track: its flags, its name and its strips."""
+    """JSON text that stores an NLA track for `restore`: mute, solo, name, names of its strips."""
     return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
 
 
 def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
-    """Read a line of `_noted`; None if the line has another form."""
+    """Mute, solo, name and strip names from a text of `_noted`; None if the text is damaged."""
     try:
         mute, solo, name, strips = json.loads(line)
         return bool(mute), bool(solo), str(name), [str(strip) for strip in strips]
@@ -372,7 +373,9 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Rewrite NLA tracks that an old file stored by their order so that they have names.
+    """Convert the stored track states of an old file, which names no tracks, to texts of `_noted`.
+
+    The old file stores the states in the order of the tracks.
 
     Returns:
         Whether any stored track was rewritten.
@@ -431,7 +434,7 @@ def _baked_strips(
     own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]
     if own:
         return own
-    # A copy of the object may play a copy of the action.
+    # A copied object may play a copy of the baked action; copies have the mark BAKED_ACTION too.
     marked = [(t, s) for t, s in strips if s.action is not None and s.action.get(BAKED_ACTION)]
     return [(t, s) for t, s in marked if t.name == saved.text(state, "track")]
 

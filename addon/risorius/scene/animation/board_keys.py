@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts the current pose and the keys of an action between sliders and the face board."""
+"""Converts the current pose and the keys of an action between sliders and the face board.
+
+Either the sliders or the board lead, that is, move the face; the others have no effect.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ class Converted:
     """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: largest difference of raw controls by the conversion, over the pose and all frames.
+        loss: largest change of a raw control by the conversion, over the pose and all frames.
         kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
         idle: names of other actions of the face whose keys have no effect after the switch.
@@ -42,10 +45,10 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about the loss of a conversion; None if it is at most board.SEEN.
+    """A sentence about raw controls that a conversion changed by more than board.SEEN, or None.
 
     Args:
-        loss: differences of raw controls after a fit.
+        loss: differences of raw controls before and after the conversion.
     """
     if loss.largest <= board.SEEN:
         return None
@@ -100,7 +103,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
     Args:
         context: with a view layer.
         rig: a character with a face board; its control armature must not be linked.
-        kind: of the new board, runtime.PRIMARY or runtime.COMPLETE.
+        kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
         The result of the conversion to the new board; empty if the sliders lead.
@@ -171,7 +174,7 @@ def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
 def _leading_curves(
     action: bpy.types.Action, controls: ArmatureObject, live: runtime.Runtime, of_board: bool
 ) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of an action that move the board's handles, or the sliders that it reaches."""
+    """The F-curves of the board's handles (of_board), or of the sliders that the board moves."""
     if of_board:
         paths = {board.path_of(handle.bone) for handle in live.handles}
     else:
@@ -194,7 +197,8 @@ def convert(
         by_board: True: from sliders to handles; False: from handles to sliders.
 
     Returns:
-        The loss of raw controls at whole frames and at the keys, and the number of new curves.
+        The largest changes of raw controls at whole frames and at keys, and the number of new
+        curves.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inserts keys by Blender's settings: auto-key, keying set, only needed, key type, group.
 
-Code that moves sliders or control bones for the animator passes the move to `by_hand`, or calls
-`changed` after the move.
+Code that moves sliders or control bones for the animator does so in a function that it passes to
+`by_hand`, or calls `changed` after the move.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 
 
 def pose_of(controls: ArmatureObject) -> Pose:
-    """The current values of the controls, before drivers and layers.
+    """The current values of the controls, without the effect of animation layers.
 
     If the face board leads, the pose has its handles instead of the sliders that they reach.
     """
@@ -125,7 +125,7 @@ def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set
 
 
 def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
-    """The data paths of a control bone that an animator moves; locked channels are not keyed."""
+    """Data paths of a bone's rotation and location, each left out if all its axes are locked."""
     names = [] if all(bone.lock_rotation) else [clip_actions.rotation_path(bone)]
     names += [] if all(bone.lock_location) else ["location"]
     return [f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name}' for name in names]
@@ -268,7 +268,7 @@ def pose_at(controls: ArmatureObject, frame: float, now: Pose) -> Pose:
 
     Args:
         controls: the control armature.
-        frame: of the action; need not be whole.
+        frame: frame of the action; need not be whole.
         now: the current pose.
     """
     keyed = curves_by_path(controls)
@@ -308,15 +308,15 @@ def _at_selected(
     move: Callable[[], Collection[str] | None],
     at: Callable[[float], object] | None,
 ) -> int:
-    """The part of `by_hand` that moves at the frames of selected keys."""
+    """Do the work of `by_hand` with at_selected: move and key at each frame with a selected key."""
     if tweaks.of(controls) is not None:
         raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))
     now, rules, made = pose_of(controls), rules_of(context, auto=False), []
-    # Read all poses before the first key, because the first key of a curve changes it at all
-    # frames.
+    # Compute the poses of all frames before any key is inserted, because the first key of a new
+    # curve sets its value at all frames.
     for frame in frames:
         before = pose_at(controls, frame, now)
         show(controls, before)
@@ -347,7 +347,7 @@ def insert(
         controls: the control armature.
         labels: sliders to key; sliders with drivers are left out.
         bones: data paths of bones to key.
-        frame: of the scene; need not be whole.
+        frame: frame of the scene; need not be whole.
         rules: settings for new keys.
 
     Returns:
@@ -411,7 +411,7 @@ def _driven(controls: ArmatureObject) -> set[str]:
 
 
 def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
-    """The new curves of a property; curves of a slider get the colour of its region."""
+    """The curves that a key insert has made for a property. Slider curves get a region colour."""
     curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
     label = curve_colours.label_of(path)
     if label:
@@ -421,7 +421,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the first two keys of a curve by the rules."""
+    """Set interpolation and handle types of a curve's newest key if it has at most two keys."""
     if len(curve.keyframe_points) > 2:
         return  # Blender copied them from the previous key
     for key in (

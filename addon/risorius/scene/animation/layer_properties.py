@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layers of a character as properties of its control armature: saved, copied and overridden."""
+"""Defines the layers of a character as properties, which Blender saves, copies and overrides."""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
@@ -45,12 +45,12 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property without animation. Args: kind  function of bpy.props, given  its arguments."""
+    """A property without keys and drivers. Args: kind  from bpy.props, given  its arguments."""
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 
 class RISORIUS_PG_warp(bpy.types.PropertyGroup):
-    """A frame of the scene and the frame of the source that is shown there."""
+    """A warp point: a scene frame, and the frame of the layer's animation that plays at it."""
 
     frame: _still(
         bpy.props.FloatProperty,

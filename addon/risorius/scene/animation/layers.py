@@ -105,9 +105,9 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point to a layer that pins the source frame shown at a scene frame to this frame.
+    """Add a warp point at a scene frame, with the source frame that the layer shows there.
 
-    The first warp point also adds one at each end, so that all frames keep their timing.
+    The first warp point also adds one at each end of the layer, so that the timing does not change.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -193,7 +193,7 @@ def remove(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
     """
     layer = places(controls)[place]
     below = of(controls).index(layer) - 1
@@ -224,7 +224,7 @@ def move(controls: ArmatureObject, place: int, up: bool) -> bool:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
         up: True: up; False: down.
 
     Returns:
@@ -252,7 +252,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
 
     Returns:
         The copy.
@@ -342,8 +342,8 @@ def fire(
 
     Args:
         controls: control armature of the character.
-        name: of the reaction, see known_reactions.
-        frame: of the scene; need not be whole.
+        name: name of the reaction, see known_reactions.
+        frame: frame of the scene; need not be whole.
         strength: 0 to 1, factor on the reaction's values.
 
     Returns:
@@ -361,7 +361,7 @@ def unfire(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: in the list of fired reactions, from 0.
+        place: index of the reaction in `reactions_of`.
     """
     reactions_of(controls).remove(place)
     controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))

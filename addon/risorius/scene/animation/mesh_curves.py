@@ -41,7 +41,7 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The mesh to read: a selected object of `sources`, else its only object, else None.
+    """The mesh to read: a selected object in `sources`, else the only object in it, else None.
 
     Args:
         context: has the scene.
@@ -118,11 +118,11 @@ def recorded(
 
 
 class MeshCurvesTask(Task["native.SolvedClip"]):
-    """Solves the curves of a recorded mesh in a thread.
+    """Solves control curves that reproduce a recorded mesh, in a background thread.
 
     Attributes:
         mesh: index of the mesh in the DNA file.
-        mm: length of the file's unit in millimetres.
+        mm: length of the DNA file's unit in millimetres.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
             item: the recorded mesh.
             frames: float32[F, V, 3], from `recorded`.
             rate: frames per second.
-            relative: True: fit the motion relative to the mesh's neutral; False: fit the shape.
+            relative: True: fit the motion away from the mesh's neutral shape; False: fit its shape.
             sparse, smooth: see risorius.solve_clip.
 
         Raises:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture range of a face as properties of its control armature: saved, copied, overridden."""
+"""Defines the capture ranges of a face as properties, which Blender saves and overrides."""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
@@ -19,7 +19,7 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Number of changes of any range.
+# Counts the changes of ranges of all faces, so that caches notice them (see `changes`).
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -28,7 +28,7 @@ def _touch(_self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
 
 
 def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
-    """Keep the extreme at 0.1 to 1.9 above the neutral, and count the change."""
+    """Limit the extreme to 0.1 to 1.9 above the neutral value, and count the change."""
     wanted = min(max(self.extreme, self.neutral + _LEAST), self.neutral + _MOST)
     if abs(wanted - self.extreme) > 1e-6:
         self.extreme = wanted
@@ -36,7 +36,7 @@ def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_range(bpy.types.PropertyGroup):
-    """The range of one control; its name is the raw control's."""
+    """The capture range of one control; the entry has the name of the raw control."""
 
     used: bpy.props.BoolProperty(
         name="Use",
@@ -82,7 +82,7 @@ def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, also if the face does not use them.
+    """The ranges of a face, even if they are switched off.
 
     Args:
         controls: the control armature. A row without a valid range counts as off.
@@ -93,7 +93,7 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
     module = native.part("ranges")
     found = {}
     for row in rows_of(controls):
-        # Blender stores float32, so 0.67 is rounded to 0.67 again.
+        # Blender stores 0.67 as the float32 number 0.670000017; rounding restores 0.67.
         range_ = module.Range(round(row.neutral, 5), round(row.extreme, 5))
         reason = "" if row.used and range_.trouble() is None else row.reason or "off"
         found[row.name] = module.Learned(range_, reason)

@@ -25,7 +25,7 @@ def sources(context: Context) -> list[MeshObject]:
 
 
 def source_of(context: Context) -> MeshObject | None:
-    """The mesh to read: a selected object of `sources`, else its only object, else None."""
+    """The mesh to read: a selected object in `sources`, else the only object in it, else None."""
     there = sources(context)
     selected = cast(list[MeshObject], context.selected_objects)
     chosen = [item for item in selected if item in there]

@@ -51,7 +51,7 @@ class _Hand:
     Attributes:
         frame: frame of the scene.
         stand: the moved controls and their values.
-        held: True: the user inserted a key, so the tweak gets a key even without a difference.
+        held: True: the user inserted a key, so the tweak gets a key even if no value changed.
     """
 
     frame: float
@@ -61,11 +61,11 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """The evaluated controls below a tweak on a face with NLA strips.
+    """Cached pose of the controls without the tweak, for a face with NLA strips.
 
     Attributes:
         frame: frame of the scene.
-        strips: the strips at that time.
+        strips: settings of the NLA strips when `stand` was evaluated, from `_strips`.
         stand: the values of the controls.
     """
 
@@ -76,8 +76,8 @@ class _Below:
 
 # Session uid of a control armature -> controls that the user moved without a key.
 _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
-# Session uid of a control armature checked since load or undo -> cached pose below its tweak, or
-# None.
+# Session uid of a control armature whose action was checked since load or undo -> its cached pose
+# without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
 # Session uid of a control armature -> reason why the tweak refused its last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
@@ -104,7 +104,7 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
 
 def end(controls: ArmatureObject) -> None:
-    """Store moves without a key in the tweak, and turn the tweak off. Its layer stays."""
+    """Store moved controls that have no new key in the tweak, and end it. Its layer stays."""
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -133,12 +133,12 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Move new keys of the action below the tweak into the tweak, and note moves without a key.
+    """Move new keys of the active action into the tweak, and note controls moved without a key.
 
     Args:
         controls: an edited control armature.
         frame: current frame of the scene.
-        edited: whether its action was edited too.
+        edited: whether the active action was edited too.
     """
     tweak, uid = tweaks.of(controls), controls.session_uid
     if tweak is None:
@@ -158,7 +158,7 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """The pose of the controls below the tweak. On a face with NLA strips it is cached, because
+    """The pose of the controls without the tweak. On a face with NLA strips it is cached, because
     Blender has to evaluate the strips."""
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
@@ -186,10 +186,10 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 
 
 def settle(controls: ArmatureObject) -> None:
-    """Store moves without a key in the tweak; moves outside its frame range are dropped.
+    """Store moved controls that have no new key in the tweak, unless the frame is outside it.
 
     Args:
-        controls: a control armature; the scene may be at another frame than the move.
+        controls: a control armature. The scene may have changed its frame since the move.
     """
     hand = _hands.pop(controls.session_uid, None)
     if hand is not None and tweaks.of(controls) is not None:
@@ -297,8 +297,8 @@ def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve)
 def _take_all(
     controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
 ) -> None:
-    """Store the controls of several frames in the tweak, then reset the controls of other frames to
-    the current frame.
+    """Store the moved controls of several frames in the tweak. Then set controls that were keyed at
+    other frames to their pose without the tweak at the current frame.
 
     hands: one for each frame, the current frame last.
     """
@@ -335,7 +335,7 @@ def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
 ) -> list[float] | None:
-    """The frames of keys that `before` lacks; None if the curve has any other edit."""
+    """The frames of keys that were inserted or overwritten since `before`; None for other edits."""
     frames, values = clip_actions.key_points(curve)
     if before is None:
         return frames.tolist()
@@ -382,7 +382,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the pose below the tweak; None if none does."""
+    """The controls that differ from the pose without the tweak; None if none does."""
     rig = parts.rig_of(controls)
     if rig is None:
         return None

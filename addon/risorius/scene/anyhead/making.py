@@ -21,7 +21,7 @@ _FITTED = 0.6  # share of the total time after which the head has its expression
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task of two stages; `stage` is FIT or JOINTS."""
+    """A task that first fits the head (`stage` FIT), then makes joints (`stage` JOINTS)."""
 
     stage = FIT
 
@@ -30,7 +30,7 @@ class HeadTask(Task[Result], Generic[Result]):
 
         Args:
             stage: FIT or JOINTS.
-            begin, end: shares of the task at which the stage begins and ends.
+            begin, end: progress of the task, 0 to 1, when the stage begins and ends.
         """
         self.stage = stage
 
@@ -65,7 +65,7 @@ class Template(NamedTuple):
 
 
 class Transfer(NamedTuple):
-    """Options of the transfer.
+    """Options for the transfer of expressions from a template face to a head.
 
     Attributes:
         strength: factor of all expressions, 0 to 1.5.
@@ -174,7 +174,7 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The textures of a face's DNA file, by their paths for the new file.
+    """The texture files of a face as bytes, by the paths that belong to the new DNA file.
 
     Args:
         dna: the face.

@@ -2,7 +2,8 @@
 """Bakes the animation of a face to actions, and restores the live face.
 
 Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
-file looks the same in a Blender without the add-on. Each part stores its earlier animation.
+file looks the same in a Blender without the add-on. Armatures and shape keys store their earlier
+animation for the way back.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class BakeOptions:
         kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
         start, end, step: range and step in frames; the step may be a fraction.
         lod: level of detail of a RESULT; -1: the level in the viewport.
-        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; others keep their state.
+        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; others do not move.
         error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
         strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """
@@ -65,7 +66,7 @@ def baked(rig: ArmatureObject) -> str:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about a baked character; "" if it is not baked."""
+    """The sentence with which the panel describes a baked character; "" if it is not baked."""
     kind = baked(rig)
     if not kind:
         return ""
@@ -82,7 +83,7 @@ def words(rig: ArmatureObject) -> str:
 
 
 def _kept(owner: ArmatureObject) -> Mapping[str, object]:
-    """The stored notes of a bake on an armature; empty if they have another form."""
+    """The frame range and settings that a bake stored on an armature; empty if they are damaged."""
     return saved.table(owner, parts.BAKED) or {}
 
 

@@ -13,7 +13,9 @@ OPENED = "risorius_opened"  # on a Key: "channel name" of each shape key that wa
 
 
 def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
-    """The real shape keys of a mesh by channel; in LIVE mode, keys that the bake needs are added.
+    """The shape keys of a mesh that belong to channels. In LIVE mode, missing keys are added.
+
+    A mesh in LIVE mode has one key with the sum of all channels, which a bake cannot animate.
 
     Args:
         item: mesh object.
@@ -44,7 +46,7 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
 
 
 def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
-    """Remove the shape keys of a bake. Keys that the user edited stay and get their drivers.
+    """Remove the shape keys of a bake. A key that the user edited stays, driven by its channel.
 
     Args:
         item: mesh object; its baked action is removed already.

@@ -83,7 +83,7 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """Tracks of other animated properties, from their samples."""
+    """Tracks of sampled properties that the user animates and the rig does not compute."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1
@@ -202,7 +202,7 @@ def key_tracks(
         others: path -> values of keys that the user animates, see Samples.
 
     Returns:
-        One track for each of these keys, and for each key in `others`.
+        One track for each key in `names`, and for each path in `others`.
     """
     tracks = list(_others(others or {}, key))
     for channel, name in names.items():
@@ -228,7 +228,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider or bone that never leaves its value.
+        Tracks. `actions.write` makes no curve for a slider that stays at rest, or for a bone that
+        keeps its current value.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}
@@ -248,7 +249,7 @@ def control_tracks(
 
 
 def _control_bone(bone: bpy.types.PoseBone, matrices: NDArray[np.float64]) -> Iterator[Track]:
-    """Tracks of a control bone in its own rotation mode."""
+    """Tracks of location, rotation and scale of a control bone, in the bone's rotation mode."""
     turn = _TURNS.get(bone.rotation_mode, "rotation_euler")
     rows = {"location": [], turn: [], "scale": []}
     last = None

@@ -195,7 +195,7 @@ def assign_action(
     Args:
         target: the animation data or the strip.
         action: any action.
-        slot: of the action; None lets Blender choose. Must be None before Blender 4.4.
+        slot: slot of the action; None lets Blender choose. Must be None before Blender 4.4.
     """
     target.action = action
     if slot is not None:

@@ -14,7 +14,7 @@ from .blender_types import ArmatureObject
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
-# Datablocks with a node tree inside; scenes have one up to Blender 4.5.
+# Types of datablocks that contain a node tree; scenes have one up to Blender 4.5.
 _WITH_NODES = (
     bpy.types.Material,
     bpy.types.World,
@@ -51,7 +51,7 @@ def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.Dri
 
 
 class Entries:
-    """Updates drivers that read single channels or maps after the order of these changed.
+    """Redirects drivers that read a channel or a map by index after the indices have changed.
 
     Args:
         rig: deforming armature.
@@ -100,7 +100,7 @@ class Entries:
         return f'["{bpy.utils.escape_identifier(key)}"]'
 
     def move(self) -> None:
-        """Write the new data paths; the new properties must have been evaluated before."""
+        """Write the new data paths to drivers; Blender must have evaluated the new properties."""
         for target, path in self._moves:
             target.data_path = path
 
@@ -148,7 +148,7 @@ def plain_driver(
         curve: F-curve of a new driver without variables.
         owner: the object with the property.
         data_path: path from the object to one number.
-        name: of the driver's variable.
+        name: name of the driver's variable.
     """
     driver = curve.driver
     assert driver is not None

@@ -37,7 +37,8 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: value that was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
-# On a mesh object in Direct mode (see direct.py): the persistent uid of the modifier.
+# On a mesh object in Direct mode (see direct.py): persistent uid of its Armature modifier, which
+# is switched off.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
 JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an older file showed its joints
@@ -89,7 +90,8 @@ def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
 def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
     """Set a custom property that points to another part, also on overrides of linked characters.
 
-    It is marked as overridable, because Blender otherwise resets it to the library's at load.
+    It is marked as overridable, because Blender otherwise resets it to the value in the library
+    when the file is opened.
 
     Args:
         owner: the object that gets the property.

@@ -87,7 +87,7 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
 
 
 def _packed(content: bytes) -> bytes:
-    """The bytes as a zlib stream, uncompressed if it would exceed the limit for unpacking."""
+    """A zlib stream of bytes; not compressed if unpacking would then exceed the limit."""
     # Level 2 takes a sixth of the time of level 6 for 9 % more bytes.
     packed = zlib.compress(content, 2)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)

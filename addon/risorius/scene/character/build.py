@@ -52,7 +52,7 @@ class _File:
     """A DNA file that was read and compiled.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         content: bytes of the file.
         dna: Dna parsed from these bytes.
         rig: risorius.Rig compiled from the Dna.
@@ -82,7 +82,7 @@ def import_file(
 
     Args:
         context: a Blender context with scene and view layer.
-        path: of the DNA file.
+        path: path of the DNA file.
         options: levels, shapes and materials to build.
         progress: function that is called with the progress, 0 to 1.
 
@@ -168,7 +168,7 @@ def _first(plan: plans.CharacterPlan) -> int:
 
 
 def settle(context: Context, *items: bpy.types.Object) -> None:
-    """Update the evaluated copies after adding custom properties.
+    """Make Blender evaluate objects again after custom properties were added to them.
 
     Args:
         context: its view layer is updated.
@@ -240,7 +240,7 @@ def _kind_of_keys(mode: str) -> str:
 
 
 def choose_skinning(rig: ArmatureObject, mode: str) -> None:
-    """Store whether a face may use Direct mode; only LIVE forbids it.
+    """Store whether a face may use Direct mode (skinning/direct.py), which LIVE forbids.
 
     Args:
         rig: the deforming armature.
@@ -253,7 +253,7 @@ def choose_skinning(rig: ArmatureObject, mode: str) -> None:
 
 
 def channel_labels(dna: native.Dna) -> list[str]:
-    """Unique names for real shape keys, one for each blend shape channel."""
+    """Unique names for the shape keys of KEYS mode, one for each blend shape channel."""
     return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
 
 
@@ -264,7 +264,7 @@ def _into_place(
     rig: ArmatureObject,
     controls: ArmatureObject,
 ) -> None:
-    """Give the collection its final name, and select the controls alone."""
+    """Give the character's collection its final name, and select only the control armature."""
     workshop.name = plan.name
     compat.deselect_all(context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
@@ -272,7 +272,7 @@ def _into_place(
 
 
 def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
-    """Switch the meshes of a character to another kind of shapes.
+    """Switch the shape keys of a character's meshes to another mode.
 
     Args:
         rig: the deforming armature.

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds mesh objects with skin weights, and switches their shape keys between LIVE and KEYS."""
+"""Builds mesh objects with skin weights, and switches their shape keys between two modes.
+
+In KEYS mode a mesh has a real key for each blend shape channel. In LIVE mode it has one live key,
+to which the evaluator writes the sum of all channels.
+"""
 
 from __future__ import annotations
 
@@ -141,7 +145,7 @@ def live_block(item: MeshObject) -> bpy.types.ShapeKey | None:
     """The live key, also after renaming; None if the mesh has none.
 
     Its interpolation identifies the key, because this setting has no effect on relative keys and
-    survives renames, reordering, copies and files. The search by name is only a shortcut.
+    survives renaming, reordering, copying and saving. The search by name is only a shortcut.
     """
     key = item.data.shape_keys
     if key is None:
@@ -255,7 +259,7 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        Result of user_edits.key_edits.
+        bool[V], whether a vertex was edited, and float64[V, 3] offsets, see user_edits.key_edits.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
@@ -266,7 +270,7 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
 
     Args:
         item: the mesh object.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:
@@ -289,7 +293,7 @@ def add_channel_key(
         item: the mesh object.
         rig: deforming armature with the weights of channels.
         channel: index of the blend shape channel.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:
@@ -356,7 +360,7 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add the live key, for the sum of channels or final positions. Args: item  the mesh object."""
+    """Add a live key to a mesh. Args: item  the mesh object."""
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)

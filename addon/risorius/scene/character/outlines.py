@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hides and shows the outlines of control bones, and removes them from collections."""
+"""Hides and shows the outlines (custom shapes) of control bones, and places them."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def stand_beside(rig: ArmatureObject) -> int:
 
 
 def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]:
-    """(name of the part, bone) of each control bone with an outline."""
+    """(role such as "head", bone) of each control bone with an outline."""
     for bone in controls.pose.bones:
         part = bone.bone.get(parts.PART)
         if isinstance(part, str) and bone.custom_shape is not None:

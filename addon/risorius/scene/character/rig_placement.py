@@ -49,7 +49,7 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig has a matrix up to rounding. Args: wanted  float64, 16 numbers."""
+    """Whether a rig's object matrix equals a matrix, up to rounding. Args: wanted  float64[16]."""
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
@@ -77,7 +77,7 @@ def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
     """Move a new face beside its source mesh, along +x.
 
     Args:
-        rig: deforming armature of the face; its DNA file has the origin of the mesh object.
+        rig: deforming armature of the face, which has the same origin as the mesh object.
         item: the mesh object.
     """
     place = item.matrix_world.translation
@@ -163,7 +163,7 @@ def attach(
     hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
-    # Relative to the body's rest pose, so that the body's current pose moves the face.
+    # The face is attached relative to the body's rest pose, so that the current pose moves it.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
     hold.set_inverse_pending = False
@@ -193,7 +193,7 @@ def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
 
 
 def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
-    """Rotations of a body's neck and head for the face, relative to the base bone.
+    """Rotations of a body's neck and head bones, which the face adds to its own.
 
     Copy Rotation constraints are no alternative, because they assume equal object rotations, and
     bodies from other programs are rotated and scaled objects.
@@ -203,7 +203,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; missing without a rotation.
+        "neck" and "head" -> Quaternion in the control armature's axes, without bones at rest.
     """
     hold = body_of(controls)
     if hold is None:
@@ -242,7 +242,7 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move (and scale) the face so that its head and neck bones meet the body's at rest."""
+    """Move the face so that its head (or neck) bone meets the body's at rest, and scale it."""
     own = controls.data.bones
     pairs = [
         (

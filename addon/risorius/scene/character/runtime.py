@@ -103,14 +103,14 @@ class Runtime:
         return replace(self, board=PRIMARY)
 
     def with_board(self, kind: str) -> Runtime:
-        """This Runtime for a kind of face board. Args: kind  PRIMARY or COMPLETE."""
+        """This Runtime, or its copy for the primary board. Args: kind  PRIMARY or COMPLETE."""
         assert self.board == COMPLETE or kind == PRIMARY
         return self._with_primary if kind != self.board else self
 
     @cached_property
     def table(self) -> board_table.BoardTable:
-        """The table from GUI to raw controls: of the primary board, else of the file; made from the
-        raw controls if the file has none."""
+        """The table that converts GUI controls to raw controls: the table of the primary board, the
+        table of the file, or one GUI control per raw control if the file has no table."""
         if self.board == PRIMARY:
             return primary_table.table_of(self.labels)
         if not self.dna.gui_control_names:
@@ -122,7 +122,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board; handles of a complete board have no positions."""
+        """The handles of the face board. Their positions on a complete board are not set here."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -213,7 +213,7 @@ def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
         except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
-            # Print it once, not at every frame; the panel shows the loss too.
+            # Cache the failure, so that the error is printed once and not at every frame.
             words = names.printable(str(error)).rstrip(".")
             console.say(f"the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None

@@ -22,8 +22,8 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
 
     The slider bone is selected if it is keyed; it is locked, so nobody moves it by accident.
     Outside pose mode the keyed bones of head and eyes are selected too, so that moving a column of
-    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Handles
-    of a face board follow the rule of pose mode in every mode.
+    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Keyed
+    handles of a face board are selected only if none of them is selected, in every mode.
 
     Args:
         controls: control armature of the face.
@@ -76,7 +76,7 @@ def show_object(context: Context, controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject) -> None:
-    """Make slider keys visible if Blender's operators inserted new ones.
+    """Make slider keys visible if Blender's operators inserted new slider keys.
 
     Args:
         controls: a control armature whose action was edited.

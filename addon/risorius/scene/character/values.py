@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the arrays of channels and animated maps that drivers of a character read."""
+"""Writes the arrays of channels and animated maps that drivers of a character read.
+
+Materials read the maps from one mesh of the character, the carrier.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ def write(
         rig: deforming armature; Blender is not notified of its change.
         maps: float32[M], values of the animated maps.
         channels: float32[C], values of the blend shape channels.
-        simulated: function that returns whether an edit of a mesh object resets a simulation.
+        simulated: function that returns whether tagging a mesh object would reset a simulation.
     """
     _fill(rig, parts.CHANNELS, channels)
     _fill(rig, parts.MAPS, maps)

@@ -56,7 +56,7 @@ def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
     """The sliders that move a selected handle at least _SHARE as far as its strongest slider.
 
-    Sliders that drivers or layers lead are left out.
+    Sliders that are moved by drivers or layers are left out.
 
     Args:
         context: has the visible scene.

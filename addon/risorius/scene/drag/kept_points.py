@@ -22,7 +22,7 @@ def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        counts: number of vertices of each mesh of the DNA; points beyond them are left out.
+        counts: number of vertices of each DNA mesh; points with a larger index are left out.
     """
     controls = parts.controls_of(rig)
     numbers = saved.wholes(controls, kind) if controls is not None else []

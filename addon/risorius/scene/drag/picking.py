@@ -44,7 +44,7 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex of the first face on a ray, or None if another object comes first.
+    """The vertex at which a ray meets a face; None if it first meets another object or nothing.
 
     Args:
         context: its evaluated scene is searched.

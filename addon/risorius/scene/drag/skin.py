@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the visible meshes of a face: vertices in world space, and mirrored vertices."""
+"""Reads vertices of a face's visible meshes in world space, and finds mirrored vertices."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Skin:
 
     @classmethod
     def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
-        """The skin of a character.
+        """Collect the visible meshes of a character.
 
         Args:
             context: has the visible scene.
@@ -91,7 +91,7 @@ class Skin:
         return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
 
     def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
-        """(vertex, position in world space) of a polygon's vertices; None as in `seen`.
+        """(vertex, position in world space) of a polygon's vertices; None if `seen` gives None.
 
         Args:
             mesh: index of the mesh in the DNA file.

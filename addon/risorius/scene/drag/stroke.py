@@ -85,7 +85,7 @@ class Stroke:
         point: dragged (mesh, vertex).
         options: options; they may change during the drag.
         skin: the meshes in the scene.
-        state: sliders at the press.
+        state: sliders at the mouse press.
         turns: transforms from file space to world space.
         reach: float32[3, R], motion of the point per control, in file units.
         raw: float32[R], current raw controls of the face.
@@ -167,7 +167,7 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the sliders of the press. Args: context  with the visible view layer."""
+        """Restore the sliders of the mouse press. Args: context  with the visible view layer."""
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)
@@ -244,12 +244,13 @@ class Stroke:
         return native.module().ControlLimits(free, self.state.low, self.state.high)
 
     def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
-        """Targets float64[P, 3] and axes float64[P, 3, 3] of the solver, in file space."""
+        """Targets float64[P, 3] of the points and axes float64[P, 3, 3] that weigh the errors."""
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
         along = np.eye(3)
         if view is not None:
-            # Two axes lie in the screen plane; the third has length 0, so that the depth is free.
+            # The solver measures errors along two axes in the screen plane. The third axis has
+            # length 0, so that the depth is free.
             rows = _across(view) @ anchors.maps[0]
             along[:2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
             along[2] = 0.0

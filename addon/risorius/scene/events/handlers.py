@@ -75,8 +75,8 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether the changing frame belongs to a render; during a render job, frames that the
-    interface changes in the main thread do not."""
+    """Whether a render changed the frame. During a render job the interface may change it too, but
+    only in the main thread."""
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -104,12 +104,12 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. The writes tag rigs but not controls, so that updates do not repeat."""
+    """React to edits. Tag no control armature, because that would trigger this handler again."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
     board.note_edit()
-    # During a render job only the frames of the render may be written.
+    # During a render job only the handlers of its frames may write, not the handlers of edits.
     if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
         return
     if evaluate.is_paused():
@@ -182,7 +182,7 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Remove outlines of newly appended faces from the scene; later links by the user stay."""
+    """Remove outlines of newly appended faces from the scene; the user may link them later."""
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
@@ -219,7 +219,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Let shown_keys and tweak_guard react to keys and moves by Blender's own operators."""
+    """Tell shown_keys and tweak_guard that Blender's operators may have set keys or moved bones."""
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None
@@ -252,7 +252,7 @@ def _concerned(
 
 @persistent
 def _loaded(*_arguments: object) -> None:
-    """After load: Blender calls no update handler when it evaluates a file for the first time."""
+    """After load: evaluate the faces, because Blender calls no update handler for a new file."""
     context = current_context()
     layer = context.view_layer
     session.end("load")
@@ -274,7 +274,7 @@ def _loaded(*_arguments: object) -> None:
 
 @persistent
 def _restored(*_arguments: object) -> None:
-    """After load, undo and redo: forget the last written values, because they do not apply.
+    """After load, undo and redo: forget the last written values, which may differ from the data.
 
     Pose bones must not be read here: until the next update, those of restored objects point to
     freed bones, and Blender would crash.
@@ -324,7 +324,7 @@ def _before_save(*_arguments: object) -> None:
 
 @persistent
 def _saved(*_arguments: object) -> None:
-    """After a save: restore the state that files must not contain."""
+    """After a save: restore Direct mode, solo, mute and heat maps, which files do not contain."""
     if native.problem():
         return
     ordinary.take_off(parts.rigs())

@@ -232,8 +232,8 @@ def _shapes(
     weights: NDArray[np.float32],
     options: ShipOptions,
 ) -> None:
-    """Give a copied mesh the real shape keys to export with their animation, and remove the others
-    of Risorius."""
+    """Give a copied mesh a shape key with baked animation for each exported channel, and remove the
+    other keys that Risorius made."""
     key = made.data.shape_keys
     if key is None:
         return
@@ -274,7 +274,7 @@ def _forget(item: bpy.types.Object) -> None:
 
 
 def _everything() -> dict[str, set[bpy.types.ID]]:
-    """Collection in bpy.data -> its datablocks; shape keys are left out."""
+    """Name of a collection in bpy.data -> its datablocks, for all collections but shape_keys."""
     return {
         kind.identifier: set(getattr(bpy.data, kind.identifier))
         for kind in bpy.data.bl_rna.properties
@@ -283,7 +283,7 @@ def _everything() -> dict[str, set[bpy.types.ID]]:
 
 
 def _remove_all_but(before: Mapping[str, set[bpy.types.ID]]) -> None:
-    """Remove all datablocks that are not in `before`, also those of a failed exporter."""
+    """Remove all datablocks that are not in `before`, even if a failed exporter left them."""
     new = [
         item
         for kind, there in before.items()

@@ -52,8 +52,8 @@ class _Flat:
         sources: input "color", "alpha" or "roughness" -> shader_inputs.Source.
         images: input -> reused or baked image, including "normal".
         baked: inputs to bake.
-        mean: True: roughness becomes one number, because polygons overlap in the UV map; later this
-            number.
+        mean: True: roughness becomes one number, because polygons overlap in the UV map; after the
+            bake, this number.
     """
 
     material: bpy.types.Material
@@ -289,7 +289,7 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image for a bake; roughness without opacity gets a smaller one."""
+    """An empty image for a bake. It is smaller if it stores roughness without opacity."""
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -487,7 +487,7 @@ def _pack(image: bpy.types.Image) -> None:
 
 
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
-    """A packed image (a copy if reused) with a file name that is not in `files`; it is appended."""
+    """Pack a baked image, or a copy of a reused one, with a new file name, appended to `files`."""
     taken = name not in flat.baked
     if taken:
         image = image.copy()
@@ -495,7 +495,8 @@ def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) ->
         if image.packed_file is None:
             _pack(image)
     ending = PurePath(image.filepath_raw).suffix.lower() if taken else ""
-    # Exporters identify images by their paths, and the file must not contain paths of this machine.
+    # The path is invented: exporters identify images by their paths, and the exported file must not
+    # contain paths of this machine.
     known = ending if ending in texture_search.EXTENSIONS else ".png"
     files.append(native.part("files.names").file_name(image.name, known, files))
     image.filepath_raw = f"//{files[-1]}"

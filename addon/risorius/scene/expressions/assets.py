@@ -75,7 +75,7 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
-    # A viseme is named by its name, because its label is only meant for panels.
+    # The action of a viseme gets the viseme's name, because its label is only meant for panels.
     sound = expression.group == "viseme"
     name = f"Face {expression.name if sound else expression.label}"
     old = _named(name)
@@ -122,7 +122,7 @@ def give_picture(action: bpy.types.Action, path: Path) -> bool:
 
     Args:
         action: the asset.
-        path: of the PNG file.
+        path: path of the PNG file.
 
     Returns:
         Whether the preview was set; False if the file is missing or no PNG.

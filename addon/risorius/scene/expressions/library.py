@@ -155,7 +155,7 @@ def find(items: dict[str, Item], name: str) -> Item:
 
     Args:
         items: expressions by name, from all_items.
-        name: of the expression.
+        name: name of the expression.
 
     Raises:
         LibraryError: no expression has this name.

@@ -61,7 +61,7 @@ def check(live: runtime.Runtime, item: Item) -> None:
 def goals(
     rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
 ) -> dict[str, float]:
-    """The slider values after blending an expression onto a pose, without limits.
+    """The slider values after blending an expression onto a pose, not clamped to slider limits.
 
     Args:
         rig: the character.

@@ -187,8 +187,8 @@ def _color_of(material: bpy.types.Material | None) -> list[float]:
 def _pixels(
     image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
 ) -> NDArray[np.float32] | None:
-    """float32[h, w, 4]: a reduced image; without alpha, the mean of its colours becomes the alpha.
-    None if its file is missing."""
+    """float32[h, w, 4]: an image, scaled down to at most _TEXELS. Without alpha, the mean of its
+    colours is the alpha. None if its file is missing."""
     if image.name_full not in known:
         copy = image.copy()
         try:
@@ -218,7 +218,7 @@ def make(
     """Draw pictures and write their files, without using Blender data.
 
     Args:
-        sitter: the character.
+        sitter: data of the character, from sitter_of.
         jobs: the pictures to draw.
         progress: function that is called with the progress, 0 to 1.
         cancelled: function that returns whether to stop.

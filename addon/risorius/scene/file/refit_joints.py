@@ -38,7 +38,7 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """float64[4, 4]: the matrix to append to the file's local matrix."""
+        """float64[4, 4]: factor by which the file's local matrix is multiplied from the right."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
@@ -137,7 +137,7 @@ def replace_joints(context: Context, change: Change) -> None:
 
     Args:
         context: a Blender context with a view layer.
-        change: the replacement; its bone names are filled in.
+        change: the replacement; this function sets its old_bones and new_bones.
     """
     rig, old, new = change.rig, change.old.armature, change.new.armature
     if rig.data.users > 1:
@@ -255,8 +255,10 @@ def _edit(
 def _followers(
     edit_bones: bpy.types.ArmatureEditBones, kept: Mapping[int, str], gone: Collection[str]
 ) -> list[tuple[str, str | None, Matrix | None]]:
-    """The user's own bones, parents first: (name, new parent or None to keep it, matrix relative to
-    the parent), so that they follow their joints."""
+    """The user's own bones, parents first: (name, new parent, matrix relative to the parent).
+
+    With these values the bones follow their joints. A new parent of None keeps the parent.
+    """
     ours = set(kept.values()) | set(gone)
     found = []
     for bone in edit_bones:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replaces meshes and shape keys by those of a new file, in the same objects and datablocks."""
+"""Gives existing mesh objects and datablocks the meshes and shape keys of a new DNA file."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
 def _refit(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """Refit one mesh: polygons, weights and layers, then shape keys."""
+    """Give one mesh object the polygons, weights, layers and shape keys of the new file."""
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
     same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
@@ -426,7 +426,7 @@ def _refit_shape(
 
 
 def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32 positions plus moves; positions without a move keep their bits."""
+    """float32 positions plus moves; positions with a move of 0 stay bit-identical."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
     result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)
@@ -441,7 +441,7 @@ def _points(
     channel_map: Sequence[int],
     bearer: transfer.Carry,
 ) -> NDArray[np.float32] | None:
-    """New coordinates of a key, after its relative key's; both are stored in `done`."""
+    """New coordinates of a key. It first computes the relative key, and stores both in `done`."""
     if name in done:
         return done[name]
     above = shape.relative[name]
@@ -515,7 +515,7 @@ def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
 
 
 def finish_shapes(change: Change) -> None:
-    """Set the shape mode of all meshes, which adds new keys; drivers must be updated before."""
+    """Set the mode of all meshes, which adds new keys. Drivers must have the new indices."""
     live = runtime.there(change.rig)
     labels = build.channel_labels(live.dna)
     there = parts.meshes_of(change.rig)

@@ -2,8 +2,8 @@
 """Replaces a character's DNA file and keeps its objects.
 
 The new character is built as separate objects first, so that a bad file changes nothing. Then its
-data move into the existing objects, meshes, keys and bones. References to these and the user's
-additions stay.
+data move into the existing objects, meshes, keys and bones. So references to these and additions
+by the user stay.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def replace_file(
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
-        path: of the DNA file; it may be the same file.
+        path: path of the DNA file; it may be the same file.
         progress: function that is called with the progress, 0 to 1.
 
     Returns:
@@ -172,7 +172,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
     label = former.name if former is not None else text.name
     parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
-    # Delete the new character's pointer, because its removal would remove the Text too.
+    # Delete the new character's pointer to the Text. Otherwise its removal would remove the Text.
     del fresh[parts.DNA]
     used = [r.get(parts.DNA) for r in parts.rigs()]
     if former is not None and former not in used:
@@ -312,7 +312,7 @@ def _renew_board(
 
 
 def _keep_report(change: Change) -> None:
-    """Write the report to a Text and to the console."""
+    """Write the report of a replacement to a Text and to the console."""
     name = change.rig.name.removesuffix("_rig")
     if not change.report:
         return

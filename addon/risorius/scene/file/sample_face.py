@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a sample person in a thread."""
+"""Builds the DNA file of a sample person in a background thread."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
     """A task that builds a person.
 
     Args:
-        path: of the new DNA file; its folder may contain the data package (.whl).
+        path: path of the new DNA file; its folder may contain the data package (.whl).
         person: a key of the sample package's PEOPLE.
         offline: True: do not download.
     """

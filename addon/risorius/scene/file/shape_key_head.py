@@ -115,7 +115,7 @@ def shapes_of(
 
 
 def turn_of(context: Context, item: bpy.types.Object) -> Doubles:
-    """float64[3, 3]: from object space to centimetres with x left, y up, z to the front.
+    """float64[3, 3]: from object space to centimetres; x to the head's left, y up, z to the front.
 
     Args:
         context: its scene gives the unit.
@@ -131,7 +131,7 @@ def _axes(context: Context) -> Doubles:
 
 
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """A mesh at rest, without shapes, with its Mirror modifiers applied.
+    """The basis of a mesh without its shape keys, with its Mirror modifiers applied.
 
     Args:
         context, item, head: see part_of.

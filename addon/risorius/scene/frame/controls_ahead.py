@@ -27,7 +27,8 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Session uid of the user's scene -> temporary scene with its controls.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# Whether the file was edited since the last frame; whether the file has a simulation.
+# _edited: whether the file may have been edited since the last frame. _simulated: whether it has
+# a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes that Blender evaluated since the last load, undo or redo.
@@ -66,9 +67,9 @@ def note_evaluated(scene: bpy.types.Scene) -> None:
 def is_safe(user: bpy.types.Scene) -> bool:
     """Whether the separate graph may be built before a frame of a scene.
 
-    Building it makes Blender rebuild the graph of the scene. Blender 4.2 and 4.3 crash if the
-    latter was never evaluated, such as after switching a window to the scene. If this is False, the
-    faces are updated after the frame.
+    Building it makes Blender rebuild the scene's own graph. Blender 4.2 and 4.3 crash if that graph
+    was never evaluated, such as after switching a window to the scene. If this is False, the faces
+    are updated after the frame.
 
     Args:
         user: the scene to be evaluated.
@@ -186,7 +187,7 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 
 
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
-    """Whether a graph contains the rig of any face. Args: whole  True: or any mesh of a face."""
+    """Whether a graph contains the rig of any face. Args: whole  True: or any face mesh."""
     return any(
         item.evaluated_get(graph).is_evaluated
         for rig, _controls in faces

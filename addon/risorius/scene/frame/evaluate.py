@@ -28,7 +28,7 @@ from ..skinning import bone_writer, conditions, direct, live_keys
 from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
-# Session uid of a deforming armature -> work done before this frame.
+# Session uid of a deforming armature -> work done for it before Blender evaluates this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
 # Final positions of several faces, to be written together; None: write them immediately.
 _gathered = session.value(
@@ -111,7 +111,8 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     """
     if native.problem() or is_paused():
         return
-    # If rotations are read from joints, their constraints need the rotations of this frame first.
+    # If joint rotations are read from bones with constraints, these constraints must see the neck
+    # and head of this frame, so the face is evaluated before it.
     read = _look_at_joints(controls_ahead.is_edited())
     if not controls_ahead.is_needed() and not read:
         return
@@ -133,7 +134,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
 
 
 def _look_at_joints(edited: bool) -> bool:
-    """Update the Reading of all faces once per frame.
+    """Update the Reading (see joint_readings.py) of all faces once per frame.
 
     Returns: whether a joint rotation of any face is read from its bone.
     """
@@ -352,7 +353,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), Moment.ANEW)
     context.view_layer.update()
-    # Blender 5.2 does not redraw views after an operator without anything left to evaluate.
+    # Blender 5.2 does not redraw views after an operator that leaves nothing to evaluate.
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -40,7 +40,9 @@ _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether the inputs of a face are known to depend on a face; reset if dependencies change.
+    """Whether the inputs of a face are known to depend on a face.
+
+    The record is dropped if parents, drivers or constraints have changed.
 
     Args:
         rig, controls: deforming and control armature of the face.

@@ -30,7 +30,7 @@ class Look:
 
     Attributes:
         solo: labels of the only controls that have an effect; empty: all.
-        muted: muted KINDS.
+        muted: parts of the face without effect, from KINDS: joints, shapes, maps.
         in_renders: whether renders use the setting too.
     """
 
@@ -40,7 +40,7 @@ class Look:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the whole face is shown."""
+        """Whether no control is solo and no part of the face is muted."""
         return not self.solo and not self.muted
 
 
@@ -121,7 +121,7 @@ def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArr
 
 
 def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> None:
-    """Set muted parts to rest, in place.
+    """Set the muted parts of a pose (joints, shapes or maps) to rest.
 
     Args:
         look: the setting.

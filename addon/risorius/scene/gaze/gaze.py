@@ -178,7 +178,7 @@ def _error(
 
 
 def _within(live: runtime.Runtime, side: str, angles: Float, maximum: float) -> Float:
-    """Clips yaw and pitch to the range that the look controls of a side reach at `maximum`."""
+    """Clips yaw and pitch to the angles that an eye's look controls reach at value `maximum`."""
     low, high = np.zeros(2), np.zeros(2)
     for _index, *at_one in live.look[side]:
         low = np.minimum(low, np.array(at_one) * maximum)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The geometry nodes that turn cards of hair into strands."""
+"""Builds the geometry nodes that turn hair cards into strands."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
     if kind.along:
-        # The last row has no next row: its strands slide along the segment before it.
+        # The last row has no next row, so its points slide along the segment that ends at it.
         back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
         most = min(_MOST_SLID, kind.along / unit / (_lengths(item, rows).mean() / (rows - 1)))
         share = g.random(-most, 0.4 * most, 5, lock)
@@ -158,15 +158,15 @@ def _aside(g: _Tree, lock: Socket, most: float) -> Node:
 def _slid(
     g: _Tree, mesh: Socket, place: Socket, end: Socket, start: Socket, share: Socket
 ) -> Socket:
-    """Place of a card's vertex after a strand has slid along the card.
+    """Position of a card's vertex for a strand that is shifted along the card.
 
     Args:
         g: the tree.
         mesh: the deformed cards.
-        place: the position of a vertex, a field.
-        end: place of the vertex before the slide.
+        place: the field of vertex positions.
+        end: position of the vertex without the shift.
         start: index of the vertex where the segment to the next row starts.
-        share: length of the slide as a fraction of that segment; negative: towards the root.
+        share: length of the shift as a fraction of that segment; negative: towards the root.
     """
     first, second = (
         g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))

@@ -65,9 +65,9 @@ def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) ->
 
     Args:
         rig: the character.
-        frame: first frame.
+        frame: frame at which the blink begins.
         blink: its timing.
-        rules: settings of keys.
+        rules: settings for new keys.
 
     Returns:
         The number of inserted keys.
@@ -103,7 +103,7 @@ def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> 
 
     Args:
         rig: the character.
-        frame: first frame.
+        frame: frame at which the blink begins.
         blink: its timing.
         name: name of the layer if there is none yet.
     """

@@ -30,7 +30,7 @@ _REDRAW = 0.25  # seconds between redraws of the status
 
 @dataclass
 class _State:
-    """State of the timer."""
+    """State of the timer that writes captured faces."""
 
     error: str = ""  # why the last capture ended by itself
     since_redraw: float = 0.0  # seconds
@@ -225,7 +225,7 @@ _HANDLERS = (
 
 
 def register() -> None:
-    """Add the handlers."""
+    """Add the handlers for load, save, undo and redo."""
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

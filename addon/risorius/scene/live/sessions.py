@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sessions of captured characters, and the receivers that they share.
+"""Manages the live capture sessions of characters, and the receivers that sessions share.
 
 No Blender object is kept: a character is found again each time and may be deleted.
 """
@@ -36,7 +36,8 @@ class Settings:
         everywhere: True: other computers can send; False: only this one.
         subject: name of the phone; "" for the first one received.
         smoothing: 0 to 1.
-        gain, head_gain: factors of all units and of head rotations; head_gain 0 for none.
+        gain, head_gain: factors of all captured controls and of head rotations; head_gain 0: the
+            head does not turn.
         mapping: name or file of the mapping to controls.
     """
 
@@ -110,7 +111,7 @@ def of(controls: bpy.types.Object | None) -> Session | None:
 
 
 def begin(controls: ArmatureObject, shaper: native.Shaper, settings: Settings) -> Session:
-    """Let a character follow a subject; it must not have a session.
+    """Begin a session of a character that has none, so that it follows a subject.
 
     Args:
         controls: its control armature.

@@ -156,5 +156,6 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
-            # Otherwise a library override loses the value at load, and `flag` counts as the user's.
+            # Otherwise a library override loses the value when the file is opened, and the flag
+            # would count as a choice of the user.
             item.property_overridable_library_set(f'["{written}"]', True)

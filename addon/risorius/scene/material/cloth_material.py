@@ -12,7 +12,7 @@ _NEAR, _FAR = 7.0, 14.0  # camera distances in eye distances: threads begin to f
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of a material.
+    """Build the node tree of a cloth material.
 
     Args:
         graph: Graph of the material.
@@ -32,7 +32,7 @@ def build(graph: Graph, look: Look) -> None:
     turns = _THREADS / look.unit
     across = graph.math("SINE", graph.math("MULTIPLY", graph.math("ADD", x, y), turns))
     along = graph.math("SINE", graph.math("MULTIPLY", z, turns))
-    # Far away a thread is smaller than a pixel and would flicker.
+    # The threads fade with distance, because threads smaller than a pixel would flicker.
     away = graph.node("CameraData").outputs["View Distance"]
     span = (_FAR - _NEAR) * look.unit
     near = graph.math("DIVIDE", graph.math("SUBTRACT", _FAR * look.unit, away), span, clamp=True)

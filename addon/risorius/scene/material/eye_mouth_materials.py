@@ -10,14 +10,14 @@ from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Color, Graph, Value
 
-# Mesh attributes. EYES: x and height from the eye's axis in radii, 1 on the front half; TEETH:
-# place along the arch, pi per tooth, and height, -1 to 1; MOUTH: depth behind the foremost vertex
-# in eye distances.
+# Mesh attributes of each vertex. EYES: x and height relative to the eye's axis, in eye radii, and
+# 1 on the front half, else 0. TEETH: position along the arch, pi per tooth, and height, -1 to 1.
+# MOUTH: depth behind the foremost vertex, in eye distances.
 EYES = "risorius_eye"
 TEETH = "risorius_teeth"
 MOUTH = "risorius_mouth"
 
-# Linear colours, chosen by eye.
+# Linear RGB colours, tuned by hand in renders.
 _SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
 _PUPIL, _IRIS_IN, _IRIS_OUT = (0.002, 0.002, 0.002), (0.19, 0.10, 0.045), (0.055, 0.066, 0.05)
 _LIMBUS = (0.022, 0.022, 0.02)
@@ -26,8 +26,9 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Lips and cheeks shade the inside of a mouth. Without cast shadows (Material Preview, exports)
-# molars would be as bright as incisors.
+# Depth in the mouth in eye distances, and colour by which the surface is multiplied there: lips and
+# cheeks shade the inside. Without cast shadows (Material Preview, exports) molars would be as
+# bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -39,7 +40,7 @@ _COARSE = 1500  # vertices: a mesh with fewer has no separate teeth, so the mate
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of a material by the kind of its mesh.
+    """Build the node tree of a material by the kind of its mesh.
 
     Args:
         graph: Graph of the material.
@@ -275,7 +276,7 @@ def lashes(graph: Graph, look: Look) -> None:
         alpha = graph.image(mask, label="Alpha").outputs["Color"]
     elif picture is not None:
         node = graph.image(picture, label="Colour")
-        # A picture without alpha shows hairs on a plain ground, so the noise pattern stays.
+        # An image without alpha shows hairs on a plain ground, so the noise pattern is used.
         alpha = node.outputs["Alpha"] if picture.channels == 4 else alpha
         color = node.outputs["Color"] if picture.channels == 4 else color
     graph.set(Base_Color=color, Alpha=alpha, Roughness=_film(graph, look, 0.4, 0.6))

@@ -15,7 +15,7 @@ _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of the material of scalp hair, brows or a beard.
+    """Build the node tree of the material of scalp hair, brows or a beard.
 
     Args:
         graph: Graph of the material.

@@ -28,9 +28,9 @@ class Look:
         has_uvs: whether the mesh has a UV map.
         simple: True leaves out subsurface scattering, relief and maps.
         cornea: whether the face has a mesh of corneas over its eyes.
-        uses: uses of the animated maps.
-        areas: areas of a face that this mesh has.
-        border: whether the mesh has an open border away from the face.
+        uses: effects of the animated maps of the face.
+        areas: skin areas of a face, such as the forehead, that this mesh has.
+        border: whether the mesh has an open border away from the face, such as at the neck.
         found: texture_search.TexturePlan.
         images: loader of images.
         atlas, places: image with the wrinkle masks, and the place of each region in it.

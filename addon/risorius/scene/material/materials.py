@@ -223,8 +223,10 @@ def _add(
 def _add_border(
     mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
 ) -> None:
-    """Write the closeness to an open border away from the face, 1 at the border, if there is
-    one."""
+    """Write an attribute: 1 at an open border away from the face, falling to 0 with distance.
+
+    A mesh without such a border gets no attribute.
+    """
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)
     used = np.empty(len(mesh.loops), np.int32)
@@ -273,8 +275,8 @@ def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArr
 def _tooth_coordinates(
     points: NDArray[np.float32] | NDArray[np.float64], unit: float
 ) -> NDArray[np.float64]:
-    """float64[V, 3]: place along the arch, pi per tooth; height from the mesh's middle, -1 to 1;
-    0."""
+    """float64[V, 3]: position along the arch, pi per tooth; height from the mesh's middle, -1 to
+    1; and 0."""
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     half = max((high[0] - low[0]) / 2, 1e-9)

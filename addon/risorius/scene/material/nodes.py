@@ -244,7 +244,7 @@ class Graph:
 
         Args:
             height: 0 to 1.
-            distance: Blender units of height 1.
+            distance: relief in Blender units that a height of 1 means.
             normal: normal without the relief; None for the surface's own.
             strength: 0 to 1.
         """

@@ -19,7 +19,7 @@ from ..base import session
 from ..base.blender_types import Context, MeshObject
 
 PREVIEW = "risorius_mix_preview"  # custom property of the object that shows the mix
-# Path -> (time of change, size), Dna.
+# Path -> ((time of the last change, size in bytes) of the file, its Dna).
 _read: dict[str, tuple[tuple[float, int], native.Dna]] = session.table(
     "parents.read", ("unregister",)
 )
@@ -34,7 +34,7 @@ class MixError(FaceError, ValueError):
 
 
 def region_names() -> tuple[str, ...]:
-    """The names of the regions of a face that can be mixed with shares of their own."""
+    """The names of the regions of a face for which the user can set other shares of the parents."""
     return tuple(native.part("mixing").REGIONS)
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Causes of the motion of a vertex, firing correctives, and correctives of a control, in
-millimetres."""
+"""Finds the causes of a vertex's motion, firing correctives, and the correctives of a control.
+
+Motions are in millimetres.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,9 @@ from . import displacement, present
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
 _LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
-# Deforming armature -> its last result.
+# Session uid of a deforming armature -> last result of `of_vertex`.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
-# Deforming armature -> firing correctives, and the inputs of that result.
+# Session uid of a deforming armature -> (inputs of `strongest`, its last result).
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 
@@ -151,7 +153,7 @@ def firing(now: present.Present) -> list[int]:
 
 
 def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
-    """For each of some controls, the current pose without the effect of this control.
+    """Index of a control -> the current pose without the effect of this control.
 
     Args:
         now: the current face.

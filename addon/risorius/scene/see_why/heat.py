@@ -35,9 +35,9 @@ from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
-# Deforming armature -> inputs of its colours.
+# Session uid of a deforming armature -> values from which its colours were computed.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
-# Deforming armature -> its map while a file is saved.
+# Session uid of a deforming armature -> (kind, what) of the map that is removed during a save.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 
@@ -50,7 +50,7 @@ class Heat:
         kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
             neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
         what: label of the control, index of the corrective, or index of the layer.
-        most: millimetres of the hottest colour.
+        most: motion in millimetres that gets the hottest colour.
     """
 
     kind: str

@@ -56,7 +56,7 @@ class Names(NamedTuple):
 
     @property
     def unknown(self) -> int:
-        """The number of unknown names without the user's assignment."""
+        """The number of keys whose name is unknown and that the user has not assigned."""
         return sum(not row.is_known and not row.is_said for row in self.rows.values())
 
 
@@ -101,7 +101,7 @@ def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
 
 
 def own_control(key: str) -> str:
-    """The name of a key's own control.
+    """The name of a new control that belongs only to this key.
 
     Args:
         key: name of the key; it may contain letters that are invalid in controls.
@@ -190,7 +190,7 @@ UNIT = "UNIT"
 
 @session.cached(("unregister",), 1)
 def choices() -> tuple[Choice, ...]:
-    """All possible assignments of a key: ARKit units first, because most people know them, then
+    """All possible assignments of a key: first ARKit units, which most people know, then
     controls and expressions."""
     vocabulary, words = native.part("controls.vocabulary"), tables.controls()
     units = [

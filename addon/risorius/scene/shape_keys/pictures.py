@@ -47,7 +47,7 @@ class Model:
     Attributes:
         points: float64[V, 3], the face looks along -y.
         ways: name of a key -> float32[V, 3] displacement.
-        triangles: int64[F, 3].
+        triangles: int64[F, 3], vertex indices.
         frame: centre of the pictures, and half their height.
         paths: name of a key -> file of its picture.
     """
@@ -65,7 +65,7 @@ class Job(NamedTuple):
     Attributes:
         model: the head.
         keys: names of keys.
-        samples: values of assigned.Choice.
+        samples: values of assigned.Choice, drawn on the sample man.
     """
 
     model: Model
@@ -131,8 +131,8 @@ def _digest(*parts_of_it: bytes) -> str:
 
 
 def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
-    """float64[V]: largest motion of each vertex, relative to the largest motion of the same key, so
-    that a brow counts as much as a jaw. Keys with almost no motion do not count."""
+    """float64[V]: largest motion of each vertex by any key, divided by the largest motion of that
+    key, so that a brow counts as much as a jaw. Keys with almost no motion do not count."""
     lengths = [np.nan_to_num(np.linalg.norm(way, axis=1), posinf=0.0) for way in ways.values()]
     furthest = [float(length.max(initial=0.0)) for length in lengths]
     share = np.zeros(count)

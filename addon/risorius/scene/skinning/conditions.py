@@ -59,9 +59,10 @@ class _Kept:
     is_fresh: bool = True
 
 
-# Deforming armature -> its plan.
+# Session uid of a deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh object -> number of the add-on's last write to it; an update of this write is no edit.
+# Mesh object -> number of the add-on's last write to it. The update that reports this write does
+# not count as an edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
 # Scene and view layer -> the last write that an update of its graph reported.
@@ -97,7 +98,9 @@ def known(rig: ArmatureObject) -> Plan | None:
 
 
 def note_moved(rig: ArmatureObject) -> None:
-    """Mark a plan as outdated, because keys or drivers move joints; a script's keys cause no edit.
+    """Mark a plan as outdated, because keys or drivers move joints.
+
+    This is necessary because Blender reports no edit for keys that a script inserted.
 
     Args:
         rig: deforming armature.
@@ -108,7 +111,7 @@ def note_moved(rig: ArmatureObject) -> None:
 
 
 def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
-    """Keep a face in the form of files: bones posed, modifiers enabled. Calls may be nested.
+    """Keep a face out of Direct mode: bones posed, modifiers enabled. Calls may be nested.
 
     Args:
         rig: deforming armature.
@@ -122,7 +125,7 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 
 def note_written(item: MeshObject) -> None:
-    """Note a write of the add-on, whose update is no edit. Args: item  the mesh object."""
+    """Note a write of the add-on, so that it does not count as an edit. Args: item  the mesh."""
     _writes.now += 1
     _written[item.session_uid] = _writes.now
 
@@ -133,8 +136,8 @@ def forget_written() -> None:
 
 
 def end_updates(depsgraph: Depsgraph) -> None:
-    """Called at the end of the handlers of an update, because Blender evaluates their writes
-    without another update.
+    """Note that the handlers of an update are done. Blender reports no further update for their
+    writes, so the next update of these objects is an edit.
 
     Args:
         depsgraph: graph of the update; graphs of other view layers report the writes later.
@@ -263,7 +266,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Note undo or redo: the following update of all restored datablocks is no edit."""
+    """Note undo or redo: the next update, of all restored data, does not count as an edit."""
     _restored.now = True
 
 

@@ -68,7 +68,7 @@ def write(
 
 
 def bears_simulation(item: bpy.types.Object) -> bool:
-    """Whether an edit of an object resets a simulation: its own, or one that it influences."""
+    """Whether an edit of an object resets its own simulation, or one that it influences."""
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None
     return field or body or any(m.type in caches.SIMULATED for m in item.modifiers)

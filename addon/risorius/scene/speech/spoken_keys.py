@@ -351,7 +351,7 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Frames and values of a control in a span of frames; both end values are the curve's own."""
+    """Frames and values of a control in a span of frames, with the curve's values at both ends."""
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))

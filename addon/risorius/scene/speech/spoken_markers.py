@@ -36,7 +36,7 @@ def named(text: str) -> str | None:
 
 
 def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
-    """The mark of the voice whose markers a scene shows ("" for none), and the markers."""
+    """The id of the voice whose markers a scene shows ("" for none), and the markers."""
     there = [Mark(m.frame, m.name) for m in scene.timeline_markers]
     try:
         kept = json.loads(saved.text(scene, _KEPT) or "{}")

@@ -15,8 +15,8 @@ from . import spoken_keys
 
 
 def all_of(controls: ArmatureObject) -> list[bpy.types.Action]:
-    """The actions with a voice that a face plays: of the chosen layer, then its own action, NLA
-    strips and other layers.
+    """The actions with a voice that a face plays, in this order: action of the chosen layer, active
+    action, NLA strips, other layers.
 
     Args:
         controls: its control armature.

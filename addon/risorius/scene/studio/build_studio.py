@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Camera, three lights and a backdrop around a face, in a collection of their own.
+"""Builds a camera, three lights and a backdrop around a face, in a new collection.
 
-The user may change or delete them, because nothing of the face refers to them.
+The user may change or delete these objects, because no part of the face refers to them.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _places(item: MeshObject) -> np.ndarray:
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:
-    """The largest height at which the front of the body ends, compared in 8 strips below the face.
+    """The height of the lower edge of the body's front: the highest edge in 8 vertical strips.
 
     A hem may hang lower at the sides, and a picture that reaches down to the lowest point would
     show a gap in the middle.

@@ -16,7 +16,7 @@ from ..skinning import ordinary
 
 
 def separate_all() -> list[str]:
-    """Separate every character from its original.
+    """Give every duplicated character its own data, see `separate`.
 
     Returns:
         Sentences about changes, for a report.

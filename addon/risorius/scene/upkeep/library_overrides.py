@@ -3,7 +3,7 @@
 
 Blender refuses bulk writes to linked data and to overrides that are not editable, and to the
 shape keys of every override. So the override is made fully editable, and its meshes either have
-real keys, which drivers move without any write, or are copied into this file.
+real keys (one per channel), which drivers move without any write, or are copied into this file.
 """
 
 from __future__ import annotations
@@ -159,7 +159,8 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
         if material.name not in owned:
             owned[material.name] = _local_copy(material)
         item.data.materials[index] = owned[material.name]
-    # Blender 5.2 reports overrides without their hierarchy as errors when a file is opened.
+    # Remove the old overrides. Without their hierarchy, Blender 5.2 reports them as errors when the
+    # file is opened.
     for old in dict.fromkeys(left):
         if old is not None and old.override_library is not None and old.users == 0:
             bpy.data.batch_remove([old])

@@ -229,7 +229,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _read(
         self, context: Context, live: runtime.Runtime
     ) -> tuple["native.Clip", list[str], str]:
-        """Read the file as a clip of raw controls; also report lines and the mapping's name."""
+        """Read the file. Returns: clip of raw controls, lines for the report, mapping's name."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
@@ -442,7 +442,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
 
 
 def draw_import(self: Menu, _context: Context) -> None:
-    """Entry of File > Import."""
+    """Draw the entry for animation in the menu File > Import."""
     self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
 
 

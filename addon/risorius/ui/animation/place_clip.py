@@ -135,7 +135,7 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of the layer that the clip becomes. Args: context  has the frame rate."""
+        """Settings of the layer that plays the clip. Args: context  has the frame rate."""
         return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:

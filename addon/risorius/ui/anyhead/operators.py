@@ -151,7 +151,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         return making.rig_task(head, self._template(context), transfer, wishes)
 
     def _template(self, context: Context) -> making.Template:
-        """The face with the expressions.
+        """The face whose expressions the new rig gets.
 
         Raises:
             FaceError: there is no such face.

@@ -33,7 +33,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
-    """Draw warnings about a face that is evaluated a frame late or that something hinders.
+    """Draw warnings about a face that is evaluated a frame late or does not follow its controls.
 
     Args:
         layout: layout of the panel.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The faces and frames for a bake or an export."""
+"""Chooses the faces, frames and level of detail of a bake or an export."""
 
 import bpy
 

@@ -172,13 +172,18 @@ def _draw_marks() -> None:
     if first is None:
         return
     if shown.lines:
-        _write(shown.lines, first, context.preferences.system.ui_scale)
+        write(shown.lines, first, context.preferences.system.ui_scale)
 
 
-def _write(lines: list[str], at: Vector, scale: float) -> None:
+def write(lines: list[str], at: Vector, scale: float) -> None:
     """Draw lines of text beside a place.
 
     The background is dark, so that outlines of bones do not disturb the text.
+
+    Args:
+        lines: one or more lines.
+        at: the place, in pixels of the region.
+        scale: scale of the interface.
     """
     blf.size(0, round(12 * scale))
     wide = max(blf.dimensions(0, text)[0] for text in lines)

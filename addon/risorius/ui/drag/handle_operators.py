@@ -17,7 +17,10 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """Base of operators on one point, which is the vertex of the properties or under the cursor."""
+    """Base of operators on one point of a face.
+
+    A click uses the point under the cursor; scripts set the properties `mesh` and `vertex`.
+    """
 
     mesh: bpy.props.IntProperty(
         name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
@@ -51,7 +54,7 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same click selects a handle, and Blender may reverse the order of our key bindings.
+        # The same click on a handle selects it, and Blender may try this operator first.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:

@@ -42,7 +42,7 @@ _KEYS = (
     ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
 )
 
-# "workspace and mode" -> the tool that was active before this one.
+# Key of a workspace and mode -> name of the tool that was active before the drag tool.
 _before: dict[str, str] = session.table("tool.before", ("unregister",))
 # Session uid of a face, and its (mesh, vertex) under the cursor; at most one entry.
 _pointed: list[tuple[int, tuple[int, int]]] = session.keep("tool.pointed", list, ("load",))

@@ -160,7 +160,7 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
         except RuntimeError as error:  # an error message of Blender's exporter
-            said = str(error).replace(f"{path.parent}{os.sep}", "")  # a temporary folder
+            said = str(error).replace(f"{path.parent}{os.sep}", "")  # the folder is temporary
             raise FaceError(said.strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
         raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))

@@ -211,7 +211,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
 
 
 class _OfOne(_LibraryOperator):
-    """Base of operators on the named expression, or on the last clicked one without a name."""
+    """Base of operators on the named expression; without a name, on the last clicked one."""
 
     expression: bpy.props.StringProperty(name="Expression", options={"SKIP_SAVE"})
 

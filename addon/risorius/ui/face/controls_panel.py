@@ -206,7 +206,7 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 def _draw_sides(column: UILayout, linked: bool) -> None:
     """Draw headings of the columns Left and Right.
 
-    A slider is too narrow for a letter before its number.
+    They replace the letters L and R, for which a slider has no room before its number.
     """
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")

@@ -27,7 +27,7 @@ from ..words import say
 _MARK = 0.3215  # a marker value that no user sets
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
-# last: Blender's last operator that was checked; selected: its setting Selected Only.
+# "last" -> Blender's last operator that was checked; "selected" -> its setting Selected Only.
 _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
@@ -99,7 +99,7 @@ def _draw(self: Menu, context: Context) -> None:
 
 
 def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
-    """Whether Blender's operator has just pasted a pose flipped; True only once per call."""
+    """Whether Blender's operator has just pasted a pose flipped; True only once for each paste."""
     last = manager.operators[-1] if len(manager.operators) else None
     kind = last.bl_idname if last is not None else ""
     state = (last.as_pointer() if last is not None else 0, kind)

@@ -19,12 +19,13 @@ from ..blender_types import Context
 _FRONT = Vector((0.0, -1.0, 0.0))  # direction in which an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer
 _ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # types of regions that overlap a view
-_SIDE = 0.77  # cosine of 40 degrees: views from farther aside are turned
+_SIDE = 0.77  # cosine of 40 degrees: views farther off the front are rotated
 
 
 def frame(context: Context, rig: ArmatureObject) -> None:
-    """Frame a face in the 3D views of the user's window, and turn views from the side to the front.
+    """Frame a face in the 3D views of the user's window.
 
+    A perspective view that is more than 40 degrees off the front rotates to a view from the front.
     Views through a camera do not change, nor views that already show the face well. A solid view
     with Blender's default material colours switches to texture colours, which show iris, lips and
     brows. Undo does not restore views.
@@ -177,7 +178,7 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
         if view_fit.is_well_in_view(middle, radius, far, held, view.view_distance):
             continue
         view.view_location, view.view_distance = middle, far
-        # Views along an axis (front, side, top) are chosen with a key and keep their direction.
+        # An orthographic view, such as Front or Right, keeps the direction that the user chose.
         seen_from = view.view_rotation @ Vector((0.0, 0.0, 1.0))
         if perspective and seen_from.dot(turn @ _FRONT) < _SIDE:
             view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")

@@ -87,7 +87,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
 
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
-    # Several files, chosen in the file browser or dropped together.
+    # Folder and names of several files that were chosen in the file browser or dropped together.
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}

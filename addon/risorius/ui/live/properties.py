@@ -30,7 +30,7 @@ def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
-    """The user's settings, stored with the window."""
+    """The user's settings of live capture, stored with the window manager."""
 
     source: bpy.props.EnumProperty(
         name="Source",

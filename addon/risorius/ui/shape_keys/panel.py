@@ -25,7 +25,7 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # height of the large picture, in lines
 _LITTLE = 2.0  # height of a picture in the list, in lines
-# Heads with assignments whose pictures were started automatically.
+# (head, sample) for which the panel has already started to draw missing pictures.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
@@ -59,7 +59,7 @@ class RISORIUS_UL_shape_key_names(UIList):
         both = line.column(align=True)
         words.show(both, item.name)
         below = both.row(align=True)
-        # Blender's list reacts to clicks on its first line only.
+        # Blender's list reacts to clicks on its first line only, so the second line is a button.
         below.alignment = "LEFT"
         is_open = not row.is_known and not row.is_said
         below.active = is_open or row.is_said

@@ -70,7 +70,7 @@ def who_knows(row: assigned.Row) -> str:
 
 
 def words_of_controls(controls: tuple[str, ...]) -> str:
-    """A short text for controls: one title, the equivalent ARKit shape, or the first and a number.
+    """A short text for controls: title, equivalent ARKit shape, or first title and "and 3 more".
 
     Args:
         controls: names of controls without their prefix.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reactions that a Mixer fires, and rules of controls that exclude each other; read from TOML."""
+"""Reads from TOML the reactions of a Mixer and the rules of controls that exclude each other."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
-        ValueError: invalid file; the text has the file, the found and the expected value.
+        ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "reactions.toml")
     prefix = table.get("prefix", "")
@@ -108,7 +108,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
-        ValueError: invalid file; the text has the file, the found and the expected value.
+        ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "exclusives.toml")
     prefix = table.get("prefix", "")
@@ -138,7 +138,7 @@ def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any]
 
 @cache
 def _own(file: str) -> dict[str, Any]:
-    """A table of the package; cached, because every new mixer needs it."""
+    """Read a TOML file of this package. The result is cached, because each new mixer needs it."""
     text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
     return toml.parse(text)
 

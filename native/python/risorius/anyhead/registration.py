@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Registers a template onto a head of any topology: interface of the native registration."""
+"""Registers a template onto a head of any topology, by the native registration."""
 
 from __future__ import annotations
 

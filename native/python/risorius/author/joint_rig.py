@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Turns a face that moves by blend shapes into a face that moves by joints.
 
-Dna --columns, displacements--> fit --weights, joint groups--> Dna --errors--> blend shapes
+The native fit finds joints, weights and joint motions for the displacements by each control. Joint
+groups store the motions. Blend shapes correct the errors that the joints leave.
 """
 
 from __future__ import annotations
@@ -116,7 +117,9 @@ def make_joint_rig(
 
 
 def lighten(rig: JointRig, source: Dna) -> None:
-    """Remove the shortest deltas until a rig has at most as many as its input. Updates its errors.
+    """Remove the shortest blend shape deltas of a rig that has more deltas than its source.
+
+    The errors in `rig` are updated.
 
     Args:
         rig: the joint rig; it is changed.
@@ -174,8 +177,8 @@ def find_reference(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        DnaError: as make_joint_rig().
-        ValueError: as make_joint_rig().
+        DnaError: see make_joint_rig().
+        ValueError: see make_joint_rig().
     """
     work, fit, made, _ = _made(dna, options or RigOptions(), progress, None, whole=False)
     return reference_of(work, fit, made)
@@ -327,7 +330,8 @@ def _order_levels(
     own = np.arange(count) + len(work.source.joint_names)
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
-    # Shifts of the neck's joints count as expressions, see level_weights.
+    # Shifts of resting joints, such as the neck, count as further expressions, so that vertices
+    # keep the resting joint that they follow.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),
@@ -421,7 +425,7 @@ def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[s
 
 
 def _add_joints(work: Work, fit: Joints, names: list[str]) -> dict[str, list[str]]:
-    """The new joints at the end of the Dna's; their names by region."""
+    """Append the new joints to the joints of the Dna. Returns region -> names of its new joints."""
     dna = work.dna
     positions = fit.joints[len(given(work)) :]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
@@ -510,7 +514,7 @@ def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGr
 
     Args:
         work: the face.
-        values: float64[new joints, 6, columns].
+        values: float64[new joints, 6, columns], translations and Euler angles by each input.
         columns: indices of the inputs.
     """
     count = len(values)

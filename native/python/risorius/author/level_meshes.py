@@ -16,7 +16,8 @@ from .work import Work, listed_meshes
 
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
 _LOOKED_AT = 2000  # number of checked vertices of the fine skin
-# Limits of a level. Largest distances from the fine skin, as fractions of the skin's size.
+# Limits of a level: root mean square and largest distance of the skin from the fine skin, as
+# fractions of the skin's size.
 _RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
 _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees
@@ -28,7 +29,8 @@ class LevelMeshes:
 
     Attributes:
         count: number of levels, including levels of the source.
-        triangles: (level, mesh of the source) -> triangles; a level lacks missing meshes.
+        triangles: (level, mesh of the source) -> triangles; meshes that a level leaves out have no
+            entry.
         ended: reason why there are no more levels, or "".
     """
 
@@ -100,7 +102,7 @@ class _Skin:
         self.poses = [self.positions, *(self.positions + wanted[e] for e in most)]
         fine = self.places[fan_triangles(mesh)]
         self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
-        # The fine mesh may already have slivers and folds, for example at the rims of lids.
+        # A level may have as many slivers and folds as the fine mesh, which has some at lid rims.
         self.had = [shape_of(points, self.fine) for points in self.poses]
 
     def wrong(self, triangles: Ints | None) -> str:
@@ -136,8 +138,8 @@ def shape_of(points: Doubles, triangles: Ints) -> tuple[float, float]:
     """The fractions of triangles that are slivers, and of edges folded by more than 120 degrees.
 
     Args:
-        points: float64[V, 3].
-        triangles: int64[n, 3].
+        points: float64[V, 3], vertex positions.
+        triangles: int64[n, 3], vertex indices.
     """
     if not len(triangles):
         return 0.0, 0.0

@@ -23,7 +23,8 @@ from .work import (
     resting,
 )
 
-# Weight of a displacement at the value 0.5 relative to the value 1, for expressions along an arc.
+# Weight in the fit of the displacements by expressions along an arc at the value 0.5. Displacements
+# at the value 1 have the weight 1.
 _HALVES = 1.5
 
 
@@ -37,12 +38,12 @@ def level_weights(
 ) -> Doubles:
     """float64[V, joints]: weights on the joints of a level.
 
-    The fit gets two kinds of additional expressions. The first shifts each resting joint of the
-    neck with everything below it, so that vertices keep their resting joint. The second is the
-    state at 0.5 of expressions along an arc.
+    The fit gets two kinds of additional expressions. The first kind shifts a joint that no
+    expression moves, such as the neck, with all its children, so that vertices keep following it.
+    The second kind is the pose at the value 0.5 of expressions that move vertices along arcs.
 
     Args:
-        ways: motions of the face; the parents of new joints are chosen.
+        ways: motions of the face; the parents of new joints must be known.
         options: options of the fit.
         lod: the level. Coarser levels use less smoothness, because their vertices are farther
             apart.
@@ -57,7 +58,8 @@ def level_weights(
         return start
     joints = np.concatenate([used, len(work.source.joint_names) + work.new[lod]])
     asked = np.concatenate([wanted, shifted, halves])
-    # Smoothness is relative to all displacements. It is scaled to be relative to the expressions.
+    # The fit takes smoothness relative to all displacements. The factor makes it relative to the
+    # displacements by real expressions.
     even = options.smoothness * float((wanted**2).sum() / max((asked**2).sum(), 1e-30))
     fit = fit_weights(
         np.asarray(mesh.positions, np.float64),
@@ -73,7 +75,7 @@ def level_weights(
 
 
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
-    """Additional expressions that shift the resting joints, so that vertices keep theirs.
+    """Additional expressions that shift resting joints, so that vertices keep following them.
 
     Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the joints of the source that
         take part.
@@ -91,9 +93,10 @@ def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
 
 
 def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
-    """Additional expressions: the state at 0.5 of expressions along an arc.
+    """Additional expressions: the pose at the value 0.5 of expressions along an arc.
 
-    Returns: displacements float64[n, V, 3] and motions float64[n, joints, 3, 4], both weighted.
+    Returns: displacements float64[n, V, 3] and motions float64[n, joints, 3, 4], both multiplied
+        by _HALVES.
     """
     between = Between(ways, mesh)
     rows = sorted({*ways.middles, *np.flatnonzero(ways.turning).tolist()})
@@ -105,11 +108,11 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
-    """Move the weights of joints that a level lacks to their heirs.
+    """Move the weights of joints that a level lacks to the joints that replace them.
 
     Args:
         work: the face.
-        start: float64[V, joints].
+        start: float64[V, joints], weights of the finer level.
         there: indices of the level's joints.
     """
     rows = start.copy()

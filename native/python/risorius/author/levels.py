@@ -30,14 +30,17 @@ _LEAST_VERTICES = 24
 
 @dataclass(frozen=True)
 class LodOptions:
-    """The number of levels and the budgets of each. Levels of the source are kept."""
+    """The number of levels, and the numbers of joints and vertices of each level.
+
+    Levels that the source face already has are not simplified again.
+    """
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
     vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
 
     def check(self) -> None:
-        """Raise ValueError if a budget has not `count` numbers or grows from level to level."""
+        """Raise ValueError if `count` is invalid, or a budget has not `count` numbers or grows."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -71,8 +74,8 @@ class _Merging:
     """Removes joints one after the other; the most similar joint takes a removed joint's vertices.
 
     Attributes:
-        points: float64[V, 4], vertices with a 1.
-        weights: float64[V, J].
+        points: float64[V, 4], vertices in homogeneous coordinates.
+        weights: float64[V, J], skin weights of the joints that are still there.
         motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
         heirs: removed joint -> joint that took its vertices.
         there: bool[J], whether a joint is still there.
@@ -133,14 +136,14 @@ def joint_order(
 ) -> tuple[list[int], dict[int, int]]:
     """The new joints sorted by importance, the most important first; mirrored joints are adjacent.
 
-    The joint whose vertices another joint moves most similarly is removed repeatedly; the other
-    joint takes its vertices. The reverse order of removal is the result.
+    Repeatedly, the joint is removed whose vertices another joint can move with the least error, and
+    the other joint takes its vertices. The reverse order of removal is the result.
 
     Args:
-        positions: float64[V, 3].
-        weights: float64[V, J].
-        rotations: float64[E, J, 3, 3].
-        translations: float64[E, J, 3].
+        positions: float64[V, 3], neutral vertices.
+        weights: float64[V, J], skin weights.
+        rotations: float64[E, J, 3, 3], rotation of each joint in each expression.
+        translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
         fixed: number of first joints that all levels keep and that the result does not contain.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the meshes of all levels of a joint rig: weights, blend shapes for errors, errors."""
+"""Makes the meshes of a joint rig: fits weights, adds corrective shapes, and measures errors."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Made:
         """Prepare an empty list of meshes.
 
         Args:
-            work: the face; its joints are made.
+            work: the face; it must already have the new joints.
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes.
             coarse: triangles of the coarser levels.

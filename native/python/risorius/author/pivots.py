@@ -44,7 +44,7 @@ def find_pivots(
     Args:
         names: names of the E expressions.
         positions: float64[V, 3], neutral vertices.
-        displacements: float64[E, V, 3].
+        displacements: float64[E, V, 3], displacements with each expression at 1.
         joint_names: names of the existing joints.
         joints: float64[J, 3], their positions.
         jaw: whether an existing joint opens the mouth; then no hinge is needed.
@@ -108,7 +108,7 @@ def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def arc(positions: Doubles, displacement: Doubles, middle: Doubles, share: float) -> Doubles:
-    """float64[V, 3]: displacements on arcs about a point; the distance changes linearly.
+    """float64[V, 3]: displacements on arcs about a point; the radius changes linearly with `share`.
 
     Args:
         positions: float64[V, 3], neutral vertices.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints, weights and levels of a joint rig, which other faces of the same topology reuse.
+"""Stores joints, weights and levels of a joint rig for other faces of the same topology.
 
 The joints are fitted once. For another person, only their motions are fitted. All these people
 have the same joints, so that they can be mixed.

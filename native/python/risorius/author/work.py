@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options, errors and the face, which all steps from a face of shapes to a face of joints share."""
+"""Defines the options, errors and intermediate data that all steps of making a joint rig share."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Error of a vertex that follows another neck joint than in the source. A turned head moves vertices
-# of different neck joints about this far apart.
+# Shift of a resting joint in carried_shifts(), so the error of a vertex that follows another neck
+# joint than in the source. A rotated head separates vertices of different neck joints this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
-# Tolerance relative to the head's height: 0.16 mm of 240 mm. Default of the command line, of
-# Blender and of the sample people.
+# Tolerance relative to the head's height: 0.16 mm for a head of 240 mm. Default of the command
+# line, of Blender and of the sample people.
 TOLERANCE = 1 / 1500
 _RIGID_MM = 0.02  # a mesh needs no new joints if the existing joints' error is smaller
 
@@ -41,16 +41,17 @@ class RigOptions:
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
     shapes: bool = True  # False: joints only, no blend shapes
-    # Whether the rig has at most as many blend shape deltas as its input. If necessary, the
+    # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint takes no part in an expression if it moves no vertex by this distance.
+    # A joint takes no part in an expression if it moves no vertex by this distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
     # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
     # turn with their own joint.
     kept: tuple[str, ...] = ()
-    # Whether errors at control values between 0 and 1 are measured: a tenth of the total time.
+    # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
+    # total time.
     between: bool = True
 
 
@@ -66,8 +67,8 @@ class MeshErrors:
     joints_largest: Doubles  # [E] largest error of the joints alone, mm
     largest: Doubles  # [E] largest error with blend shapes, mm
     worst_vertex: Ints  # [E] vertex with the largest error of the joints alone
-    # [E] largest error in mm of the joints alone with the control at 0.25, 0.5 and 0.75, measured
-    # from the line or the arc
+    # [E] largest error in mm of the joints alone with the control at 0.25, 0.5 and 0.75, relative
+    # to the wanted positions on a line or an arc
     between_largest: Doubles
     lod: int = 0
 
@@ -96,7 +97,7 @@ class Joints:
 
 @dataclass
 class Work:
-    """The new face, and quantities that are computed once."""
+    """The source face, the face that is made, and quantities that several steps use."""
 
     source: Dna
     dna: Dna  # the face that is made
@@ -255,8 +256,8 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But vertices must keep their joint, because a neck
-    may be turned by hand.
+    The fit cannot distinguish resting joints. But vertices must keep following the same one,
+    because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
@@ -282,9 +283,10 @@ def carriers(work: Work) -> Ints:
 
 
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V, resting]: each vertex' weights, summed by carrying resting joint (carriers()).
+    """float64[V, resting]: the fraction of a vertex' weights that each resting joint carries.
 
-    Rows have the sum 1.
+    It is the sum of the weights on the joints whose carriers() is the resting joint. Rows have the
+    sum 1.
 
     Args:
         work: the face.
@@ -304,10 +306,11 @@ def carried_shift(work: Work) -> float:
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
 
-    These count as additional expressions, so that vertices keep their joint of neck and head.
+    The fits use them as additional expressions, so that vertices keep following the same joint of
+    neck and head.
 
     Args:
-        work: the face; the parents of new joints are chosen.
+        work: the face; the parents of new joints must be known.
         joints: n resting joints.
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))

@@ -22,7 +22,7 @@ class Performance:
     """A clip prepared for a character.
 
     Attributes:
-        clip: curves of raw controls; the character may lack some.
+        clip: curves of raw controls; the character may lack some of these controls.
         mapping: name of the mapping that was used; "" if the file's names are controls.
         unmapped: curves of the file that are not controls and that the mapping does not know.
     """
@@ -37,7 +37,8 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
 
     Args:
         path: a .rzc file, or a file that risorius.importing reads.
-        face: its raw controls are used directly, and its table converts GUI controls.
+        face: the character; curves of its raw controls are used directly, and curves of its GUI
+            controls are converted to raw controls.
         mapping: name of a built-in mapping, or a TOML file; None: the best fit, or none for .rzc.
 
     Raises:
@@ -58,7 +59,7 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         others = tuple(name for name in found.clip.names if name not in own)
         return Performance(found.clip.selected(own), "", others)
     clip, report = found.apply(mapping, rig=face.rig)
-    # A mapping contains controls of faces; a rig may have others, such as the neck's rotation.
+    # Curves of raw controls that the mapping does not know, such as the neck's rotation, are added.
     own = [name for name in own if name in report.unmapped and name not in clip]
     if own:
         curves = np.concatenate([clip.curves, found.clip.selected(own).curves])

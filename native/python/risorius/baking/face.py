@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A character prepared for baking, and clips prepared for it."""
+"""Loads a character for baking, adapts clips to it, and evaluates their frames in chunks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ FIELDS = {
 }
 """The users' names for parts of a Pose -> its fields."""
 _LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
-# Bytes of poses per chunk, because processing is several times faster inside the processor's cache.
+# Bytes of poses per chunk. A chunk fits into the processor's cache, where work is several times
+# faster.
 _CHUNK_BYTES = 8 << 20
 
 
@@ -56,7 +57,7 @@ class Face:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of the numbers of a joint: translation, rotation, scale."""
+        """Short names of a joint's components: translation (tx, ty, tz), rotation and scale."""
         turn = ("qx", "qy", "qz", "qw") if self.rig.rotation == "quaternion" else ("rx", "ry", "rz")
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
@@ -130,7 +131,7 @@ def prepared(
 
     Args:
         clip: any clip.
-        face: the character, for with_head_turns.
+        face: the character whose neck and head joints receive the rotations.
         rate: resample to this number of frames per second; None: do not resample.
         frames: first and end (exclusive), counted from 0 after resampling; frames beyond the clip's
             end are ignored.
@@ -166,7 +167,7 @@ def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
         face: the character.
 
     Returns:
-        The clip with additional curves for each such joint, one per component of its quaternion.
+        The clip with additional curves: one per quaternion component of each rotated joint.
     """
     raw = face.rig.raw_control_names
     given = dict(zip(clip.names, clip.curves, strict=True))
@@ -192,10 +193,7 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of the clip's curves that move nothing.
-
-    The face has no such raw control.
-    """
+    """The names of the clip's curves without effect, because the face has no such raw control."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))
@@ -203,7 +201,7 @@ def missing(clip: risorius.Clip, face: Face) -> list[str]:
 
 
 def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
-    """The poses of all frames, in chunks whose size depends only on the character.
+    """The poses of all frames, in chunks whose size depends on the character and `threads`.
 
     Controls without a curve are at rest. Each frame equals Rig.evaluate of its controls, bit for
     bit.

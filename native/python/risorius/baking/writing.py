@@ -24,10 +24,10 @@ _SPOOL_BYTES = 32 << 20
 
 
 class NpzWriter:
-    """Writes an .npz: the largest array directly, the others after it.
+    """Writes an .npz of poses chunk by chunk.
 
-    A zip archive is written one member at a time. So the largest array is written at once, and the
-    others are kept in memory or, if large, in temporary files.
+    A zip archive is written one member at a time. So only the largest array is written directly.
+    The others wait in memory or, if large, in temporary files, and are written after it.
     """
 
     def __init__(
@@ -211,7 +211,7 @@ class CsvWriter:
 
 
 def _headings(face: Face, part: str, indices: npt.NDArray[np.intp]) -> list[str]:
-    """E.g. joint:FACIAL_C_Jaw.rx, shape:jaw_open, map:wrinkle, control:CTRL_expressions.jawOpen."""
+    """Column headings, e.g. joint:FACIAL_C_Jaw.rx, shape:jaw_open, map:wrinkle, control:jawOpen."""
     names = face.names[part]
     if part != "joints":
         return [f"{part[:-1]}:{names[i]}" for i in indices]

@@ -154,7 +154,7 @@ def named(error: RisoriusError, source: str | os.PathLike[str] | bytes) -> Risor
     """An error about a file; if its bytes show another kind of file, the error names this kind.
 
     Args:
-        error: error of the native module; its text ends with its place in brackets.
+        error: error of the native module; its text ends with the faulty field in brackets.
         source: path or bytes of the file.
     """
     kind = kind_of(ends_of(source))

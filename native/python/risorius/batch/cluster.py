@@ -85,7 +85,7 @@ class Cluster:
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs, with a few more submitted than the workers can run."""
+        """Run jobs. A few more are submitted than the workers can run, so that no worker waits."""
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:

@@ -125,7 +125,7 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """The chosen ones of `choices`, in the order of `choices`."""
+        """The elements of `choices` that the table names, in the order of `choices`."""
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -274,7 +274,10 @@ def _root(base: Path, pattern: str) -> Path:
 
 
 def _check_pattern(table: _Table, pattern: str) -> None:
-    """Accept only plain field names, because a format string could access attributes of objects."""
+    """Check the pattern of job names: only plain fields, such as {clip}, are allowed.
+
+    Other format strings could access attributes of objects.
+    """
     expected = f"a pattern of {', '.join(f'{{{field}}}' for field in FIELDS)} was expected, "
     try:
         pieces = list(string.Formatter().parse(pattern))
@@ -286,7 +289,7 @@ def _check_pattern(table: _Table, pattern: str) -> None:
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
-    """The name of a job. Names of files and folders are made safe and without separators."""
+    """The name of a job. Names in it are made valid as file names on every system."""
     return pattern.format(
         clip=file_name(clip.path.stem),
         character=file_name(character.path.stem),

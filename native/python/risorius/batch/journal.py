@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """The line of a finished job: stamp and files to compare, and its place in the journal."""
+    """A finished job: hash of its inputs, output files, and its line's offset and size in bytes."""
 
     stamp: str
     files: list[list[Any]]
@@ -31,8 +31,8 @@ class Journal:
     """A file of JSON lines next to the outputs.
 
     A job counts as finished if its inputs have not changed and its files still have the recorded
-    size and time. The facts are read from the file when needed, because the control ranges of
-    thousands of jobs would take too much memory.
+    size and time. The measured facts of a job are read from the file when needed, because the
+    control ranges of thousands of jobs would take too much memory.
     """
 
     def __init__(self, path: Path) -> None:

@@ -97,7 +97,7 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Waiting jobs by face and clip, so that a worker can keep its files for its next job."""
+    """Waiting jobs by face and clip, so that the next job of a worker needs no other files."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}

@@ -58,7 +58,7 @@ def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """Check a DNA file. Returns its definition, or None after an error, and the findings."""
+    """Check a DNA file. Returns its Dna, or None after an error, and the findings."""
     try:
         found = risorius.check(name)
         if any(finding.is_error for finding in found):
@@ -70,7 +70,7 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
-    """Warnings about raw controls for rotations of joints that no GUI control or solver sets."""
+    """Warnings about raw controls of joint rotations, if no GUI control or solver sets them."""
     where = "definition.raw_control_names"
     return [
         risorius.Finding(False, "invalid_value", where, None, text)
@@ -118,7 +118,7 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each valid file whether it can be mixed with the first valid one."""
+    """Add to the results of each valid file whether it can be mixed with the first valid file."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

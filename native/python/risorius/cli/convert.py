@@ -144,7 +144,7 @@ def _writable(minor: int) -> int:
 
 
 def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
-    """The version to write without an option; it is printed if it differs from the source's.
+    """The DNA version to write if no option gives one; printed if the source has another.
 
     Args:
         source: the file that was read.

@@ -151,7 +151,9 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """Parse --threshold: one number, or MM,DEGREES,SCALE.
+    """Parse --threshold: effects of a coefficient that count as small, for all or for each kind.
+
+    Kinds are translation in mm, rotation in degrees, and scale in per cent.
 
     Raises:
         CommandLineError: not one or three numbers from 0.
@@ -181,8 +183,8 @@ def complain(args: argparse.Namespace) -> None:
 def read_regions(name: str) -> edit.Regions:
     """Read the joint names or indices of each region from JSON or TOML.
 
-    Forms: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a single key "regions", or without
-    names [["FACIAL_L_Eye", ...], ...].
+    The file contains {"eye": ["FACIAL_L_Eye", ...], ...}, or this table as the value of a key
+    "regions", or lists of joints without names of regions: [["FACIAL_L_Eye", ...], ...].
 
     Raises:
         InputError: not JSON or TOML, or a different structure.
@@ -416,6 +418,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """A control's name without prefix; of a corrective's controls, the first four."""
+    """The name of a control without prefix, or of the first four controls of a corrective."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

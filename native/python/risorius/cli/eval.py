@@ -74,7 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
-    """Parse NAME=VALUE texts; stderr shows the full names of abbreviated ones.
+    """Parse NAME=VALUE texts; full names of abbreviated controls are printed to stderr.
 
     Args:
         texts: the texts as typed; for a repeated name the last value is used.
@@ -133,7 +133,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
     Args:
         values: float32[n].
         names: names of the values; values without a name are called "control" and their number.
-        first: control number of the first value.
+        first: index of the control that has the first value.
     """
     return [
         {
@@ -199,7 +199,7 @@ def page(facts: dict[str, Any]) -> str:
         f"\njoints, as difference from the neutral pose ({facts['translation_unit']}, "
         f"{facts['rotation_unit']}; sx sy sz are added to 1)"
     )
-    # Rounding errors of float32 sums are not shown; --json has every digit.
+    # Motions as small as the rounding of float32 sums are not printed; --json has all digits.
     joints = [row for row in facts["joints"] if any(_moved(row[a]) for a in ATTRIBUTES)]
     if not joints:
         return "\n".join([*out, "  none"])

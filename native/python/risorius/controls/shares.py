@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Converts between an amount and a share of another control, such as jawOpen.
+"""Converts a control's value to a fraction of another control's value, and back.
 
-Example: lips that stay together while the jaw opens.
+Example: mouthClose, which keeps the lips together, is a fraction of jawOpen.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[
 def _in_system(
     a: risorius.Dna, b: risorius.Dna, report: Report
 ) -> tuple[risorius.Dna, Report, bool]:
-    """B in A's axes and units, its report, and whether the comparison is exact."""
+    """B converted to A's axes and units, the report, and whether the comparison is bit for bit."""
     target = {
         argument: getattr(a, name)
         for argument, name in _SYSTEM.items()
@@ -98,7 +98,7 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether both files are equal, to find differences that the modules of the layers missed."""
+    """Whether both faces give equal bytes; else there may be differences that no module found."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

@@ -58,7 +58,7 @@ def explain_raw(
 
     Args:
         dna: the face.
-        raw: float64[raw controls].
+        raw: float64[raw controls], values in the pose.
         rest: float64[raw controls], values at rest.
         gui: float64[GUI controls]; None if the raw controls were set directly.
         names: names of the controls.

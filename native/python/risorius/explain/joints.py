@@ -26,9 +26,10 @@ def contributions(
 ) -> Contributions:
     """Compute the contribution of each control to each joint; they sum to the joint's pose.
 
-    Rows of joint groups are sums over controls. Products of quaternions are not: there a control's
-    contribution is the change of the Euler angles when its quaternion is multiplied, in the order
-    of the columns. A twist, a swing, or a quaternion of a network is one contribution.
+    Most joint values are sums over controls. But the rotation of a joint with quaternions is a
+    product, so a control's contribution is the change of the Euler angles when its quaternion is
+    multiplied, in the order of the columns. A twist, a swing, or a quaternion of a network is one
+    contribution.
 
     Args:
         dna: the face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: named poses of the standard raw controls in data files that users can edit.
+"""Reads expressions (named poses of the standard raw controls) from files that users can edit.
 
 The files in this folder contain six emotions, fifteen visemes and more. Any file of the same form
 can be loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the
@@ -70,8 +70,9 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
             in the order of FILES.
 
     Raises:
-        ValueError: the text has the file, the expression, the found and the expected value.
-        OSError.
+        ValueError: an invalid file; the message names the file, the expression, the value found and
+            the value expected.
+        OSError: a file cannot be read.
     """
     if path is None:
         return dict(_own(EDITION))
@@ -87,7 +88,7 @@ def of_text(text: str) -> dict[str, Expression]:
     """Read expressions from the text of a file.
 
     Raises:
-        ValueError: see load.
+        ValueError: the text is invalid; the message says where.
     """
     return _parsed(toml.parse(text), "an expression")
 
@@ -100,7 +101,7 @@ def get(name: str, edition: int = EDITION) -> Expression:
         edition: 1 for the older, milder expressions; otherwise the current ones.
 
     Raises:
-        ValueError: unknown name; the text lists some names.
+        ValueError: unknown name; the message lists some names.
     """
     own = _own(1 if edition == 1 else EDITION)
     if name not in own:
@@ -194,7 +195,7 @@ def _own(edition: int = EDITION) -> dict[str, Expression]:
 
 
 def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expression]:
-    """Join the expressions of files; of equal names, the later file's expression is used."""
+    """Join the expressions of files. For a name in several files, the last file is used."""
     out: dict[str, Expression] = {}
     file_of: dict[str, str] = {}
     for file, expressions in found.items():

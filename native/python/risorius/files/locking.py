@@ -44,7 +44,8 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # A process that waits for the lock must open a new file of this name; see _open.
+        # The file is removed before the lock ends, so that `_open` of a waiting process notices
+        # it. Windows cannot remove an open file, so there the file is closed first.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
@@ -105,7 +106,7 @@ else:
         except OSError as error:
             if error.errno not in _UNKNOWN:
                 raise
-            # A file system without locks: the process number in the file decides.
+            # This file system has no locks, so the lock counts as held while its holder may run.
             holder = _holder(handle)
             if _may_live(holder):
                 raise LockedError(_refusal(folder, holder)) from None

@@ -76,6 +76,11 @@ def typical(names: Sequence[str], count: int, seed: int = 1) -> Doubles:
 
 
 def of_frames(names: Sequence[str], frames: Sequence[Mapping[str, float]]) -> Doubles:
-    """Frames as float64[frames, names]. Args: names: of targets; frames: unit -> weight."""
+    """float64[frames, names]: weights of ARKit units in captured frames, clipped to 0 to 1.
+
+    Args:
+        names: names of the units.
+        frames: unit -> weight of each frame; missing units are 0.
+    """
     rows = [[frame.get(name, 0.0) for name in names] for frame in frames]
     return np.clip(np.array(rows, np.float64).reshape(-1, len(names)), 0.0, 1.0)

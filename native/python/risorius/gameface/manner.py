@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Measures VRM values of a face: angles of the gaze, and presets that do not mix with a feeling."""
+"""Measures values of VRM expressions on a face.
+
+These are the angles of the gaze, and the presets that must fade out during a feeling because the
+sum of both morph targets would deform the face.
+"""
 
 from __future__ import annotations
 

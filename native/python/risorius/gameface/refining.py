@@ -50,7 +50,8 @@ class Refiner:
     """Corrects the errors that linear sums and pairs leave at given poses.
 
     Attributes:
-        before, after: float64[n], error of the farthest vertex in mm on every fifth pose.
+        before, after: float64[n], the largest vertex error in mm at every fifth pose, without and
+            with the new combinations.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class Refiner:
             points: vertices of the LOD.
             rig: the face's rig.
             sums: linear sums of its targets.
-            targets: targets of the group that captures drive.
+            targets: targets of the group arkit, which face capture drives.
             made: the combinations of pairs.
         """
         self._points, self._targets, self._made = points, list(targets), list(made)
@@ -150,7 +151,10 @@ class Refiner:
         return out
 
     def _main_directions(self, poses: Doubles) -> Doubles:
-        """float64[poses, _MAIN]: principal components of the errors at the _LOUDEST vertices."""
+        """float64[poses, _MAIN]: coordinates of each pose's error along its principal components.
+
+        Only the _LOUDEST vertices with the largest errors are used.
+        """
         loud = np.zeros(len(self._points.rest))
         for pose in poses[:: max(1, len(poses) // 100)]:
             np.maximum(loud, np.square(self._left(pose)).sum(axis=1), out=loud)
@@ -201,5 +205,5 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
 
 
 def _farthest(delta: Doubles) -> float:
-    """Length of the largest displacement, metres to millimetres."""
+    """Length of the largest displacement in mm. Args: delta: float64[P, 3], metres."""
     return 1000.0 * float(np.sqrt(np.square(delta).sum(axis=1).max(initial=0.0)))

@@ -307,7 +307,7 @@ def read_scene(parser: Parser) -> Scene:
 
 
 def properties(node: Node | None) -> dict[str, list[Any]]:
-    """Name -> values of the properties in Properties70, without those left at their default."""
+    """Name -> values of the properties in Properties70; the file omits properties at default."""
     table = node.first("Properties70") if node is not None else None
     rows = [p for p in (table.inner if table else []) if len(p.values) > 4]
     return {str(p.values[0]): p.values[4:] for p in rows}
@@ -372,7 +372,7 @@ def _curves(
 
 
 def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
-    """Id of a curve node -> (component: d|X, d|Y ..., id of a curve) for its curves."""
+    """Id of an AnimationCurveNode -> (component such as "d|X", id of the curve) per curve."""
     out: dict[int, list[tuple[str, int]]] = defaultdict(list)
     for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
@@ -383,7 +383,7 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """(object, property) of each connection to a property of an object."""
+    """(object, property) for each of `links` that ends at a property of an object."""
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -452,13 +452,13 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
     """int64[count]: flags of each key; float64[count, 2]: slopes after it and before the next key.
 
-    The file stores both once for each run of keys that have them in common.
+    The file stores them once for each run of consecutive keys with the same flags and slopes.
     """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
     good = 0 < flags.size <= count and flags.size == runs.size
-    # No run may be longer than the curve, because the sum of the runs would overflow.
+    # Each run is checked on its own, because the sum of very large runs could overflow.
     if not good or (runs < 0).any() or (runs > count).any() or runs.sum() != count:
         return np.full(count, 4, np.int64), np.zeros((count, 2))
     table = np.zeros((flags.size, 4))
@@ -470,7 +470,15 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
 def _auto(
     times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Sets slopes of automatic tangents: parallel to the neighbours, flat at an extreme."""
+    """Sets the slopes of keys with automatic tangents.
+
+    The slope is that of the line through the two neighbouring keys; it is 0 at a clamped extreme.
+
+    Args:
+        times, values: float64[keys], seconds and values of the keys.
+        flags: int64[keys], KeyAttrFlags.
+        leave, arrive: float64[keys], slopes after and before each key, used for other tangents.
+    """
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():
         return leave, arrive

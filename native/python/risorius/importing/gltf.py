@@ -26,7 +26,7 @@ from .source import Take, keep_ascending, make_clip, read_bytes
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"glTF"
-# Samples per second of smooth curves.
+# Samples per second into which smooth and stepped curves are converted.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = (5126,)
@@ -302,10 +302,10 @@ class Document:
         return self.linked(uri, place)
 
     def linked(self, uri: object, place: str) -> bytes:
-        """The bytes that a uri stands for: its own in base64, or a file in the glTF's folder.
+        """The bytes that a uri contains in base64, or of the file in the glTF's folder it names.
 
         Args:
-            uri: of a buffer or a picture, as in the file; may be of any type.
+            uri: uri of a buffer or a picture, as in the file; may be of any type.
             place: place of the uri, for errors.
 
         Raises:
@@ -320,11 +320,12 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A glTF may name files in its own folder, but not elsewhere on the disk.
+        # Only files in the glTF's folder are read, because a uri could name any file on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file, found=True)
-        # A short JSON may refer to a large buffer many times, so each buffer counts.
+        # Each reference takes its bytes from the budget, because a short JSON may refer to one
+        # large file many times.
         self.budget.hold(len(data), place)
         return data
 
@@ -355,14 +356,14 @@ class Document:
         return np.array(found, np.float64)
 
     def transform(self, node: Mapping[str, Any], place: str) -> Doubles:
-        """float64[4, 4] from a node to the node above it.
+        """float64[4, 4], the matrix from a node to its parent.
 
         Args:
-            node: its table.
-            place: its name in errors.
+            node: table of the node.
+            place: name of the node for errors.
 
         Raises:
-            AnimationFileError: its matrix, rotation, scale or translation is no list of numbers.
+            AnimationFileError: a matrix, rotation, scale or translation is no list of numbers.
         """
         if "matrix" in node:
             return self.finite(node, "matrix", [0.0] * 16, place).reshape(4, 4).T
@@ -572,7 +573,8 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Animated extras may be properties of a rig; colours, positions and so on are no face curves.
+    # Custom properties of a rig are in "extras". Other animated properties, such as colours, are
+    # no curves of a face.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 

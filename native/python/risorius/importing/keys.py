@@ -27,8 +27,8 @@ class Keys:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
         kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
-        leave: float64[keys], slope after each key per second; empty unless a key is CUBIC.
-        arrive: float64[keys], slope before each key per second.
+        leave: float64[keys], slope just after each key, per second; empty unless a key is CUBIC.
+        arrive: float64[keys], slope just before each key, per second; empty as `leave`.
     """
 
     times: Doubles
@@ -86,7 +86,7 @@ def on_one_clock(
     Raises:
         BudgetError: too many curves with keys at different times, or keys too far apart.
     """
-    # Curves with equal times normally share one array.
+    # Each array of times is used once, because curves with equal times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))

@@ -33,7 +33,8 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Curves that are not controls of the rig: angles of head, neck and eyes in radians.
+# Angles in radians of the head and neck, and in ANGLES also of the eyes. These curves rotate
+# bones and are not controls of the rig.
 HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
 ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
@@ -58,8 +59,8 @@ class Adjustment:
     """Changes the curve of a control to offset + gain * curve(value).
 
     Attributes:
-        points: (value, result) by ascending value, linear between, constant outside; empty:
-            identity.
+        points: points (value, result) of `curve` by ascending value; linear between them, constant
+            outside. Empty: curve(value) is the value itself.
     """
 
     gain: float = 1.0
@@ -75,7 +76,7 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class Mapping:
-    """The rows of a mapping from curve names to controls, without abbreviations.
+    """A mapping from curve names to controls, in which all names are written in full.
 
     Attributes:
         name: name of the file, without suffix.
@@ -131,8 +132,11 @@ class Mapping:
         return find
 
     def _spellings(self, name: str) -> Iterator[str]:
-        """The spellings under which a name is looked up: itself, without known prefixes, without a
-        mesh's name, as in the vocabulary."""
+        """The spellings under which a name is searched.
+
+        These are the name itself, the name without known prefixes, the name without a mesh's name
+        before it, and the vocabulary's spelling.
+        """
         yield name
         for start in self.strip:
             if name.lower().startswith(start.lower()) and len(name) > len(start):
@@ -155,7 +159,7 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """A clip after a mapping: curve -> controls, and the names that were not used."""
+    """A mapped clip, the controls that each source curve moves, and the names without use."""
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -222,7 +226,10 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
 def _divided(
     mapping: Mapping, clip: Clip, sums: dict[str, Doubles], budget: Budget
 ) -> tuple[Clip, dict[str, Doubles]]:
-    """Divides controls that are shares by the other control; the clip may get more frames."""
+    """Divides each control of `mapping.shares` by the control of which it takes back a share.
+
+    The clip gets more frames if its keys are far apart, see `_between`.
+    """
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
     times = _between(clip.frame_times()) if any(sums[c].any() for c, _ in shares) else None
@@ -237,14 +244,16 @@ def _divided(
 
 
 def _between(times: Doubles) -> Doubles | None:
-    """Adds times between keys that are far apart. A quotient of linear curves is not linear, and
-    lips that are shut at both keys would part between them.
+    """Times of keys that are far apart, and more times between them.
+
+    A quotient of linear curves is not linear between keys. Without more frames, lips that are shut
+    at two keys would part between them.
 
     Args:
         times: float64[frames], seconds.
 
     Returns:
-        None if nothing is added, because the frames of a capture are close enough.
+        float64[more frames], seconds; None if the frames are close enough, as in a capture.
     """
     steps = np.diff(times)
     if len(steps) == 0 or np.median(steps) <= _KEYED:
@@ -388,9 +397,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping whose rows are the base of another.
+    """The mapping that the key `base` of a TOML table names; the table's rows are added to it.
 
-    "vocabulary NAME" is one of controls.vocabulary; those of ARKit and VRM include the ARKit units.
+    "vocabulary NAME" means the names of a vocabulary of controls.vocabulary. For ARKit and VRM the
+    ARKit units are included.
     """
     base = _text(table, "base", where)
     if not base:
@@ -410,7 +420,7 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 
 
 def row_of(said: Meaning) -> Row:
-    """Control -> weight of a name in a vocabulary; an expression is replaced by its controls."""
+    """Control -> weight for a name of a vocabulary; an expression is replaced by its controls."""
     if said.controls or not said.expression:
         return dict(said.controls)
     return dict(expressions.get(said.expression).weights)
@@ -452,11 +462,11 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 
 
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
-    """Control -> weight of a row, without abbreviations.
+    """Control -> weight of a row, with names of controls in full.
 
-    "@PP" is the weighted pose of the expression PP. A name ending in * stands for both sides, in **
-    for the four lip quarters, unless the row itself is a pattern. A name without a dot gets the
-    prefix.
+    "@PP" means the controls of the expression PP. A control ending in * means the controls of both
+    sides, one ending in ** the controls of the four lip quarters, unless the row's key contains a
+    *. A name without a dot gets the prefix.
     """
     if isinstance(value, str):
         value = {"@" + value: 1.0}
@@ -495,9 +505,10 @@ def _expression(name: str, at: str, where: str) -> Table[str, float]:
 
 
 def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
-    """Control -> control of which it is a share, with full names; "" removes one from the base.
+    """Control -> the control of which it takes back a share, with names in full.
 
-    A control may not be a share of a share, because the order of division would matter.
+    "" instead of a control removes an entry of the base mapping. A share of a share is an error,
+    because the result would depend on the order of the divisions.
     """
     out: dict[str, str] = {}
     for key, value in table.items():
@@ -595,7 +606,7 @@ def _is_letter(curve: str) -> bool:
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """Names of the mappings that know single-letter curves; empty unless all curves are letters."""
+    """Names of the mappings that know any of `names`; empty unless all are single letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

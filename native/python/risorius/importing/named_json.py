@@ -143,7 +143,7 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 
 
 def matrix(reader: Reader, document: object) -> Take | None:
-    """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
+    """Reads {names: [...], frames: [[...], ...]}; Audio2Face calls these facsNames, weightMat.
 
     A frame may be a table with the values under "weights" and a time. Returns None if the document
     has another layout.
@@ -197,7 +197,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
 
 
 def neurosync(reader: Reader, document: object) -> Take | None:
-    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
+    """Reads {"blendshapes": [[61 or 68 values], ...]}, which the NeuroSync service returns.
 
     Returns None if the document has another layout.
 
@@ -232,7 +232,7 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}; the values may be in a table under "weights".
+    """Reads a list of frames {time, name: value, ...}; "weights" may be a table of the values.
 
     Returns None if the document has another layout.
 
@@ -254,7 +254,8 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Keyed curves and rows of a curve table are lists of tables, too.
+    # Tables with a curve's name are keyed curves or rows of a curve table, which other functions
+    # read.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -305,8 +306,9 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None if the
-    document has another layout.
+    """Reads Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...].
+
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -394,7 +396,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
+    """Reads {name: [values], ...}, which may be under "curves", with a rate or a list of times.
 
     Returns None if the document has another layout.
 

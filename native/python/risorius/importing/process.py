@@ -161,7 +161,7 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
 def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:
     size = 2 * half + 1
     base = np.vander(np.arange(-half, half + 1) / half, order + 1, increasing=True)
-    # [at, from]: maps the values of a window to the fitted polynomial's values
+    # fit[i, j]: weight of the window's value j in the fitted polynomial's value at position i
     fit = base @ np.linalg.pinv(base)
     out = np.empty_like(curves)
     windows = np.lib.stride_tricks.sliding_window_view(curves, size, axis=1)
@@ -235,7 +235,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Mirrors a clip: partners swap their curves, and sideways angles change their sign."""
+    """Mirrors a clip: left and right controls swap their curves; yaw and roll change their sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)

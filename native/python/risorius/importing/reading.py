@@ -165,8 +165,10 @@ class Imported:
 
 
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
-    """Keeps the requested angles of head and eyes; drops head angles that are all 0, which would
-    hold the head still."""
+    """Keeps the requested angles of head and eyes.
+
+    Head angles that are all 0 are dropped, because their curves would only keep the head still.
+    """
     clip = done.clip
     drop = set()
     for name in clip.names:
@@ -254,7 +256,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # such as an overflow caused by a number in the file
+    # for example, a number in the file causes an overflow
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
@@ -267,7 +269,7 @@ def read(
 
 
 def _moving(clip: Clip) -> list[str]:
-    """The curves that are not constantly 0, or all curves if each is."""
+    """Names of the curves that are not constantly 0; all names if every curve is constantly 0."""
     moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
     return moving or list(clip.names)
 

@@ -21,7 +21,7 @@ Doubles = npt.NDArray[np.float64]
 
 # Larger than any recorded take; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Times further apart than at this rate (per second) are times of keys, not of frames.
+# Frames per second: times that are further apart are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
 # largest fraction of frames that may be dropped because their time does not ascend

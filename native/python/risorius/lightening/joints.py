@@ -79,7 +79,7 @@ def mirrored_joints(dna: Dna) -> Ints:
 
 
 class Leaving:
-    """Removes joints one after the other; other joints, its heirs, take over its vertices."""
+    """Removes joints one after the other. Other joints, its heirs, take over a joint's vertices."""
 
     def __init__(
         self,

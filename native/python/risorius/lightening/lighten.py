@@ -38,7 +38,7 @@ Progress = Callable[[float], bool | None]
 _ROUNDS = 4  # largest number of rounds of choosing joints and refitting weights
 _BETTER = 0.97  # a further round follows if the error is below this fraction of the last one
 _FIGHT = 1.0  # exponent by which the importance of a pose grows with its error
-# Memory limit of the tables of joint motions: bytes, and bytes per byte of the face.
+# Memory limit of intermediate tables in bytes: a constant, plus a factor times the face's size.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 
@@ -332,7 +332,7 @@ class _Thinning:
         self.rest = sk.world_matrices(dna, np.zeros((len(self.parents), 9)))[:, :3, 3] - middle
 
     def choose(self, joints: int, counts: Doubles) -> tuple[list[int], Leaving]:
-        """Chooses joints to remove; the returned object has the weights that others take over.
+        """Chooses joints to remove. The returned object has the vertex weights of the other joints.
 
         Args:
             joints: number of joints to keep.
@@ -397,8 +397,8 @@ def _products(
 ) -> Doubles:
     """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
-    A joint that no pose moves gets the product of a small shift of its descendants, so that still
-    joints differ.
+    For each joint that no pose moves, a small shift of its descendants is added as a pose, because
+    otherwise all resting joints would seem to be interchangeable.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))

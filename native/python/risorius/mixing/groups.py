@@ -34,7 +34,7 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     lists = [[_lists(g) for g in own] for own in groups]
     if all(own == lists[0] for own in lists[1:]):
         return [_mean(row, share) for row in zip(*groups, strict=True)]
-    # For joints with quaternion rotation the order of columns matters; all parents have the same.
+    # The order of columns matters for joints with quaternion rotation. It is equal in all parents.
     turned = [turned_groups(p) for p in parents]
     out = [
         _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixes faces: numeric values become weighted means, names and lists stay.
+"""Mixes faces: numeric values become weighted means; names and lists are not changed.
 
 Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
 weights of its vertices. A region from another face is scaled to the size of the mixed face and
@@ -30,7 +30,8 @@ from .share import Share, mean_of
 class Mix:
     """The shares of the parents for the whole face, with exceptions for some regions.
 
-    Parents listed for a region have their share there; the others divide the rest by `shares`.
+    In a region, the listed parents get their listed shares. The rest is divided among all parents,
+    including the listed ones, in proportion to `shares`.
     """
 
     shares: Sequence[float]  # [P], for the whole face; normalised to sum 1
@@ -125,14 +126,14 @@ class Places:
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        # Masks sum to 1 only up to rounding.
+        # Rounding errors of masks may make the difference negative, so it is clipped.
         face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
         # Size and position of a region are measured at its rim, so that it fits its neighbours.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
-        # these surround the face: their scale is measured at their rim
+        # Neck and skull surround the face, so their scale is measured at their rim.
         for outer in ("neck", "skull"):
             at = REGIONS.index(outer)
             for own, p in zip(sizes, positions, strict=True):

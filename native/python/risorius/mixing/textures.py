@@ -51,7 +51,7 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Mixes the textures that the leading parent's metadata names.
+    """Mixes the textures in the metadata of the leading parent, which has the largest share.
 
     Args:
         parents: compatible faces.
@@ -96,7 +96,7 @@ def mix_textures(
 
 
 def check_room(path: Path, pictures: Iterable[str]) -> None:
-    """Refuses to overwrite images that belong to no face of this name.
+    """Refuses to overwrite images in the texture folder if the DNA file does not exist yet.
 
     Args:
         path: path of the new DNA file; if it exists, its images may be replaced.
@@ -115,7 +115,7 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: the shares for a mesh's textures; a rigid mesh has those of its region."""
+    """float64[P]: the shares for a mesh's textures; for a rigid mesh, the shares of its region."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())

@@ -48,7 +48,7 @@ class _Measured:
     Attributes:
         neutral, extreme: values of the control at rest and at its extreme.
         noise: standard deviation of the noise in a frame.
-        rests: whether it is near 0 in some frames.
+        rests: whether a tenth of its values is at most _HIGHEST_REST.
         has_ceiling: whether its peaks end at nearly the same height.
     """
 
@@ -144,8 +144,8 @@ def _together(pair: list[_Measured]) -> _Measured:
     """Combines the measurements of both sides, so that a symmetric face stays symmetric."""
     extremes = [side.extreme for side in pair]
     least, most = min(extremes), max(extremes)
-    # If the extremes are similar, the smaller one lets both sides reach 1. Otherwise one side did
-    # not reach its extreme.
+    # If the extremes are similar, both sides get the smaller one, so that both can reach 1.
+    # Otherwise one side did not reach its extreme in the take, and both get the larger one.
     return _Measured(
         float(np.mean([side.neutral for side in pair])),
         least if least >= _SAME * most else most,

@@ -155,7 +155,7 @@ def _kept_apart(
     opposites: npt.NDArray[np.int64],
     solve: Callable[[Drag, Doubles], Doubles],
 ) -> Doubles:
-    """The pose from `solve` with only one control on of each opposite pair: the one used more.
+    """The pose from `solve` in which only the stronger control of each opposite pair is on.
 
     An opposite that was on at the beginning returns to 0 before the other one starts.
     """
@@ -180,9 +180,9 @@ def _kept_apart(
 def _both_on(
     opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The pairs of which both controls are on, and further than before: (weaker, stronger).
+    """Opposite pairs in which both controls increased from `begin`: (weaker, stronger) controls.
 
-    The weaker control was less on before, or is less on now if both had equal values.
+    The weaker control has the smaller value in `begin`, or in `at` if both are equal in `begin`.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -209,10 +209,10 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls that belong elsewhere (see LOCAL) get ELSEWHERE, so that a dragged brow does not turn
-    the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of their
-    effect here to their effect on the whole face, so that the brow lowers before the whole face
-    contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face (see LOCAL) get ELSEWHERE, so that a dragged brow does not
+    turn the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of
+    their effect here to their effect on the whole face, so that the brow lowers before the whole
+    face contracts, which would lower it too. The largest ease is 1.
 
     Args:
         surface: surface of the face.
@@ -223,7 +223,8 @@ def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
-    # solve_drag squares the cost of a change; with the root, the change is proportional to `alone`.
+    # solve_drag squares the cost of a change, so the change grows with the square of the ease.
+    # The root makes it proportional to `alone`.
     readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
     return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 

@@ -112,7 +112,7 @@ def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[n
 
 
 def _leave_out(reach: Floats, surface: Surface, mesh: int, vertices: list[int]) -> None:
-    """Removes from all rows the directions of controls that these vertices can already drag.
+    """Removes from `reach` the combinations of controls that the new handles can already drag.
 
     Args:
         reach: float32[n, 3, R], displacements by controls; changed in place.

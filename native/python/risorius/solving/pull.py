@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drag as equations: residuals of target coordinates, derivatives by controls, least squares."""
+"""Makes and solves the equations of a drag: residuals, derivatives by controls, least squares."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GAIN = 1e-5  # fraction of the squared distance: a smaller gain ends the iterat
 
 @dataclass
 class Drag:
-    """The checked equations of a drag; their m = P k rows are target coordinates."""
+    """The checked equations of a drag: P points with k directions each give m = P k equations."""
 
     probe: Probe
     free: npt.NDArray[np.bool_]  # [R]: controls that may change
@@ -204,8 +204,8 @@ def least_squares(
 
 
 def seen_from(drag: Drag, begin: Doubles, at: Doubles) -> tuple[Doubles, Doubles]:
-    """Derivatives float64[m, U] at a pose, and the residual as a function of changes from the
-    beginning.
+    """Linear equations for the change from the pose `begin`: derivatives float64[m, U] at the pose
+    `at`, and the residual float64[m] that they predict for `begin`.
 
     Args:
         drag: equations of the drag.

@@ -20,11 +20,12 @@ from .surface import Doubles
 
 _REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: 0, moving, at a bound
 _MOST_STEPS = 600  # largest number of steps of a path
-# largest number of steps to a given distance; the result of a longer path is not sparse
+# largest number of path steps in cheapest_to(); the result of a longer path is not sparse
 _MOST_MORE = 60
 _END = 1e-6  # fraction of the first price at which a path ends
 _FAR = 0.1  # fraction of the first residual: a target that stays farther away is out of reach
-# fraction of the possible gain that may be given up to use fewer controls, for such a target
+# fraction of the possible gain that may be given up to use fewer controls, if the target is out of
+# reach
 _LITTLE = 0.1
 _CALM = 0.12  # fraction of the first price below which controls hardly help, for such a target
 _LEVEL = 1e-9  # smaller differences of slopes count as none
@@ -56,7 +57,7 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: size of the gradient of each resting unknown that may follow it."""
+        """float64[n]: size of the gradient; 0 for unknowns that move or cannot follow it."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
@@ -153,7 +154,7 @@ def cheapest_change(
     tolerance: float,
     worth: float,
 ) -> Doubles:
-    """float64[n]: the cheapest x with a x near b; mostly 0.
+    """float64[n]: the cheapest x with a @ x near b; most elements are 0.
 
     Args:
         a: float64[m, n], the matrix.
@@ -188,7 +189,7 @@ def cheapest_change(
 def cheapest_to(
     a: Doubles, b: Doubles, low: Doubles, high: Doubles, price: Doubles, aim: float
 ) -> Doubles:
-    """float64[n]: the cheapest x with a x within a distance of b, or as near as possible.
+    """float64[n]: the cheapest x with a @ x within `aim` of b, or as near as possible.
 
     Args:
         a: float64[m, n], the matrix.

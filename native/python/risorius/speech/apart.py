@@ -113,7 +113,7 @@ def _library(texts: Mapping[str, str] | None) -> dict[str, Expression] | None:
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
     python = python_program()
     options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
-    # otherwise a console window would appear on Windows
+    # Without this flag, a console window would appear on Windows.
     quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)
     try:
         return subprocess.Popen(
@@ -220,7 +220,7 @@ def serve(task: dict[str, Any]) -> None:
         words.write(json.dumps(message) + "\n")
         words.flush()
 
-    # before a thread reads the pipe, because on Windows the import would wait for the read
+    # Import before a thread reads the pipe, because on Windows the import would wait for the read.
     with contextlib.suppress(ImportError):
         importlib.import_module("pocketsphinx")
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -169,7 +169,8 @@ def _one_channel(channels: Samples) -> Samples:
     """Converts float32[samples, channels] to float32[samples]."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # Microphones with opposite polarity cancel each other, and with them the voice.
+    # If microphones have opposite polarity, the mean of the channels loses the voice, so the
+    # loudest channel is used.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean
@@ -177,7 +178,7 @@ def _one_channel(channels: Samples) -> Samples:
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
     """Converts a sound file with ffmpeg to the bytes of a WAV file."""
-    # a pipe was read already, so ffmpeg would wait for its data forever
+    # Only files: a pipe has been read already, so ffmpeg would wait for its data for ever.
     if not os.path.isfile(path):
         raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")

@@ -51,7 +51,7 @@ def write(found: Sequence[Phoneme], name: str) -> str:
 
 
 def table(found: Sequence[Phoneme]) -> str:
-    """Tab-separated lines: begin and end in seconds, phoneme, confidence, the word that begins."""
+    """Tab-separated lines: begin and end in seconds, phoneme, confidence, word that begins."""
     rows = ["begin\tend\tphoneme\tconfidence\tword"]
     rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
     return "\n".join(rows) + "\n"

@@ -89,7 +89,8 @@ def _mesh(mesh: Mesh, kind: str, size: float, streams: _Streams) -> dict[str, An
     about["corners"] = streams.add(corners)
     about["influences"], about["joints"], about["weights"] = _skin(mesh, streams)
     if kind in ("hair", "lashes") and len(mesh.normals):
-        # Hair cards keep the normals of the skin below, which their polygons cannot give.
+        # Hair cards have the normals of the skin below. The page cannot compute these from the
+        # cards' polygons, so they are stored.
         about["normals"] = streams.add(np.rint(_normals(mesh) * _DIRECTION))
     about.update(_targets(mesh, size, streams))
     return about
@@ -105,8 +106,11 @@ def _steps(
 
 
 def _step(values: Floats, most: float) -> float:
-    """The step: the largest power of two, up to 16 steps of the usual size, of which all values are
-    multiples; else the largest one up to `most`."""
+    """The step in which values are stored, a power of two.
+
+    The usual step is the largest power of two up to `most`. It is 16, 8, 4 or 2 times as large if
+    all values are multiples of the larger step.
+    """
     for coarser in (16.0, 8.0, 4.0, 2.0):
         steps = values / (_power(most) * coarser)
         if np.array_equal(steps, np.rint(steps)):

@@ -189,8 +189,12 @@ def _packed(data: bytes, level: int = 9) -> str:
 
 
 def _captures(names: list[str]) -> dict[str, Any]:
-    """The mapping for tables dropped on the page: curve -> [control or angle, weight], with raw
-    controls as numbers and angles as names; and the controls that are shares of others."""
+    """The mapping with which the page reads tables of captures that a user drops on it.
+
+    Returns:
+        "rows": curve -> [control, weight], the control being a raw control's index or the name of
+        an angle. "shares": indices of controls that take back a share of another, and of the other.
+    """
     mapping = load_mapping(_CAPTURES)
     index = {short_name(name): i for i, name in enumerate(names)}
     index |= {name: i for i, name in enumerate(names)}
@@ -212,8 +216,10 @@ def _captures(names: list[str]) -> dict[str, Any]:
 
 
 def _bones(dna: Dna) -> list[dict[str, Any]]:
-    """Joints that rotate as neck and head: their share of the angles, their axes, and the raw
-    controls that hold their rotation."""
+    """A table for each joint that rotates with the neck or head.
+
+    It contains the joint's share of the angles, its axes, and the raw controls of its rotation.
+    """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     return [
         {

@@ -103,7 +103,7 @@ def cut_clear(
 
 
 def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
-    """The results for all rows in order; a thread computes them in advance."""
+    """The results of `work` for all rows in order; a thread computes them in advance."""
     waiting: deque[Future[T]] = deque()
     with ThreadPoolExecutor(1) as pool:
         for row in rows:
@@ -115,7 +115,7 @@ def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
 
 
 class _Ground:
-    """The skin near the hairs, and its motion with the face. Args: as of cut_clear."""
+    """The skin near the hairs, and its motion with the face. Arguments are as in cut_clear."""
 
     def __init__(self, strips: Strips, dna: Dna, head: Mesh, unit: float) -> None:
         self.unit, self._dna, self._rig = unit, dna, Rig(dna)
@@ -147,7 +147,7 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """The roots of strips, as weighted corners of triangles; corners are rows of this skin."""
+        """The roots of strips, as weights of vertices; vertices are numbered as in `rest`."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:
@@ -193,7 +193,10 @@ class _Posed:
         return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
-        """float64[n, rows, 2, 3]: left and right edges in the pose, moved as in binding.py."""
+        """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
+
+        They move as the cards that binding.py binds to the skin.
+        """
         ground = self._ground
         roots = ground.roots(strips)
         was, now = (unit_vectors(roots.of(n)) for n in (ground.upright, self._turned))
@@ -229,7 +232,7 @@ class _Posed:
 
 
 class _Cutting:
-    """Hairs that are cut, and `stays`, bool[n], which is False for dropped hairs."""
+    """Cuts hairs, and sets `stays`, bool[n], to False for dropped hairs."""
 
     def __init__(self, strips: Strips, still: _Posed) -> None:
         self._strips, self._still = strips, still

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes fine form of the face that the mesh shows too softly: beside a nostril, at a lip, under an
-eye.
+"""Computes the fine form of a face for the skin's relief: beside nostrils, at lips, under eyes.
 
 Form is the height of a vertex above or below the mean of its neighbourhood. The mesh shows it too
 softly, so the skin's relief adds it once more, like an unsharp mask. Hollows of the form also get

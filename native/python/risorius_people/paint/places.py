@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where hair grows on the man's head, as densities at vertices.
+"""Computes where hair grows on the man's head, as densities from 0 to 1 at given points.
 
 Positions are in decimetres: x from the middle of the face to the side, y up and z to the front from
 the middle of the eyes.
@@ -165,7 +165,7 @@ def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
     moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
     moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
     chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
-    # beside the tuft below the lower lip
+    # bare skin on both sides of the tuft of hair below the lower lip
     bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)
     full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
     goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))

@@ -11,7 +11,7 @@ _AT_ONCE = 1 << 20  # largest number of texels that are searched together
 
 
 class Raster:
-    """The triangle and the weights of each covered texel, found once for all values of vertices.
+    """The triangle and the weights of each texel that a face covers, for interpolation.
 
     Attributes:
         covered: bool[size, size], whether a face covers a texel.
@@ -157,7 +157,8 @@ def _halves(whole: Floats) -> Floats:
 
 
 def _filled(image: Floats, share: Floats) -> Floats:
-    """Means of covered texels; a texel without them takes the next coarser level's value."""
+    """Image / share, the mean of the covered texels in each block; blocks without covered texels
+    take the value of a coarser level."""
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

@@ -55,13 +55,13 @@ def look_at_face(hand: Hand) -> None:
 
 
 def take_up(hand: Hand) -> None:
-    """Activate the tool that drags the face by the button at the top of the tab."""
+    """Click on the button at the top of the tab that activates the tool for dragging the face."""
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is in the hand", lambda: hand.ask("drags"))
 
 
 def put_down(hand: Hand) -> None:
-    """Return to the previous tool by the same button."""
+    """Click on the same button, which returns to the previous tool."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is put down", lambda: not hand.ask("drags"))

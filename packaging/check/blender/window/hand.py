@@ -28,10 +28,10 @@ class LateError(Exception):
 
 
 class Hand:
-    """Moves the pointer of a display. Asks Blender only for places on the screen and for its state.
+    """Moves the pointer, presses keys and takes pictures; calls functions of inside.py in Blender.
 
     Attributes:
-        talk: folder of the questions and answers; see inside.py.
+        talk: folder of the files by which functions of inside.py are called.
         out: folder of the pictures.
         user: Blender's user folder.
         blender: Blender's process.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs in a Blender with a window, and answers the questions of drive.py.
+"""Runs in a Blender with a window, and calls the functions that drive.py requests.
 
     blender --python inside.py -- TALK
 
@@ -170,7 +170,7 @@ def points():
 
 
 def on_screen(place):
-    """The pixel of a point of world space on the screen, or None behind the viewer."""
+    """The pixel on the screen of a point in world space; None if it is behind the viewer."""
     area, drawing, _sidebar = view()
     at = view3d_utils.location_3d_to_region_2d(drawing, area.spaces.active.region_3d, place)
     if at is None:
@@ -224,7 +224,10 @@ def drags():
 
 
 def two_handles():
-    """The lowest handle, and the nearest handle more than 20 pixels away: points and places."""
+    """The lowest handle, and the handle nearest to it that is more than 20 pixels away.
+
+    Returns mesh and vertex ("point") and the place on the screen ("at") of each.
+    """
     one, live = rig(), module("scene.character.runtime").of(rig())
     found = module("scene.drag.picking").handles_of(bpy.context, one, live)
     found = [f for f in found if on_screen(f[1]) is not None]
@@ -310,7 +313,7 @@ def bone_in_world(name):
 
 
 def board_leads():
-    """Whether the board leads the face."""
+    """Whether the face board, and not the sliders, sets the controls of the face."""
     return bool(module("scene.character.board").leads_face(rig()))
 
 
@@ -335,7 +338,7 @@ def timeline_at(frame):
 
 
 def timeline_header():
-    """The rectangle of the timeline's header, and the scene's last frame."""
+    """Left, top, width and height of the timeline's header, and the scene's last frame."""
     area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
     region = next(r for r in area.regions if r.type == "HEADER")
     return [*rectangle(region), bpy.context.scene.frame_end]
@@ -386,7 +389,7 @@ def tweaks():
 
 
 def given_by_board(control):
-    """The value that the board gives to a raw control."""
+    """The value to which the face board sets a raw control."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The deformation of a skin mesh from its own head (source) to another head (target).
+"""Computes the deformation of a skin mesh from its own head (source) to another head (target).
 
 Each vertex has a deformation gradient (Sumner and Popovic, "Deformation Transfer for Triangle
 Meshes", 2004). The gradients are smoothed over about 2 cm, because expressions scale with the size
@@ -27,7 +27,8 @@ _STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems 
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024  # vertices that are smoothed together
 # The point with the same texture coordinates is taken if its distance is at most _LONGER times the
-# distance of the closest point plus _BESIDE times the reach. _SAME_TEXEL: share of the UV square.
+# distance of the closest point plus _BESIDE times the smoothing radius. _SAME_TEXEL: largest UV
+# distance at which texture coordinates count as the same.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
 _NO_TEXTURE = 1e-6  # texture coordinates with a smaller extent are unusable
 _TURNED = 0.5  # a rotation counts if it leaves at most this share of the RMS difference
@@ -176,7 +177,7 @@ class Change:
         therefore preferred, and points with the same texture coordinates if they are close enough.
 
         Args:
-            points: float64[n, 3].
+            points: float64[n, 3], positions on or near the source skin.
             mesh: the mesh that the points are the vertices of; None: points without normals.
         """
         found, places, far = self._closest.nearest(points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Neutral joint positions on the target head, and joint translations of the joint groups.
+"""Computes neutral joint positions and the translations of joint groups on the target head.
 
 Joints keep their orientation, so that rotation columns keep their meaning. If the whole head is
 rotated, the root joints take the rotation. Translation columns are transformed by the deformation

@@ -32,7 +32,7 @@ class Pose:
     """A fitted model and its place: point = scale * rotation @ form + shift.
 
     Attributes:
-        rotation: float64[3, 3].
+        rotation: float64[3, 3], from the form's space to the surface's.
         scale: units of the surface per cm of the form.
         shift: float64[3], the translation.
         parts: float64[K], weights of the form's parts in standard deviations.
@@ -261,7 +261,7 @@ def _round(
 
 
 class _System:
-    """The normal equations of a round. Unknowns: rotation (3), translation (3), growth (1), then
+    """The normal equations of a round. Unknowns: rotation (3), translation (3), log scale (1), then
     the weights of parts and of expressions."""
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The names of the landmarks of a face, and their names in sentences."""
+"""Lists the names of the landmarks of a face, and their names in sentences."""
 
 from __future__ import annotations
 

@@ -24,7 +24,8 @@ class Region:
         width: cm of the form: distance from the region's centre at which the weight is 1/e.
         prior: strength of the pull of the form's weights towards 0.
         least_cosine: least cosine between the normals of a pair.
-        expressions: whether expressions may change; at the mouth they would replace its own form.
+        expressions: whether weights of expressions may change. They may not at the mouth, because
+            an expression would be fitted in place of the form of the lips.
     """
 
     begins: tuple[str, ...]

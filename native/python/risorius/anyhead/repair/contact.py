@@ -93,8 +93,8 @@ class Contacts:
         return float(beyond @ self._share) * MM**3
 
     def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """The same volume in mm3, measured by SkinChecker; contacts of the skin with itself do not
-        count. Slower than `volume`.
+        """The volume of `volume` in mm3, measured by SkinChecker, which is slower. Contacts of the
+        skin with itself do not count.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.

@@ -107,7 +107,7 @@ def _merged(surface: Surface) -> tuple[Ints, Ints]:
     size = float(np.ptp(surface.points, axis=0).max()) or 1.0
     normals = surface.normals()
     places = np.round(surface.points / (1e-6 * size)).astype(np.int64)
-    # Lips that touch lie at one place and face each other.
+    # Touching lips have vertices at the same position with opposite normals, which must stay apart.
     facing = np.round(normals * 0.7).astype(np.int64)
     _, first, of = np.unique(
         np.concatenate([places, facing], axis=1), axis=0, return_index=True, return_inverse=True

@@ -17,7 +17,8 @@ from ..work import MM, listed_meshes
 from .poser import Controls, make_checker, skin_and_solids
 
 Row = tuple[Controls, Doubles]
-# Vertices of other meshes follow the skin fully up to the first distance and not beyond the second.
+# Vertices of other meshes follow the skin fully if their distance from it is at most _NEAR_MM, and
+# not at all beyond _FAR_MM.
 _NEAR_MM, _FAR_MM = 6.0, 12.0
 _LEAST_MM = 0.01  # shorter deltas are left out
 _SKIN = 0.1  # a mesh with more than this fraction of the skin's vertices is a coarser skin
@@ -125,7 +126,8 @@ def _add_targets(
         corners, shares = np.zeros((0, 3), np.int64), np.zeros((0, 3))
         if m != skin:
             points = np.asarray(mesh.positions, np.float64)
-            # A coarser skin has the same normals as the skin, but lashes have two sides.
+            # Only for a coarser skin, the nearest point must have a similar normal. The normals of
+            # lashes point to both sides, so normals are not compared there.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
             found, shares, distance = checker.nearest(points, normals)

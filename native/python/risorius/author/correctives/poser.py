@@ -144,7 +144,7 @@ def skin_and_solids(
 
 
 def worst(all_of: Iterable[SkinFaults]) -> SkinFaults:
-    """The worst value of each entry. Combinations may have the faults of their parts."""
+    """For each vertex, face and edge, the worst depth, stretch and fold of all given faults."""
     return reduce(
         lambda a, b: SkinFaults(
             np.maximum(a.depth, b.depth),

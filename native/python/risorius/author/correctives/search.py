@@ -32,7 +32,8 @@ _BLOCK = 64  # number of combinations between two reports of progress
 _ENOUGH = 3000  # smallest number of vertices of a skin that shows faults
 _MOVED_MM = 0.1  # vertices that move less count as resting
 _SHARED = 4  # a pair is checked if both expressions move at least this many common vertices
-# Sums of volume and of faces that count as equally bad, and the largest severity that is ignored.
+# Volume of intersection in mm3 and number of faces that count as equally bad; largest severity that
+# is ignored.
 _VOLUME, _FACES, _LEAST = 100.0, 5.0, 0.1
 KINDS = ("volume", "stretched", "folded")
 _ALIKE = np.array([_VOLUME, _FACES, _FACES])  # equally bad sums, by kind
@@ -122,7 +123,7 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """The faults that a combination may have: those of its controls, and of pairs of them."""
+        """The faults that a combination may have, because its controls or their pairs have them."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)
@@ -245,13 +246,13 @@ def correct_again(
 ) -> Dna:
     """Check and repair the pairs of a finished rig once more by shapes. Returns the new face.
 
-    A rig's small errors matter where lips or lids touch. And turns of joints do not add up like the
-    shapes that were checked first. Existing correctives of pairs are extended; other pairs get new
-    ones.
+    A rig's small errors matter where lips or lids touch. And rotations of joints do not add up like
+    the shapes that were checked first. Existing correctives of pairs are extended; other pairs get
+    new ones.
 
     Args:
         rig: the rig of joints and shapes; it is not changed.
-        source: the face without found correctives; its own correctives are not changed.
+        source: the face before correctives were searched; its correctives are not changed.
         options: options of the search. At most once_more pairs get new correctives.
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
@@ -285,9 +286,9 @@ def values_of(sums: Sequence[FaultSums]) -> Doubles:
 def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     """Choose the combinations to repair, so that all kinds of faults decrease similarly.
 
-    A single measure would neglect a kind of fault, because pairs with much volume are not those
-    with many folds. For each kind, the chosen combinations hold a fraction of the total. The
-    smallest of the three fractions is maximised by weights of the kinds (Arora, Hazan and Kale,
+    A single measure would neglect a kind of fault, because the pairs with large volumes differ from
+    the pairs with many folds. For each kind, the chosen combinations have a fraction of the total.
+    The smallest of the three fractions is maximised by weights of the kinds (Arora, Hazan and Kale,
     "The Multiplicative Weights Update Method", 2012), which start with the weights of severity().
 
     Args:

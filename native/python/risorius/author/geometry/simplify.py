@@ -103,10 +103,10 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
 def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
     """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
-    The simplification keeps texture coordinates and displacements by expressions beside the form.
-    Borders and seams stay in place. If seams prevent the reduction, they are welded, and each
-    vertex keeps one texture coordinate. Each connected piece keeps some vertices, or all small
-    pieces are removed.
+    The simplification preserves texture coordinates and displacements by expressions in addition
+    to the form. Borders and seams stay in place. If seams prevent the reduction, they are welded,
+    and each vertex keeps one texture coordinate. Each connected piece keeps some vertices, or all
+    small pieces are removed.
 
     Args:
         mesh: the mesh; it is not changed.
@@ -167,7 +167,8 @@ def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: i
     triangles = own.reshape(-1, 3).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)[used]
     points = np.asarray(mesh.positions, np.float64)[places]
-    # Attributes are relative to the mesh' size, but the simplifier measures the piece's size.
+    # Attributes are relative to the mesh' size, but the simplifier compares them with the piece's
+    # size. So they are divided by the ratio of the sizes.
     share = float(np.ptp(points, axis=0).max()) / _size(mesh)
     attributes = attributes[used] / np.float32(max(share, 1e-6))
     points = points.astype(np.float32)
@@ -183,7 +184,7 @@ def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: i
 def _fewer(
     points: Floats, attributes: Floats, triangles: Indices, places: Ints, vertices: int
 ) -> Indices:
-    """Triangles with at most `vertices` vertices, if the simplifier reaches that."""
+    """Simplified triangles. Borders and seams may keep them above `vertices` vertices."""
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):

@@ -84,7 +84,7 @@ def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None
     """Fit a sphere to vertices. Returns None if they are no sphere or less than a third of one.
 
     Args:
-        points: float64[V, 3].
+        points: float64[V, 3], vertex positions of the mesh.
         vertices: indices of the vertices.
         off: largest standard deviation from the radius, in radii.
     """

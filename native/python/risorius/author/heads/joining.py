@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joins the meshes of a head into one set of shapes: turned, scaled, sorted, with eyes and jaw."""
+"""Joins the meshes of a head to one upright face in cm or m, with joints of eyes and jaw."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class FacePart:
         start, stop: range of its vertices.
         faces: range of its polygons.
         joint: name of the joint that the mesh follows.
-        material, source, polygons: as in HeadPart.
+        material, source, polygons: its material and its origin, see HeadPart.
     """
 
     name: str
@@ -298,7 +298,7 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Add a joint for the parts of the jaw. If jawOpen turns no jaw, they follow the head."""
+        """Add the jaw's joint. Without a rotation by jawOpen, the jaw's meshes follow the head."""
         turn = None
         if opening is not None:
             points, whole = self.face.mesh.positions, list(self.became.expressions)
@@ -333,12 +333,12 @@ class _Joining:
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
 
     def _in_order(self, names: Mapping[str, None]) -> list[str]:
-        """The names with those of the face's shapes first, in the file's order."""
+        """The names of all shapes: shapes of the face first, each group in the file's order."""
         return list(dict.fromkeys([*self.face.shapes, *names]))
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """Append a mesh. Without texture coordinates, all corners get the same one."""
+    """Append a mesh. All corners of a mesh without texture coordinates share one coordinate."""
     base = sum(map(len, uvs))
     own, uv_faces = mesh.uvs, mesh.uv_faces
     if not len(own) or not all(uv_faces):

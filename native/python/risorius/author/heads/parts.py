@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a head, their materials, and the user's settings for the head."""
+"""Defines the meshes of a head, their materials, and the user's settings for the head."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ class Wishes:
     """The user's settings for a head; "" or 0 means that the value is guessed.
 
     Attributes:
-        mesh: name of the face's mesh.
-        rather: name of the face's mesh if the file has several heads.
+        mesh: name of the face's mesh; the file must contain it.
+        rather: name of the mesh that is preferred if the file has several heads.
         left: direction of the character's left, one of AXES.
         up: direction of the top, one of AXES.
         front: direction in which the face looks, one of AXES.

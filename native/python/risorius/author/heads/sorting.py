@@ -37,8 +37,8 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
     Args:
         where: name of the file in error messages.
         parts: all meshes.
-        wanted: name of the face's mesh, or "".
-        rather: name of the face's mesh if the file has several heads, or "".
+        wanted: name of the face's mesh, which must exist, or "".
+        rather: name of the mesh that is preferred if the file has several heads, or "".
 
     Raises:
         ShapeFileError: no mesh moves, none has the name, or the file has several heads.
@@ -67,7 +67,7 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
 
 
 def is_other_head(face: HeadPart, part: HeadPart) -> bool:
-    """Whether a mesh with shapes is another head beside the face.
+    """Whether a mesh with shapes belongs to another head than the face.
 
     Args:
         face: the mesh of the face.
@@ -85,13 +85,13 @@ def is_coarse(part: HeadPart) -> bool:
 
 
 class Places:
-    """Places of a face's head and mouth; x points left, y up, z to the front."""
+    """Finds out whether meshes are near a face's head or in its mouth; x is left, y up, z front."""
 
     def __init__(self, face: HeadPart, height: float, mm: float, jaw_open: Doubles | None) -> None:
         """Measure a face.
 
         Args:
-            face: the face's mesh in the axes above, in any unit.
+            face: the face's mesh, upright and with x to the left, in any unit.
             height: height of the face in that unit.
             mm: length of the unit in mm.
             jaw_open: float64[V, 3], displacements of the shape that opens the mouth, or None.
@@ -132,7 +132,9 @@ class Places:
 
 
 def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
-    """The joint that a mesh without shapes follows. The mesh may be divided into upper and lower.
+    """The joint that a mesh without shapes follows.
+
+    A mesh of all teeth is divided into upper and lower teeth.
 
     Args:
         part: the mesh.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the pictures of materials beside a DNA file, with metadata that assigns them to meshes."""
+"""Makes texture files in a folder next to a DNA file, and metadata that assigns them to meshes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LOD = re.compile(r"_lod\d+_")
 
 @dataclass
 class Textures:
-    """Texture files beside a DNA file.
+    """Texture files in a folder next to a DNA file.
 
     Attributes:
         files: path -> bytes.

@@ -27,18 +27,19 @@ _NONE = np.zeros(0, np.int64)
 _FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
 _LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
 _NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
-# Vertices that move more than _HELD of jawOpen's maximum are rigid; the lowest _CHIN are the chin.
+# Vertices that jawOpen moves by more than _HELD of its maximum count as rigid parts of the jaw. The
+# lowest fraction _CHIN of them is the chin.
 _HELD, _CHIN = 0.7, 0.4
 _FOLLOWS = 0.05  # smallest motion of the chin by a shape, relative to jawOpen
 
 
 @dataclass
 class Turn:
-    """A joint below the head and its motions.
+    """A child joint of the head, and its motions.
 
     Attributes:
         name: name of the joint.
-        position: float64[3].
+        position: float64[3], the joint's position at rest.
         motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
     """
 
@@ -106,12 +107,12 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
 
 
 def _looks_out(points: Doubles, ball: Ball) -> bool:
-    """Whether a sphere has vertices at its front. A socket drawn as an eye's white has none."""
+    """Whether a sphere has vertices at its front. A hollow socket shaped like an eye has none."""
     return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
 
 
 def _is_squashed(part: HeadPart, ball: Ball) -> bool:
-    """Whether a shape deforms most of a sphere, for example lids that are part of a drawn eye."""
+    """Whether a shape deforms most of a sphere, such as a blink of a cartoon eye with lids."""
     before = part.mesh.positions[ball.vertices]
     for delta in part.shapes.values():
         own = delta[ball.vertices]
@@ -200,7 +201,8 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         eye: the eye. Its parts keep only the shapes that do not turn it, such as a pupil's.
         controls: shape -> raw controls without prefix.
 
-    Returns: the joint, and name of a turning shape -> its largest displacement beside the rotation.
+    Returns: the joint; and for each shape that turns the eye, its name -> the largest displacement
+        that differs from the rotation.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}

@@ -135,7 +135,7 @@ def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int
 
 
 def _shapes(scene: Scene, mesh: int) -> list[tuple[str, Node]]:
-    """Unique name and full target of each blend shape channel of a mesh."""
+    """Unique name, and target at full weight, of each blend shape channel of a mesh."""
     out: dict[str, Node] = {}
     for blend, _ in _below(scene, mesh, "Deformer", "BlendShape"):
         for channel, node in _below(scene, blend, "Deformer", "BlendShapeChannel"):
@@ -356,7 +356,7 @@ class _Transforms:
         return out
 
     def order(self) -> str:
-        """The order of a rotation's axes, the first one first."""
+        """The axes in the order in which a rotation is applied, such as XYZ: first about x."""
         number = self._rows.get("RotationOrder", [0])[-1]
         if not isinstance(number, int) or not 0 <= number < len(_ORDERS):
             raise _fail(

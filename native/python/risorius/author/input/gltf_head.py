@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads all meshes of a glTF at the places of their nodes, divided by materials, and materials."""
+"""Reads all meshes of a glTF at the places of their nodes, and divides them by their materials."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> 
 
 
 def _material(document: Document, number: int, known: dict[int, Material]) -> Material | None:
-    """The parts of a material that a face keeps; None for a negative number."""
+    """The name, the base colour and the pictures of a material; None for a negative number."""
     if number < 0:
         return None
     if number not in known:

@@ -202,7 +202,7 @@ def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
 
 
 def own_control(name: str) -> str:
-    """The name of a shape's own control, if no other control has the name."""
+    """Name of the new control that a shape of unknown meaning gets, if this name is free."""
     return _own(name, "", ())
 
 

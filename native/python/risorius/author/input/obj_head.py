@@ -20,7 +20,7 @@ def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
     Raises:
-        ShapeFileError: no file name, or no single one, contains a word for neutral.
+        ShapeFileError: no word of _NEUTRAL is a file name or is part of exactly one file name.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The user's meanings of shapes: the table [controls] of a spec or of a separate file.
+"""Reads and writes the user's meanings of shapes: the table [controls] of a spec or other file.
 
 A meaning is a raw control without prefix, or a list of raw controls; "=mouthFunnel" stands for the
 controls of an ARKit unit, "@aa" for an expression, and [] leaves the shape out. The tables of
@@ -37,7 +37,7 @@ class SaidMeaning(NamedTuple):
 
 
 def meaning_of(value: Said) -> SaidMeaning:
-    """The controls or the expression of a value of the table.
+    """The controls or the expression that an entry of the table [controls] means.
 
     Raises:
         GivenError: the ARKit unit is unknown, or the name of an expression is invalid.

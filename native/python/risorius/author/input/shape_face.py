@@ -27,7 +27,7 @@ _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as restin
 
 @dataclass
 class ShapeSet:
-    """A mesh with y up and its expressions, in one unit. heads.joining joins several meshes."""
+    """A mesh with y up and its expressions, in one unit; `parts` are its meshes."""
 
     name: str
     mesh: ObjMesh
@@ -138,8 +138,8 @@ def combined_rows(
         controls: expression -> raw controls without prefix.
         raw: names of all raw controls.
 
-    Returns: for each sculpt, the indices of its raw controls and its displacements float64[V, 3]
-        minus those of its expressions and of its smaller combinations.
+    Returns: for each sculpt, the indices of its raw controls, and its displacements float64[V, 3]
+        without the displacements of its single expressions and of its smaller combinations.
 
     Raises:
         ShapeFileError: a combination names an unknown expression.
@@ -170,7 +170,7 @@ def combined_rows(
 def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
     """Make a Dna with a mesh for each part and a blend shape for each control.
 
-    The joints are root and head, and those of eyes and jaw if the face has any.
+    The joints are root and head, and eyes and jaw if `shapes` has joints for them.
 
     Args:
         shapes: the mesh and its expressions.

@@ -109,7 +109,7 @@ class Read:
 
 
 def read_spec(path: Path) -> Spec:
-    """Read a SPEC.toml. A head's own file or folder gives a spec with default options.
+    """Read a SPEC.toml. For a file or folder of a head, make a spec with default options.
 
     Args:
         path: the spec, a file of a head, or a folder of OBJ files.

@@ -23,16 +23,15 @@ def padded(names: Sequence[str], count: int) -> list[str]:
 def correctives(
     dna: risorius.Dna, which: str, raw: Space, ml: Space, pose_controls: Space
 ) -> list[str]:
-    """A label with the factors of each corrective, e.g.
-
-    "corrective jaw * smile"; "" for no factors.
+    """A label for each corrective, e.g. "corrective jaw * smile"; "" if it has no factors.
 
     Args:
-        which: "a" or "b", the face to which `dna` belongs.
+        dna: the face with the correctives.
+        which: "a" or "b", the face of the comparison that `dna` is.
         raw, ml, pose_controls: the other parts of the control vector.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Correctives are not matched yet, so A's and B's get different numbers.
+    # Labels are made before correctives are matched, so none of A's and B's share a number.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)
@@ -52,7 +51,11 @@ def correctives(
 
 
 def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
-    """Labels of correctives. factors[i]: (index if a corrective, label) of each factor of i."""
+    """Labels of correctives, with the factors of a corrective that is a factor in brackets.
+
+    Args:
+        factors: for each corrective, (control's index from the first corrective, label) per factor.
+    """
 
     def product(i: int, depth: int) -> str:
         parts = []

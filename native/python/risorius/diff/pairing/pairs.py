@@ -140,7 +140,7 @@ def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
 
 
 def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Match sets of keys: equal sets first, then sets with the most common keys, then by index.
+    """Match sets of keys: equal sets first, then sets that share the most keys, then by index.
 
     Args:
         a, b: the keys of each set.

@@ -17,10 +17,9 @@ _OUTSIDE = 1 << 40  # numbers from here on stand for indices beyond the end of a
 class Space:
     """The elements of lists A and B with common numbers.
 
-    noun: noun for an element, e.g. "joint". names: names by number, A's elements first. a, b:
-        int64, the number of each element of A and B. pairs: the matched elements.
-    names: by number; first those of A, then those of B.
-    a, b: int64, the number of each element.
+    noun: noun for an element, e.g. "joint".
+    names: names by common number; A's names, then B's.
+    a, b: int64[elements of A], int64[elements of B], the common number of each element.
     pairs: the matched elements.
     """
 

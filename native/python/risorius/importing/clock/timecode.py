@@ -75,7 +75,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # At 60 frames per second, a take of 2 s would have frame numbers above 29.
+    # A take of 2 s without frame numbers above 29 has 30 frames per second, not 60.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -84,10 +84,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """Infers the base from the drop of the frame number at each new second, or None.
+    """Infers the frames per second from the frame number's drop at each new second, or None.
 
-    The frame number then drops by the base minus one step. Lost rows make it drop by less, so that
-    an unusual base is accepted only if several drops agree or no rows are lost.
+    The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
+    unusual rate is accepted only if several drops agree or no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -124,8 +124,8 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by more than 12 hours is midnight; smaller ones are rows out of order, and are
-    # kept.
+    # A step back by more than 12 hours is midnight. A smaller step back is a row out of order, and
+    # its time is not changed here.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

@@ -49,7 +49,7 @@ _NAMES: dict[str, str] = {
     # last, so that "times" does not mean "time" in the unit "s"
     **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
-# Texts in brackets after a frame number that are no unit.
+# Texts in brackets in the header of frame numbers, as in "frame (no)", that are no unit of time.
 _NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
 _BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
 # Times without a unit are seconds if their median step is at most this number, because keys can be
@@ -58,7 +58,7 @@ _LONGEST_STEP = 4.0
 # Smallest and largest usual step of a capture in milliseconds: 250 and 5 frames per second.
 _STEPS = (4.0, 200.0)
 _LEAST_ROWS = 8  # number of rows from which a unit is inferred from even steps
-# Smallest time since 1970 in each unit: a date after 1973.
+# Larger times in a unit are dates, counted from 1970; each limit is a date in 1973.
 _DATES = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))
 _LONGEST = 1e8  # seconds; a larger start time is a date
 
@@ -73,7 +73,7 @@ class TimeName(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """The caller's options on time; None leaves a value to the file."""
+    """The caller's options on time; None: the value comes from the file."""
 
     rate: float | None = None
     """Frames per second of the file."""
@@ -189,7 +189,7 @@ def _shown(values: Doubles, name: str, column: str | None) -> str:
             return unit
     steps = np.diff(values)
     steps = np.sort(steps[steps > 0.0])
-    # the lower middle, because a single gap may be large
+    # the median step; of two middle steps the smaller one, because the other may be a gap
     step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0
     if step <= _LONGEST_STEP:
         return "s"

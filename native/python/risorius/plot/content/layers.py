@@ -33,7 +33,7 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of the file. `key` is its four letters in the index table, or empty."""
+    """A part of the file. `key` is a layer's four-letter code in the file's index, else ""."""
 
     key: str
     title: str
@@ -43,7 +43,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """Numbers of network controls, RBF poses and networks, which newer layers state."""
+    """Numbers that only the layers of newer files state: network controls, RBF poses, networks."""
 
     ml_controls: int
     rbf_poses: int

@@ -18,7 +18,8 @@ from .paper import MUTED, Canvas, heading, rgb
 
 Floats = npt.NDArray[np.float64]
 
-# Names of transparent films and hair, which would hide the face because they are drawn opaque.
+# Beginnings of names of meshes that are left out: films and hair would hide the face,
+# because the renderer draws everything opaque.
 _FILMS = (
     "eyeshell",
     "cornea",
