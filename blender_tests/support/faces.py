@@ -303,9 +303,8 @@ def neck_face(**options):
     """The small face with an RBF solver that deforms it when neck and head rotate.
 
     The raw controls of TURNING are rotations of joints. The solver's poses UP and SIDE of
-    NECK_POSES
-    drive channels 4 and 5. UP together with the open jaw makes a corrective active, which drives
-    channel 2.
+    NECK_POSES drive channels 4 and 5. UP together with the open jaw makes a corrective active,
+    which drives channel 2.
     """
     dna = small_face(**options)
     count = len(CONTROLS)

@@ -79,7 +79,7 @@ def save_and_open(path, folder):
 
 
 def append(path, _folder):
-    """Append the characters and actions of a file to an empty file."""
+    """Append the characters and actions of a .blend to an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path)) as (there, _here):
         collections, actions = list(there.collections), list(there.actions)
@@ -92,7 +92,7 @@ def append(path, _folder):
 
 
 def link(path, _folder):
-    """Link the characters and actions of a file into an empty file."""
+    """Link the characters and actions of a .blend into an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path), link=True) as (there, here):
         collections = list(there.collections)
@@ -103,7 +103,7 @@ def link(path, _folder):
 
 
 def override(path, folder):
-    """Link the characters of a file, and make library overrides of them."""
+    """Link the characters of a .blend and make library overrides of them."""
     link(path, folder)
     for rig in rigs():
         bpy.context.view_layer.objects.active = rig["risorius_controls"]
@@ -175,9 +175,9 @@ def prepare(play):
 
 
 def _choose_slot(item):
-    """Choose a slot for an object's action if none is chosen.
+    """Choose the first slot of an object's action if no slot is chosen.
 
-    Blender 5.0 does not choose one for an override's action that was made by 4.2.
+    Blender 5.0 chooses none for an override's action that comes from 4.2.
     """
     data = item.animation_data
     if data is not None and data.action is not None and hasattr(data, "action_slot"):

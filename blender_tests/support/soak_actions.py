@@ -41,7 +41,7 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """Save a library with a character; then save a file with the first characters, undoable."""
+        """Save a library with a character, then a file with characters and an undo step."""
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")

@@ -245,7 +245,7 @@ def test_system_override_is_noticed_and_repaired(library, dna_file):
 
 
 def test_refused_live_key_is_noticed_and_repaired(library, dna_file, mode):
-    """Blender's own menu makes only the armatures editable, which the test simulates."""
+    """Overrides made by Blender's own menu have editable armatures and read-only meshes."""
     rig = _system_override(library[0], editable=False)
     for item in (rig, scene.controls(rig)):
         item.override_library.is_system_override = False

@@ -87,12 +87,12 @@ def glb_channels(path: Path, channels: int = 1200, keys: int = 200_000) -> None:
 
 
 def gap(path: Path) -> None:
-    """A CSV of two rows that are 30,000 years apart."""
+    """A table of curves with two rows that are 30,000 years apart."""
     path.write_text("time,jawOpen\n0,0\n1e12,1\n")
 
 
 def gap_granted(path: Path) -> None:
-    """A CSV of two rows half a year apart; a system may provide memory for all its frames."""
+    """A table with two rows half a year apart; a system may grant the memory for all frames."""
     path.write_text("time,jawOpen,jawLeft\n0,0,0\n1.5e7,1,1\n")
 
 

@@ -362,7 +362,7 @@ def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def _batches(rounds: int) -> Row:
-    """Two batches in one folder: one of them waits or fails with a sentence on the other."""
+    """Two batches in one folder: one works; the other reports that the first runs, or waits."""
     row = Row("at once", "batch")
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as text:
@@ -383,7 +383,7 @@ def _batches(rounds: int) -> Row:
 
 
 def mutations(rounds: int, names: Sequence[str] = (), seed: int | None = None) -> Iterator[Row]:
-    """All commands with mutated inputs give a result or a sentence within limits; random seed."""
+    """Mutated inputs, new in each run, give a result or a sentence within the limits."""
     drawn = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"mutations: --seed {drawn} repeats them", flush=True)
     yield from trials(5 * rounds, drawn, tuple(names))
@@ -397,7 +397,7 @@ GROUPS: dict[str, Group] = {
 
 
 def line(row: Row) -> str:
-    """A line such as "kill       convert       30 runs  0 faults"."""
+    """A trial's results as a line: "kill       convert       30 runs  0 faults"."""
     what = f"{row.runs:5} runs {len(row.faults):4} faults"
     if row.not_run:
         what = f"NOT RUN: {row.not_run}"

@@ -166,7 +166,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     """Add a short spine and facial joints on the surface of the head.
 
     Returns:
-        float32[J, 3] world positions in the neutral pose, without the effect of neutral rotations.
+        float32[J, 3] world positions in the neutral pose, without the small neutral rotations.
     """
     parents = np.full(JOINTS, 3)
     parents[:4] = [0, 0, 1, 2]

@@ -18,8 +18,7 @@ def public_functions(tree: ast.Module) -> Iterator[tuple[str, Function]]:
 
     Names that begin with an underscore, and members of such classes, are not public. Overloads are
     skipped, because their definition has the docstring. Methods that Blender calls are skipped,
-    because
-    Blender's manual explains them.
+    because Blender's manual explains them.
     """
     for node in tree.body:
         if isinstance(node, Function) and _shown(node):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks that files of a part of the project use only rooms that the plan rooms.toml allows."""
+"""Checks that folders (rooms) include and import only as rooms.toml allows."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
 
 
 def included(path: str, text: str, files: frozenset[str]) -> Iterator[Use]:
-    """Yields includes of a C++ file. Quoted names are searched beside the file, then in native/."""
+    """Yields a C++ file's includes. Quoted names are searched in its folder, then in native/."""
     for quoted, angled, other in _includes(text):
         name = quoted or angled
         places = [_joined(PurePosixPath(path).parent, name)] if quoted else []

@@ -248,7 +248,7 @@ def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int,
 
 
 def entries(files: Mapping[str, str]) -> list[str]:
-    """Names of all entries of the session registry, in the order of the files."""
+    """The names of all entries that modules keep in the session, in the order of the files."""
     read = [_read(text) for path, text in files.items() if path != SESSION]
     return [
         ast.literal_eval(node.args[0])

@@ -47,7 +47,7 @@ def _call(node: ast.Call) -> Iterator[str]:
 
 
 def of_python(text: str) -> list[str]:
-    """`line: name` of each use of a POSIX function, module or path in Python."""
+    """`line: name` for each use in Python of functions that Windows lacks."""
     rules = POSIX["python"]
     modules, names = set(rules["modules"]), set(rules["names"])
     path = re.compile(rules["paths"])

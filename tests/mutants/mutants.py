@@ -84,7 +84,7 @@ def _lies_under(path: str, place: str) -> bool:
 
 
 def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
-    """The tests of all patterns that match a file's path, in the order of the table."""
+    """The tests that the table lists for a file, in its order, from all patterns that match."""
     found: list[str] = []
     for pattern, tests in table.items():
         if fnmatch.fnmatch(path, pattern):
@@ -163,7 +163,10 @@ class Copy:
             sys.exit(f"{' '.join(command)}\n{text[-2000:]}")
 
     def try_one(self, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
-        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure; a test's output."""
+        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the last test.
+
+        Unsure means that the test also fails without the mutant.
+        """
         place = self.root / mutant.path
         source = place.read_text(encoding="utf-8")
         place.write_text(mutant.applied(source), encoding="utf-8")
@@ -182,7 +185,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; otherwise the mutant is not killed."""
+        """Whether the failed test passes without the mutant; otherwise it proves nothing."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
@@ -197,7 +200,10 @@ class Copy:
         return self.outcome(test)[0] == "passed"
 
     def outcome(self, test: str) -> tuple[str, str]:
-        """Run a test on the copy. Returns passed, killed, slow or unbuildable; a line of output."""
+        """Run a test on the present sources.
+
+        Returns: passed, killed, slow or unbuildable, and a line of the test's output about it.
+        """
         if "/" not in test.partition(":")[0]:
             target = test.partition(":")[0]
             if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:

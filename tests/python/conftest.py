@@ -25,8 +25,7 @@ def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object
     """All evaluations of the golden set, or those with a tag: (rig, tag, content of its JSON).
 
     Tags: "" for a complete load, ".quat" for quaternions, ".seq" for frames through time; other
-    tags
-    mean files that were loaded with a LOD filter.
+    tags mean files that were loaded with a LOD filter.
     """
     found = []
     for path in sorted(GOLDEN_SET.glob("*.eval*.json")):
@@ -52,7 +51,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip a test whose data are missing; the run's summary contains `what`. Returns the path."""
+    """Skip a test if `path` is missing; the summary of the run names the missing data (`what`)."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")

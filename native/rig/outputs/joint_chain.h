@@ -40,8 +40,7 @@ core::Result<JointChain> make_joint_chain(std::span<const std::int32_t> parents,
 ///                bone and the bone's descendants invalid
 ///      work      [bones] scratch memory
 /// Out: matrices  float32[bones, 3, 4]; a bone whose location, rotation and scale are neutral has
-///                the
-///                matrix of its parent
+///                the matrix of its parent
 void evaluate_chain(const JointChain& chain, const float* location, const float* rotation,
                     const float* scale, JointChain::Affine* work, float* matrices) noexcept;
 

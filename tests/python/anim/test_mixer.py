@@ -30,7 +30,7 @@ def noise(names=tuple(NAMES[:5]), frames=25, seed=3, **settings):
 
 
 def clip_time(layer, clip, t):
-    """The time in the clip that a layer shows at scene time t, which is in the layer's range."""
+    """The time in the clip that a layer shows at the scene time t, both in seconds."""
     if layer.warp is not None:
         assert not layer.reverse  # refused: a descending warp plays backwards
         return float(np.interp(t, *layer.warp))
@@ -83,7 +83,7 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """Mixed values at a time, by steps 1, 2 and 5 of the comment in mixer.h, float32[names]."""
+    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h."""
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
     for layer in layers:
@@ -210,7 +210,7 @@ def test_bakes_what_it_evaluates():
 
 
 def test_a_warp_that_falls_plays_backwards():
-    """The clip's value is its time, so that the result is the warp's line: 0.75 - t / 2."""
+    """A clip whose value is its time shows the clip time that the warp gives: 0.75 - t / 2."""
     ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
     mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
     times = np.linspace(0.25, 1.25, 11)
@@ -361,9 +361,9 @@ def test_yields_see_values_before_any_of_them():
 
 
 def test_the_seal_of_an_open_jaw_stills_the_lips():
-    """LipsTogether controls weaken UpperLipRaise in proportion to jawOpen.
+    """The lips-together controls suppress the upper lip only while the jaw is open.
 
-    If the jaw is shut, they have no effect.
+    With a shut jaw they suppress no control, and they never change the jaw.
     """
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
     names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]

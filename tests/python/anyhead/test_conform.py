@@ -342,7 +342,10 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
 
 
 def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
-    """Earlier steps, which other tests check, are replaced by functions with exact results."""
+    """Only the last step, which moves the head to the face, is tested.
+
+    The registration, which other tests cover, is replaced by its exact result.
+    """
     system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
     mirrored = face.convert(**system, face_winding_order="ccw")
     points = stretched(skin_points(face))  # cm, standing

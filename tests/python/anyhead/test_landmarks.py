@@ -46,13 +46,13 @@ def head(seed: int) -> tuple[Surface, dict[str, np.ndarray]]:
 
 
 def chin() -> np.ndarray:
-    """A given place for the chin of head 3, 1 mm in front of it."""
+    """A point in front of the chin of the head with seed 3."""
     return np.asarray(head(3)[1]["chin"] + np.array([0.0, 0.0, 0.1]))
 
 
 @cache
 def found(seed: int) -> Found:
-    """Landmarks that find_form finds on a head; for head 3, an eyeball and the chin are given."""
+    """The result of find_form for a head; with seed 3 an eyeball and the chin are given."""
     given = Hints("head.obj", {"chin": chin()}, Y, Z, (formed(3)[head_form().skin],))
     return find_form(head(seed)[0], given if seed == 3 else STANDS)
 

@@ -35,7 +35,10 @@ def template(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
-    """(OBJ file of another head with z up, in metres, triangles in another order; points in cm)."""
+    """Path of the OBJ file of another head, and the head's points in cm.
+
+    The file has z up, metres, and triangles in another order.
+    """
     form = head_form()
     parts = np.zeros(len(form.parts))
     parts[[1, 3, 5]] = 1.0, -1.0, 0.7

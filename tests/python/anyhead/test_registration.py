@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the registration, on heads by formula whose corresponding points are known."""
+"""Tests of the registration on computed heads, whose corresponding points are known exactly."""
 
 from __future__ import annotations
 

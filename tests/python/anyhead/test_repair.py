@@ -60,9 +60,10 @@ def mended(head, skin, fitted):
 
 
 def seen(skin, points, ball):
-    """Number of rays from the front that hit the eye, and the most of them in one column.
+    """How much of an eye is visible from the front, computed without the code under test.
 
-    The parallel rays form a grid of 0.2 mm; the test does not use the tested code for them.
+    Parallel rays start in a grid of 0.2 mm. Returns the number of rays that hit the eye, and the
+    largest number in one column of the grid.
     """
     at = np.arange(-RADIUS, RADIUS, 0.02)
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
@@ -99,7 +100,7 @@ def test_lids_that_close_already_stay_as_they_are(skin, fitted, mended):
 
 
 def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
-    """The upper lid is pressed 1 mm into the eye while the eye looks down."""
+    """An upper lid that is pressed into an eye that looks down is lifted out of the cornea."""
     lids = find_eyelids(skin, fitted.eyes["L"])
     arm = skin.points - EYE
     inwards = np.where(

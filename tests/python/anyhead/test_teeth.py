@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests a head's jaw, from its skin and from its teeth; eyeballs of lying heads; stopping."""
+"""Tests of a head's jaw, measured by its skin or its own teeth.
+
+Also tested: pairs of balls may be eyes, the search for a face can be stopped, and lids meet.
+"""
 
 from __future__ import annotations
 

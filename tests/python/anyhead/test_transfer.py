@@ -40,7 +40,12 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """Expressions transferred to a head. points: positions of the template's vertices on it."""
+    """Transfer the template's expressions to a head.
+
+    Args:
+        points: positions of the template's vertices on the head.
+        target: surface of the head; None: the template's triangles with these points.
+    """
     target = target or Surface(points, template.surface.triangles)
     return transfer(
         template, target, points, np.ones(len(points)), TransferOptions(threads=1, **options)
@@ -96,7 +101,7 @@ def test_a_wider_head_has_a_wider_smile_and_no_longer_one(template) -> None:
 
 
 def finer(points, triangles):
-    """Points and triangles of a surface after each triangle was split into four."""
+    """Points and triangles of a surface, each triangle split into four at its edges' middles."""
     edges, rows = np.unique(
         np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1),
         axis=0, return_inverse=True,
@@ -136,9 +141,9 @@ def test_a_hole_of_the_template_is_filled_from_around_it(template) -> None:
 
 
 def slit():
-    """Points and quads of two plates, edge to edge with a tiny gap.
+    """Points in cm and quads of two plates, edge to edge with a gap of 0.2 mm, as two lips.
 
-    Also the number of vertices of the upper plate, which are first.
+    Also returns the number of vertices of the upper plate, which come first.
     """
     x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(0.01, 4, 21))
     up = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)

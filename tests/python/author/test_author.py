@@ -68,7 +68,7 @@ def made(folder):
 
 
 def tolerated(times=1.0):
-    """The default tolerance of a vertex in cm (a fraction of the head's height), times a factor."""
+    """The default tolerance of a vertex in cm, multiplied by a factor. Args: times  the factor."""
     return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
@@ -472,7 +472,10 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
 
 
 def test_joints_that_are_there_stay(folder):
-    """The source's neck keeps its half of the lower vertices, and its jaw keeps its motion."""
+    """A source with a neck and a jaw joint keeps both.
+
+    The neck joint keeps its weight of 0.5 on the lower vertices, and the jaw keeps its rotation.
+    """
     read = spec.read_spec(folder / "spec.toml")
     dna = spec.read_face(read).dna
     positions, _ = face_shapes.head()
@@ -516,9 +519,9 @@ def test_joints_that_are_there_stay(folder):
 
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
-    """Joints that move with a jaw are its children.
+    """New joints in the skin that the jaw moves become children of the jaw joint.
 
-    The skin is as in the source also if jawOpen is 0.5 or other expressions are active.
+    So the skin equals the source's at jawOpen 0.5 and in combinations with other expressions.
     """
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()

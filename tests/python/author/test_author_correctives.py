@@ -29,7 +29,11 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """Displacements of combinations: weaker smiles, and for the first one an additional bulge."""
+    """Sculpted displacements in cm of two combinations, which weaken a smile; one adds a bulge.
+
+    Args:
+        positions: float64[V, 3], the egg's vertices in cm.
+    """
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -529,7 +533,7 @@ def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
-    """Sums that are computed by moments equal sums over a matrix with three rows per vertex."""
+    """Equations that are summed from moments equal those of a matrix with 3 rows per vertex."""
     random = np.random.default_rng(7)
     joints, vertices = 9, 200
     turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]

@@ -56,8 +56,7 @@ def skinned(path, change=None):
     """Write a skinned head as programs that quantize meshes do.
 
     The skin's matrices contain the scale to metres, the neck is posed, and the node of the mesh is
-    far
-    away.
+    far away.
     """
 
     def posed(document):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests that a rig has at most as many deltas as its input, and that its last line says so."""
+"""A made rig has at most as many deltas as its input.
+
+The last line of the command states its numbers of joints and deltas, its size and its errors.
+"""
 
 import re
 

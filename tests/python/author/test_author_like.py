@@ -30,7 +30,7 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=6), 0.05, lighter=False, lods=
 
 
 def other_person(dna):
-    """A narrower face with a longer chin, whose expressions are scaled in the same way."""
+    """The face with 0.85 times the width and a longer chin; its expressions are scaled alike."""
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -48,7 +48,10 @@ def other_person(dna):
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory):
-    """(face, its joint rig, another person's face, the rig of that face with the same joints)."""
+    """Blend shape face and joint rig of a person, then of another person.
+
+    The second rig reuses the joints of the first.
+    """
     folder = tmp_path_factory.mktemp("like")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
@@ -86,7 +89,7 @@ def test_joints_lie_where_they_move_the_other_one(people):
 
 @pytest.mark.parametrize("name", ["mouthCornerPullL", "jawOpen", "eyeBlinkR"])
 def test_a_control_at_1_is_the_other_ones_expression(people, name):
-    """The vertices at LOD 0 are computed from joints and shapes by an independent reader."""
+    """The second rig, posed by an independent reader at LOD 0, shows the second person's shape."""
     _, _, before, rig = people
     dna = rig.dna
     values = np.zeros(len(dna.raw_control_names), np.float32)

@@ -101,7 +101,7 @@ def test_a_packed_head_is_its_plain_twin(tmp_path):
 
 @pytest.mark.parametrize("bits", [12, 23])
 def test_floats_and_corners_in_a_row_are_unpacked(tmp_path, bits):
-    """Floats have the exponential filter, corners the mode INDICES; two accessors share a view."""
+    """A reader unpacks the exponential filter, the mode INDICES, and two accessors in one view."""
     positions, moved = face_shapes.head()[0] / 100, face_shapes.expressions(face_shapes.head()[0])
     jaw = moved["jawOpen"] / 100
     glb = Glb()
@@ -270,7 +270,10 @@ def test_a_head_that_draco_packed(tmp_path):
 
 
 def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_path):
-    """Each value in the JSON is replaced once: no traceback, no warning, no gigabytes."""
+    """One odd value at a time is put at each place of the JSON.
+
+    Reading succeeds or raises an error that names the file, without warnings or gigabytes.
+    """
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261128)
     odd = [None, -1, [], {}, "x", 1e308, 10**400, True, 2**53, 0.5, float("nan"), 7, 2**31]

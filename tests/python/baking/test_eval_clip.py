@@ -213,7 +213,10 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
 
 
 def test_a_capture_is_mapped(tmp_path, capsys):
-    """Curves have Live Link Face names, which a built-in mapping or a user's mapping converts."""
+    """Curves named as in Live Link Face are mapped to controls.
+
+    Without --mapping a built-in mapping is found; a mapping of the user replaces it.
+    """
     dna = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(dna))
     jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")

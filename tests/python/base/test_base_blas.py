@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests limiting linear algebra to one thread, which works only if threadpoolctl is installed."""
+"""Tests that linear algebra is limited to one thread if threadpoolctl is installed."""
 
 import sys
 

@@ -92,7 +92,10 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
 
 
 def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
-    """Joint groups of this file lose the inputs that are controls of networks, which 2.1 lacks."""
+    """If networks are left out, columns of joint groups for their controls are left out too.
+
+    Version 2.1 and the layer behavior contain no networks.
+    """
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)

@@ -119,7 +119,10 @@ for kind in ("twist", "swing"):
 
 
 def words_for(name):
-    """The pattern of the longest key that fits a property, or the last word of its name."""
+    """The pattern for a property: that of the longest entry of WORDS with which its name begins.
+
+    If there is none, the pattern is the last word of the name.
+    """
     fitting = [key for key in WORDS if name == key or (name.startswith(key) and key in name)]
     if fitting:
         return WORDS[max(fitting, key=len)]
@@ -189,7 +192,7 @@ def test_every_change_of_every_field_is_said(which):
 
 @pytest.mark.filterwarnings("ignore")
 def test_changes_go_through_the_front_door(tmp_path, capsys):
-    """For each property of Dna, one change makes `info --diff` return 1, in both directions."""
+    """The command `info --diff` reports a change of each property, in both directions."""
     dna, seen = full(), set()
     a = saved(dna, tmp_path / "a.dna")
     for path, other in every_change(dna):
@@ -467,7 +470,7 @@ def test_bytes_that_no_layer_reads_are_not_passed_over(tmp_path):
 
 
 def test_what_words_miss_is_said_all_the_same():
-    """The metadata, a dictionary, hide a repeated key, so that no property of Dna differs."""
+    """Faces that differ only in a duplicate metadata key, which no property shows, still differ."""
     facts = json.loads(full().to_json())
     facts["desc1.1"]["metadata"].insert(0, ["a", "hidden"])
     twice = risorius.Dna.from_json(json.dumps(facts))

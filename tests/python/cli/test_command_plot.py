@@ -82,7 +82,10 @@ def test_majority_of_a_group():
 
 
 def chain(**changes) -> risorius.Dna:
-    """Three joints, children first: the tip hangs on the middle, the middle on the root."""
+    """A chain of three joints listed children first: tip, its parent middle, whose parent is root.
+
+    Args: changes  properties of the Dna to replace.
+    """
     dna = risorius.Dna()
     dna.rotation_unit, dna.coordinate_system = "degrees", ("right", "up", "front")
     dna.joint_names = ["tip", "middle", "root"]

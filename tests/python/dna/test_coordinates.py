@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests conversion of axes and units by matrices, the reference and evaluated poses."""
+"""Conversion of axes and units, compared with matrices, the reference reader and posed faces."""
 
 import gzip
 import itertools
@@ -187,7 +187,10 @@ def test_every_pose_maps_where_the_order_of_rotation_stays(name):
 
 
 def random_rig(seed, joints=7, raw=5):
-    """A chain of joints with random neutral poses in a random system, without groups; its `rng`."""
+    """A chain of joints with random neutral poses and axes, and raw controls without effect.
+
+    Returns: the face, and the random generator.
+    """
     rng = np.random.default_rng(seed)
     dna = risorius.Dna(
         lod_count=1,

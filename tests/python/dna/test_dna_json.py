@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests Dna as JSON: the names of the format, and no loss of bits."""
+"""Dna as JSON: it uses the names of the file format, and loses no bit of a number."""
 
 import json
 
@@ -42,7 +42,7 @@ def test_the_standard_library_reads_the_numbers_of_the_file():
 
 @pytest.mark.parametrize("minor", range(1, 9))
 def test_extra_the_names_are_those_of_the_format(minor):
-    """The JSON equals an independent parser's, apart from the index and the digits of floats."""
+    """Each layer's JSON has the names and values of an independent parser's JSON."""
     require_extra(FIXTURES, "the reference's fixtures")
     facts = json.loads((FIXTURES / f"raw_v2{minor}.decoded.json").read_text())
     ours = json.loads(risorius.load(FIXTURES / f"raw_v2{minor}.dna").to_json())

@@ -172,7 +172,7 @@ def test_a_selection_that_makes_no_sense_is_refused(lods):
 
 
 def test_lods_past_the_last_are_passed_over_and_repeats_count_once():
-    """The reference's filter does the same, except that it counts repeated LODs several times."""
+    """The reference's filter also ignores LODs past the last, but counts repeats several times."""
     whole = risorius.load(GOLDEN / "core.dna")
     assert whole.filter_lods((1, 65535)).to_bytes() == whole.filter_lods([1, 1]).to_bytes()
     assert whole.filter_lods([1, 0]).to_bytes() == whole.to_bytes()

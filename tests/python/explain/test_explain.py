@@ -34,10 +34,13 @@ def some_controls(dna, rig, seed):
 
 
 def tolerance(dna, sizes):
-    """Largest float32 errors of a joint's values, float64[9]: 2e-5 times (sizes + one unit).
+    """Allowed float32 error of each of 9 attributes: 2e-5 times (size + 1 unit).
 
-    sizes: sums of the sizes of the parts. For rotations the unit is a radian, because values may be
-    converted through quaternions.
+    The unit of rotations is a radian, because values may be converted through quaternions.
+
+    Args:
+        dna: the face, with the unit of rotations.
+        sizes: float[..., 9], sum of the absolute contributions to each attribute.
     """
     turn = 1.0 if dna.rotation_unit == "radians" else 57.3
     return 2e-5 * np.add(sizes, [1, 1, 1, turn, turn, turn, 1, 1, 1])
@@ -419,7 +422,10 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
 
 @pytest.mark.parametrize("name", ["quatjoints", "mlquat"])
 def test_a_rotation_order_that_nobody_knows_is_that_of_the_evaluator(name):
-    """Unknown numbers are explained as they are evaluated: order xyz, axes right, up, front."""
+    """A rotation order or axis with an undefined number is read, and evaluated as the default.
+
+    The defaults are xyz, right, up and front.
+    """
     dna = risorius.load(GOLDEN / f"{name}.dna")
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
     dna.coordinate_system = ("#7", "up", "#9")

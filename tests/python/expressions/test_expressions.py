@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests expressions: those of Risorius use standard controls; errors in files are reported."""
+"""Risorius' expressions use only standard controls; errors in files of expressions are reported."""
 
 from __future__ import annotations
 
@@ -53,7 +53,10 @@ def test_expressions_differ(standard_controls):
 
 
 def test_no_two_are_mistaken_for_each_other(standard_controls):
-    """Directions of poses are compared, because an expression at two strengths is the same one."""
+    """No two expressions have nearly proportional weights.
+
+    Proportional weights would be one expression at two strengths.
+    """
     shown = [e for e in expressions.load().values() if e.weights]
     vectors = np.array([expressions.pose_vector(e, standard_controls) for e in shown])
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)

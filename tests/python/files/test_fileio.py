@@ -111,7 +111,7 @@ def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(
 
 
 def _staged(target, files):
-    """Write files as an external writer does in staging(); raise if the target is none of them."""
+    """Write files with `staging` like an external program; raise if none is the target."""
     with fileio.staging(target) as made:
         for name, data in files.items():
             path = made.with_name(name) if "/" not in name else made.parent / name

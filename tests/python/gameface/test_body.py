@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tests a face on a user's body: its place, the body's meshes and bones, and bad files.
+"""Export of a face on the user's own body: position, the body's meshes and bones, bad files.
 
-packaging/ship/gameface.sh tests such files in three-vrm and Blender's VRM reader.
-"""
+packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
 
 import numpy as np
 import pytest

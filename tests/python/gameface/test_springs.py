@@ -31,7 +31,7 @@ def haired(face, tmp_path_factory):  # noqa: F811
 
 
 def curtain(positions, length):
-    """Vertices in cm, moved into a narrow strip of `length` metres that hangs behind the head."""
+    """Positions in cm of a narrow strip of hair that hangs down behind the head."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     share = (positions - low) / np.maximum(high - low, 1e-9)
     return ((share - [0.5, 1, 0.5]) * [5, 100 * length, 1] + [0, 165, -12]).astype(np.float32)
@@ -162,7 +162,7 @@ def test_hair_on_a_body_hangs_below_its_head_bone(haired, tmp_path):
 
 
 def balls_of(found):
-    """Colliders' places in the scene, names of the first nodes of chains, directions of gravity."""
+    """Places of colliders in the scene, first nodes of chains, and directions of gravity."""
     tables, world, nodes = found.json["extensions"], found._world(), found.json["nodes"]
     if "VRMC_springBone" in tables:
         table = tables["VRMC_springBone"]

@@ -154,7 +154,7 @@ def test_a_take_that_loses_over_a_third_names_what_mends_it(tmp_path, make, form
     "base", [15, 36, 40, 45, 72, 75, 80, 90, 100, 110, 120, 144, 200, 240, 1000]
 )
 def test_timecodes_of_any_rate_are_measured(tmp_path, base):
-    """The takes last 2.5 s, with all frames or every third frame, with and without lost rows."""
+    """Takes of 2.5 s have every frame, every frame but some lost ones, or every third frame."""
     for stride, first, lost in ((1, 0, ()), (1, 7, (9, 10, 33)), (3, 2, ())):
         count = np.delete(np.arange(first, first + base * 5 // 2, stride), lost)
         text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)
@@ -167,7 +167,7 @@ def test_timecodes_of_any_rate_are_measured(tmp_path, base):
 
 @pytest.mark.parametrize("base", [30, 48, 50, 60])
 def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, base):
-    """The takes last 1.5 s; rows are lost before or after the number of the second changes."""
+    """Takes of 1.5 s lack rows before, after or around the change of the second."""
     for lost in (range(base - 3, base), range(base, base + 4), range(base - 3, base + 3)):
         count = np.delete(np.arange(base * 3 // 2), [*lost, 3, 4, base + 9])
         text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)

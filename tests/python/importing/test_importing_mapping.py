@@ -274,7 +274,7 @@ def test_a_mapping_that_is_not_there_names_those_that_are(tmp_path):
 
 
 def test_a_take_and_the_live_stream_turn_the_same_way():
-    """Takes and live streams convert the app's angles in separate code."""
+    """The mapping for files and the live decoder, separate code, give angles the same signs."""
     from risorius.live import livelink
 
     rows = importing.load_mapping("live_link_face").rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests which vocabulary a file's names belong to; single letters alone do not decide it."""
+"""Names of VRM are recognised in files as in live captures; single letters alone are not."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_the_neutral_becomes_0_and_full_stays_1():
 
 
 def test_a_face_at_rest_with_shut_lips_keeps_them_shut():
-    """At rest the jaw is slightly open and lips are shut; with shut lips, the share stays 1."""
+    """At rest the jaw is slightly open and mouthLipsTogether is 1; later shut lips still give 1."""
     lips = RIG + "mouthLipsTogetherDL"
     before = Clip([lips, RIG + "jawOpen"], [[1.0, 1.0, 0.5], [0.04, 0.52, 0.52]])
     after = process.calibrate(before, 0)
@@ -131,7 +131,7 @@ def test_short_clips_and_wrong_widths():
 
 
 def test_one_euro_holds_noise_and_follows_motion():
-    """The result equals the filter of the paper, written as a plain loop."""
+    """The filter gives the values of the paper's algorithm, written here as a plain loop."""
     rng = np.random.default_rng(2)
     values = np.where(AT > 1.0, 1.0, 0.0) + rng.normal(scale=0.01, size=120)
     out = only(process.one_euro(clip(values), 1.5, 5.0))

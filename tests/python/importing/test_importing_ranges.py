@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests values in other scales and heads in degrees: they are refused with a question.
+"""Values in other scales and head rotations in degrees are refused with a question.
 
 Options of the import convert them.
 """

@@ -709,7 +709,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
 
 
 def test_smoothing_is_the_one_euro_filter():
-    """The result equals the paper's algorithm, computed value by value in plain Python."""
+    """Smoothed values equal the one-euro filter of its paper, written here in plain Python."""
     random = np.random.default_rng(3)
     raw = np.clip(
         0.5 + random.normal(0, 0.02, 200) + np.where(np.arange(200) > 120, 0.4, 0.0), 0, 1

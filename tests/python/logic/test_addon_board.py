@@ -104,7 +104,7 @@ def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> No
 
 
 def test_what_a_fit_loses_is_said_by_name() -> None:
-    """If one slider should be up 0.5 and down 0.3, the larger value is used, the other is lost."""
+    """If one slider should be 0.5 up and 0.3 down at once, the loss names the smaller control."""
     rows: Rows = [(0, 0, 0.0, 1.0, 1.0, 0.0), (0, 1, -1.0, 0.0, -1.0, 0.0)]
     table = _of_rows(["a.ty"], rows, 2)
     gui = fitting.fit(table, [[0.5, 0.3]], [[0.0]])

@@ -15,7 +15,7 @@ ADDON = Path(__file__).resolve().parents[3] / "addon" / "risorius"
 
 
 def language(module: str) -> Any:
-    """A module of the add-on's language, imported in a package of another name."""
+    """A module of the add-on's folder language, loaded under another name."""
     name = "risorius_addon_errors"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, None, is_package=True)
@@ -86,7 +86,10 @@ def test_english_stays() -> None:
 
 @pytest.mark.parametrize("locale", language("tables").languages())
 def test_each_row_translates_itself(locale: str) -> None:
-    """The message has each value's name as its value; other braces are written twice in rows."""
+    """Each {name} is replaced by NAME; the translation must contain all these values.
+
+    So braces that are not of a value must be doubled in a row.
+    """
     for english, translation in language("tables").error_rows(locale).items():
         names = [name for _, name, _, _ in string.Formatter().parse(translation) if name]
         values = {name: name.upper() for name in names}

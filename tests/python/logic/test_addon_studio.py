@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests the studio: the picture contains head and shoulders.
-
-The lights are placed as in portrait photography.
-"""
+"""The studio's camera shows head and shoulders, and its lights follow portrait photography."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
 
 
 def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
-    """A fit finds both values if one end of a brow is lowered while the other end is raised."""
+    """A fit finds both handles again if one end of a brow is raised and the other end lowered."""
     names = [f"face_L_brow_{end}.ty" for end in ("inner", "outer")]
     inner, outer = (table.names.index(name) for name in names)
     for up, down in ((inner, outer), (outer, inner)):
@@ -191,7 +191,10 @@ def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None
 
 @dataclass
 class Near:
-    """Distances of an expression in mm, from rest and from the board's pose; used handles."""
+    """An expression's distances in mm from rest (`way`) and from the board's nearest pose (`off`).
+
+    `handles` is the number of handles that the board's pose uses.
+    """
 
     way: float = 0.0
     off: float = 0.0
@@ -199,7 +202,7 @@ class Near:
 
 
 def primary_errors(dna: Any) -> dict[str, Near]:
-    """Distances of each expression, on the mesh with the largest error: name -> Near."""
+    """Expression -> its largest distances over all meshes, and the number of its handles."""
     surface = risorius.Surface(dna, risorius.Rig(dna), lod=1)
     table = primary.table_of(list(dna.raw_control_names))
     named = expressions.load()

@@ -49,7 +49,10 @@ def stretched(dna, factors, lift):
 
 @pytest.fixture(scope="module")
 def faces(tmp_path_factory):
-    """Three faces with joints and equal topology; the second is narrow, the third is higher."""
+    """Three joint faces with equal topology.
+
+    The second is narrow; the third is 1.2 times as large and 30 units higher.
+    """
     folder = tmp_path_factory.mktemp("mixing")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
@@ -436,7 +439,10 @@ def test_pictures_are_read_back_or_refused():
 
 
 def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
-    """Mixes the man, and the person most different from him, as wholes and by region."""
+    """Mixes of the man and the girl, the most different person, as a whole and by region.
+
+    Their eyes are as round as the parents' eyes, and no polygon is flipped against both parents.
+    """
     both = [sample_people.assembled(name)[0] for name in ("man", "girl")]
     masks = Masks(both[0])
     mixes = [Mix([1.0, 1.0])]

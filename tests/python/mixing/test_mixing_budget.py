@@ -91,7 +91,10 @@ def _other_skin(dna):
 
 
 def _groups_that_share_a_joint(dna):
-    """Replace the groups by a tall, narrow one and a low, wide one, which move the same joint."""
+    """Replace the joint groups by two whose union has many empty cells.
+
+    One has all rows but the first and one column, the other one row and all columns.
+    """
     rows, columns = np.arange(9 * len(dna.joint_names)), np.arange(len(dna.raw_control_names))
     dna.joint_groups = [group(rows[1:], columns[:1]), group(rows[:1], columns)]
 
@@ -121,7 +124,10 @@ def test_mixing_holds_no_more_than_some_times_the_faces(sizes, change):
 
 
 def test_groups_of_others_rows_are_joined_row_by_row():
-    """The mix has the weighted sum of all groups, and no row is in two of its groups."""
+    """Groups of two faces with different rows become groups in which each row occurs once.
+
+    Their values are the weighted sums of the faces' values.
+    """
     face = large_face(joints=40, controls=60)
     other = copy.copy(face)
     _groups_that_share_a_joint(other)

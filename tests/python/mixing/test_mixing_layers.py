@@ -167,7 +167,7 @@ def test_faces_without_some_layers_mix_with_their_like_alone(layers, tmp_path, c
 
 
 def test_a_region_of_teeth_alone_has_a_size():
-    """No control moves the skin, so that all of it counts as skull."""
+    """A region without vertices of the skin can be mixed, although no skin shows its size."""
     face = risorius.load(GOLDEN / "ml.dna", layers="geometry")
     mixed = mix_faces([face, moved(face)], Mix([0.5, 0.5], {"mouth": {1: 1}}))
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):

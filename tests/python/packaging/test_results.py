@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that the gate counts every failure of a lane, of a test program or of a report."""
+"""results.py counts every failure of a lane (group of stages), a test program or a report."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests sample people: their parts by formulas, complete faces by their source data."""
+"""Tests of the sample people: parts are compared with formulas, whole people with source data."""
 
 import os
 import sys
@@ -59,7 +59,10 @@ def test_the_mapping_holds_the_52_units_with_weights_up_to_one():
 
 
 def test_catmull_clark_of_a_cube_is_known():
-    """A corner P of a cube moves to (F + 2 R + (n - 3) P) / n, n = 3; that is 5 / 9 of P."""
+    """Subdivision moves the corners of a cube from 1 to 5 / 9 along each axis.
+
+    This follows from the formula of Catmull and Clark, (F + 2 R + (n - 3) P) / n with n = 3.
+    """
     finer, operator = polygons.subdivide(CUBE)
     p = operator.apply(CORNERS)
     assert (len(p), len(finer.faces)) == (26, 24)
@@ -137,9 +140,9 @@ class _Nobody:
 
 @pytest.fixture(scope="module", params=["girl", "man"])
 def sample(request):
-    """A sample person: (source, dna, parts, vertices, person, body).
+    """A sample person: (source, dna, parts, shaped positions, person, body).
 
-    The man is the person for whom the data are made; the girl differs from him most.
+    The people are the man, for whom the source data are made, and the girl, who differs most.
     """
     data, person = sample_people.data(), people.PEOPLE[request.param]
     dna, parts, body = sample_people.assembled(request.param)
@@ -148,7 +151,7 @@ def sample(request):
 
 @pytest.fixture(scope="module")
 def packed():
-    """The sample face that the built extension contains."""
+    """The sample face that is packed into the built Blender extension."""
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
         _not_run.add("the extension's sample face")
@@ -212,8 +215,7 @@ def _wanted(data, body, unit, row):
     """The displacement that an ARKit unit should give, float64[V, 3], in the data's unit.
 
     A unit that is a share of the open jaw is taken together with the open jaw. For eyes and lids,
-    which
-    have other tests, it is the displacement of the person's own controls.
+    which have other tests, it is the displacement of the person's own controls.
     """
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
@@ -311,7 +313,10 @@ def _check_lips(dna, most):
 
 
 def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
-    """Closed lips stay within 0.8 mm, and mouthClose moves no lips while the jaw is shut."""
+    """Captured lips stay together within 0.8 mm, and do not move if the jaw is shut.
+
+    The unchanged shape of the source data would move them by 35 mm.
+    """
     _check_lips(sample[1], 0.8)
 
 
@@ -320,8 +325,7 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
     """The extension's man reproduces ARKit units within 0.8 mm.
 
     This includes lips that stay closed while the jaw opens, where five controls and five
-    correctives
-    rotate the same joints.
+    correctives rotate the same joints.
     """
     data, before, parts, _, _, body = sample
     dna = packed
@@ -425,7 +429,10 @@ def test_extra_each_cheek_flushes_on_its_side(sample):
 
 
 def test_people_are_shares_of_the_data():
-    """As in the data's own program, shapes for age, muscle and weight are interpolated linearly."""
+    """A person's shape interpolates the data linearly by age, muscle and weight.
+
+    The program for which the data are made uses the same formula.
+    """
     girl = people.PEOPLE["girl"].shape()
     for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # her weight is 0.4
         for age, years in (("child", 0.7), ("baby", 0.3)):

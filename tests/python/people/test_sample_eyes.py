@@ -25,7 +25,7 @@ def _height(points, middle, radius, gaze):
 
 
 def test_the_eye_has_the_measures_of_real_ones():
-    """Measures are in mm, of an eye that is scaled so that its iris is as large as a human one."""
+    """Cornea, iris and pupil have human sizes in mm if the iris is scaled to a human iris."""
     size = LIMBUS / eyeball.IRIS
     assert 12 <= size <= 15.5  # people's eyeballs have a radius of 12 mm, the data's up to 16
     top = size * float(eyeball.surface(np.zeros(1))[0])
@@ -118,7 +118,7 @@ LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLo
 
 
 def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
-    """When several controls raise the skin around the lid rims, it stays 0.4 mm above the eye."""
+    """Skin around the lids stays 0.4 mm outside the eye if several controls raise it together."""
     for side, eye in face.eyes.lids.items():
         for pose in (
             {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},

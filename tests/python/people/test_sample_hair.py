@@ -407,7 +407,7 @@ def test_metadata_say_where_strands_wind(haired):
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):
-    """Hair roots move with the skin within 2 mm, for several controls at 1."""
+    """Roots of hair stay within 2 mm of the skin for each of several controls at 1."""
     dna, hair, _ = haired[1]
     names = dna.raw_control_names
     worst = {}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests teeth, lips, tongue, shirt and asymmetry of sample people; with real data if available."""
+"""Teeth, lips and shirt of the sample people, and differences between the left and right side.
+
+Tests of the real data are skipped if the data are missing.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +35,7 @@ def man():
 
 
 def _pieces(polygons):
-    """The number of connected pieces of a mesh; in these meshes, UV islands are the same pieces."""
+    """The number of connected pieces of a mesh, counted as its UV islands."""
     return len(np.unique(islands(polygons)))
 
 
@@ -150,9 +153,9 @@ def test_extra_a_shirt_has_a_collar_and_one_hem(base):
 
 
 def test_extra_skin_in_the_shirt_rests_in_every_expression(base, man):
-    """Only controls of breath move the skin below the shirt.
+    """No control except breath moves skin below the shirt.
 
-    Otherwise it would come through the collar, for example in a shout.
+    Otherwise the skin would come through the collar, for example in a shout.
     """
     skin = man.groups["body"]
     skin = skin[np.abs(base.positions[skin, 0]) < 1]

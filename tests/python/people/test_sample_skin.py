@@ -234,7 +234,10 @@ def test_the_relief_has_what_a_mesh_rounds_off(mask):
 
 
 def test_loops_are_counted_from_the_mouths_inside():
-    """The mesh has two UV islands: rings of skin around the mouth, and the inside of the mouth."""
+    """Loops of edges around the mouth are numbered from its inside.
+
+    The mesh has two UV islands: a ring of skin around an opening, and the inside of the mouth.
+    """
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     rings = np.concatenate(
         [

@@ -43,7 +43,10 @@ def sheet():
 
 
 def folds(sheet, change):
-    """Folds of mask blink_L on the deformed sheet, float64[V, 4]; all other masks have none."""
+    """float64[V, 4]: folds of the mask blink_L if eyeBlinkL deforms the sheet by `change`.
+
+    All other controls move nothing.
+    """
     part, positions = sheet
     still = Expression(np.zeros_like(positions))
     units = {

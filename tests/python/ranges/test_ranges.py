@@ -30,7 +30,14 @@ BLINKS = [90 + 120 * n for n in range(len(HEIGHTS))]  # frames of the blinks
 
 
 def bump(count, at, width, height):
-    """A curve that rises and falls by cosines over `width` frames beside a top of 3 frames."""
+    """A curve that rises over `width` frames, is flat for 3 frames around `at`, and falls again.
+
+    Args:
+        count: number of frames of the curve.
+        at: frame of the middle of the flat top.
+        width: frames of the rise and of the fall, which are half cosines.
+        height: value of the flat top.
+    """
     distance = np.maximum(np.abs(np.arange(count) - at) - 1.0, 0.0)
     return height * np.where(distance < width, 0.5 + 0.5 * np.cos(np.pi * distance / width), 0.0)
 

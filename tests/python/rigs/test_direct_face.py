@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests final vertices from Python: values of the oracle, rules of writing, wrong arguments."""
+"""DirectFace computes final vertices like the oracle, writes only changes, refuses bad input."""
 
 import re
 import sys
@@ -14,7 +14,7 @@ TURN = np.array([[0.9238795, 0.0, 0.3826834, 0.0]], np.float32)  # 45 degrees ab
 
 
 class Face:
-    """The face of skin_oracle; its six joints are bones in another order, below a seventh bone."""
+    """The oracle's face, its six joints as bones in another order, and an additional root bone."""
 
     ROWS = (3, 0, 6, 1, 5, 4)
     OTHER = 2  # no joint of the file: a root above all others

@@ -55,7 +55,10 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, Euler angles), ...]}: factors of each joint's quaternion, in order."""
+    """{joint: [(control, [x, y, z]), ...]}: factors of each joint's quaternion, in their order.
+
+    The angles have the file's unit.
+    """
     out = {}
     for group in dna.joint_groups:
         found, order = {}, oracle.column_order(dna, group)
@@ -74,7 +77,7 @@ def turns(dna, lod):
 
 
 def giant(dna):
-    """The face with all rows in one joint group, rows of the most LODs first."""
+    """The face with all rows in one joint group, sorted so that coarser LODs use leading rows."""
     out = copy.deepcopy(dna)
     width = control_count(dna)
     rows = []
@@ -200,8 +203,7 @@ def overlapping_face(seed):
     """A face with few joints in many groups.
 
     Some groups write a row twice, repeat a control, skip a LOD or rotate quaternion joints, and
-    some
-    correctives read correctives.
+    some correctives read correctives.
     """
     rng = np.random.default_rng(seed)
     dna = random_face(seed, 5)
@@ -260,7 +262,7 @@ def test_correctives_that_others_read_are_computed_as_before(seed):
 
 
 def without_turns(dna):
-    """The face with Euler angles instead of quaternions, which depend on the order of columns."""
+    """The face with Euler angles instead of quaternions, so that the order of columns is free."""
     out = copy.deepcopy(dna)
     out.joint_behavior_metadata = risorius.JointBehaviorMetadata()
     return out
@@ -292,7 +294,10 @@ def test_quaternions_come_out_of_one_group_whole(name):
 
 
 def turning_face(*groups):
-    """Two quaternion joints at 2 LODs. groups: (rows at each LOD, controls, outputs, values)."""
+    """A face with two quaternion joints and two LODs.
+
+    Args: groups  joint groups: (rows of each LOD, control indices, output indices, values).
+    """
     dna = risorius.Dna()
     dna.lod_count = 2
     dna.raw_control_names = [f"raw{i}" for i in range(4)]

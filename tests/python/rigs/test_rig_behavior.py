@@ -72,7 +72,10 @@ class Face:
         return out
 
     def stretched(self, record):
-        """Joints of setups with non-unit input, for which Euler angles and quaternions differ."""
+        """Joints of setups whose input quaternion has not unit length.
+
+        For these, Risorius and the reference compute different angles.
+        """
         layer, controls = self.dna.twist_swing_behavior, self.expected_controls(record)
         out = []
         for s in (*layer.twists, *layer.swings):
@@ -105,7 +108,10 @@ class Face:
             )
 
     def bounds(self, pose, record, lod):
-        """Allowed errors of joints, [J, 9], from rounding of sums and from differing controls."""
+        """float64[J, 9]: allowed error of each joint attribute.
+
+        It contains the rounding of sums, and the effect of the controls' deviations.
+        """
         wanted = self.expected_controls(record)
         error = np.abs(pose.controls - wanted)
         if self.converted:
@@ -120,7 +126,7 @@ class Face:
         return out.reshape(-1, 9) + 1e-6
 
     def mixed_twists(self):
-        """Joints of twists that share a rotation with a swing and with another twist or axis."""
+        """Joints of twists that share a rotation with another twist or a swing of another axis."""
         layer = self.dna.twist_swing_behavior
         axes = {}
         for s in layer.swings:
@@ -270,8 +276,7 @@ def test_filtered_loads_are_our_lods(name, tag, lods, simd):
     """Compare filtered loads of the reference with the same LODs of a complete load.
 
     A filtered load has the joints of its LODs and the joints of no LOD. Quaternions are not
-    compared,
-    because the order of their columns depends on the load.
+    compared, because the order of their columns depends on the load.
     """
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)
@@ -302,7 +307,10 @@ def test_filtered_loads_are_what_the_reference_loads(name, tag, lods, simd):
 
 
 def reference_joints(name, lods, loaded):
-    """Indices of the reference's joints in a filtered Dna, which also has ancestors; None: all."""
+    """Indices in Risorius' filtered face of the joints that the reference keeps.
+
+    Risorius also keeps ancestors of these joints. None if both keep the same joints.
+    """
     whole = risorius.load(GOLDEN_SET / f"{name}.dna")
     kept = set(range(len(whole.joint_names))) - set(whole.lod_joint_mapping[0].tolist())
     kept |= set().union(*(whole.lod_joint_mapping[lod].tolist() for lod in lods))
@@ -334,7 +342,7 @@ def test_oracle_agrees_and_settled_is_what_repeats_itself(name, rotation):
 
 @pytest.mark.parametrize("rotation", ["euler", "quaternion"])
 def test_euler_angles_of_networks_are_read_by_their_own_system(rotation):
-    """A network's angles have another order, other signs and other axes than the face."""
+    """Euler angles of networks may have their own order, signs and axes, unlike the face's."""
     dna = risorius.load(GOLDEN / "ml.dna")
     joints = dna.machine_learned_behavior_ext.joints
     assert oracle_behavior.ml_stride(dna) == 9

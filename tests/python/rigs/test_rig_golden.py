@@ -19,8 +19,7 @@ def is_plain(name, about):
     """Whether the oracle of this test can evaluate a file quickly.
 
     The file has no networks, solvers or setups, and at most a quarter of its joints are
-    quaternions.
-    test_rig_behavior tests all files.
+    quaternions. test_rig_behavior tests all files.
     """
     if any(about["counts"][part] for part in BEYOND):
         return False
@@ -175,8 +174,7 @@ def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods, s
     """Compare filtered loads of the reference with the same LODs of a complete load.
 
     A filter keeps the joints of its LODs in order. Quaternions are not compared, because the order
-    of
-    their columns depends on the load.
+    of their columns depends on the load.
     """
     dna = risorius.load(GOLDEN_SET / f"{name}.dna")
     rig = risorius.Rig(dna, simd=simd)

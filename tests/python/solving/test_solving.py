@@ -125,7 +125,7 @@ PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_partners_change_alike_and_as_little_as_they_can(face, method):
-    """The change equals the pseudo-inverse's, in which one number moves both partners."""
+    """Both partners change by one number, which the pseudo-inverse of their joint column gives."""
     surface = face[1]
     vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
     here = surface.positions(begin, 0, vertices).astype(float)
@@ -241,7 +241,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """It ends at most 1.3 mm farther away; no active control has an active opposite."""
+    """It ends at most 1.3 mm farther from the goal; no active slider has an active opposite."""
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
@@ -313,9 +313,9 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """The price equals the price of coordinate descent on the penalised problem.
+    """The change costs as much as a solution by coordinate descent with the same error.
 
-    The penalty is chosen so that both solutions have the same error.
+    The penalty of the coordinate descent is chosen so that the errors are equal.
     """
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2

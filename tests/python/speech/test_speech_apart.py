@@ -38,7 +38,7 @@ def endless(tmp_path):
 
 @pytest.fixture
 def processes(monkeypatch):
-    """A list to which each started process of speech recognition is added."""
+    """The list of the recogniser's processes that the test starts."""
     found, begin = [], apart._started
 
     def spy(said):

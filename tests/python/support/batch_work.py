@@ -40,7 +40,7 @@ def deadly_once(job, threads=1):
 
 
 def beside_deadly(job):
-    """A job named deadly kills its worker each time; other jobs end after the third death."""
+    """Kill the worker if the job is the deadly one; any other job waits for the third death."""
     deaths = job.clip.with_name("deaths")
     if job.clip.stem == "deadly":
         with deaths.open("ab") as file:

@@ -80,7 +80,7 @@ class BodyFile:
         )
 
     def add_skinned(self, name, places, joints, targets=()):
-        """Add a skinned mesh; its own coordinate system is rotated, scaled and shifted."""
+        """Add a skinned mesh whose vertices are stored in a rotated, moved and scaled space."""
         space = np.eye(4)
         space[:3, :3], space[:3, 3] = 2.0 * TURN.T, [0.1, 0.2, 0.3]
         own = np.c_[places, np.ones(len(places))] @ np.linalg.inv(space).T

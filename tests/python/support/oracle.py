@@ -111,10 +111,8 @@ def column_order(dna, group):
     """Columns of a joint group that rotate quaternion joints, in the reference's order.
 
     The order is built for each LOD, finest first: search backwards from the end for a column that
-    is
-    zero in all rotation rows of the LOD, swap it with the column at the end, and move the end back
-    by
-    one.
+    is zero in all rotation rows of the LOD, swap it with the column at the end, and move the end
+    back by one.
     """
     matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
     turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]
@@ -135,8 +133,8 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     """Calculate in place the Euler angles of the joints that the file declares as quaternions.
 
     Also sets their error bounds: float32 products of n unit quaternions err by about 8 (n + 2) eps,
-    the
-    reference's arc sine by 1e-6; both are divided by the squared cosine of the middle Euler angle.
+    the reference's arc sine by 1e-6; both are divided by the squared cosine of the middle Euler
+    angle.
     """
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)
