@@ -39,7 +39,7 @@ class Cluster:
             self._dask: Any = importlib.import_module("distributed")
         except ImportError as error:
             raise PoolError(
-                "--scheduler needs the package distributed: pip install 'risorius[cluster]'"
+                "--scheduler needs the package distributed: pip install distributed"
             ) from error
         self._work, self.address = work, address
         # Dask logs lost connections with tracebacks; we report them in one sentence.
