@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo, save and reload, append, duplicate, disable and enable keep a face working."""
+"""Tests that undo, save, reload, append, duplicate, disable and enable keep a face working."""
 
 import addon_utils
 import bpy

@@ -64,7 +64,7 @@ class Descriptor {
   int number_;
 };
 
-// Null if the system refuses.
+// Maps a file into memory. Null if the system refuses.
 std::shared_ptr<const void> mapped(int file, std::size_t size) {
   void* memory = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
   if (memory == MAP_FAILED) return nullptr;

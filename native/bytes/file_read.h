@@ -27,8 +27,9 @@ enum class ReadBy {
   kMap,
 };
 
-/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that is cut while it is
-///        is read)
+/// Reads a whole file.
+/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that becomes shorter
+///        while it is read)
 core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
 }  // namespace risorius::bytes

@@ -16,7 +16,8 @@ namespace risorius::author::detail {
 
 using Vec3 = Eigen::Vector3d;
 
-/// A surface at its present positions. The tree refers to both spans, which must live longer.
+/// A search tree over the triangles of a surface. It refers to the triangles and positions that its
+/// constructor gets, which must live longer.
 class Nearest {
  public:
   struct Hit {
@@ -54,7 +55,7 @@ class Nearest {
   std::vector<Box> boxes_;
 };
 
-/// Shares of the corners a, b and c in the point of their triangle that is nearest to p.
+/// Barycentric coordinates of the point of triangle a, b, c that is nearest to p.
 /// Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5
 Vec3 nearest_shares(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 

@@ -18,16 +18,18 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// Bytes of magic, version and size of the body; the body and its hash follow.
+// Reads events. Memory is only taken for events that were read, because the count may be wrong.
 inline constexpr std::size_t kHeadStart = 12;
-// Bytes of a block's head: mark, size of the bytes behind the hash, frames, first frame (8), hash
-// (8) of these fields and of the bytes that follow.
+// Bytes of a block's head: mark (4), number of bytes after the head (4), frames (4), first frame
+// (8), and the hash (8) of these fields and of the bytes after the head.
 inline constexpr std::size_t kBlockStart = 28;
-// Bytes of the end: offset of the index (8), its size, mark, and the hash (8) of these fields.
+// Bytes of the end of a file: offset of the index (8), size of the index (4), mark (4), and the
+// hash (8) of the index and these fields.
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 
-// Times are 8-byte floats mapped to ordered integers, stored as second differences.
+// Maps the bits of a time, a double, to an integer so that ascending times give ascending integers.
+// The file stores second differences of these integers.
 inline std::uint64_t time_in_order(std::uint64_t bits) {
   return bits ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(bits) >> 63) >> 1;
 }

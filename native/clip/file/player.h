@@ -10,8 +10,8 @@
 
 namespace risorius::clip {
 
-/// Keeps the block of the last frame decoded, so that a following frame only costs a copy of the
-/// moving curves.
+/// Plays a clip frame by frame. The block of the last frame stays decoded, so that a following
+/// frame only costs a copy of the moving curves.
 class Player {
  public:
   explicit Player(Reader reader);

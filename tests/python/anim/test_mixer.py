@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mixer, compared with a NumPy version written from the comment in clip/mixer/mixer.h."""
+"""Compares the mixer with a NumPy version that follows the comment in clip/mixer/mixer.h."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The scene time at which the layer is evaluated, or None if it has no effect."""
+    """The scene time at which a layer is evaluated, extended or not; None if it has no effect."""
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time
@@ -218,7 +218,7 @@ def test_a_warp_that_falls_plays_backwards():
     np.testing.assert_allclose(shown, 0.75 - times / 2, rtol=0, atol=1e-6)
 
 
-# Settings of a layer that are refused together with a warp, because the warp replaces them.
+# Settings that the warp of a layer replaces; a layer with both is refused.
 BESIDE_A_WARP = (
     {"start": 0.5}, {"end": 3.0}, {"clip_range": (0.25, 0.5)}, {"scale": 2.0}, {"repeat": 2.0},
     {"reverse": True},
@@ -305,8 +305,7 @@ def test_firing_again_makes_no_step_and_never_goes_beyond_one():
         mixer.fire("two", when)
     curve = mixer.evaluate_batch(times)[:, 0]
     assert curve.max() <= 1.0
-    # The curve changes at most as fast as sixteen overlapping attacks to 0.8. An attack of 0.3 s
-    # along x * x * (3 - 2 * x) has a largest slope of 1.5 / 0.3.
+    # The slope of x * x * (3 - 2 * x) is at most 1.5 / attack, and at most sixteen attacks overlap.
     assert np.abs(np.diff(curve)).max() < 16 * 0.8 * 1.5 / 0.3 * (times[1] - times[0])
 
 
@@ -406,7 +405,7 @@ def test_files_of_rules_and_reactions(tmp_path):
 
 
 def test_every_region_has_standard_controls_and_a_title(standard_controls):
-    """The order of the regions must stay, because the add-on stores their indices."""
+    """The order of regions must not change, because the add-on stores their indices."""
     assert " ".join(REGIONS) == "brow eye nose cheek mouth jaw tongue teeth neck ear other"
     assert {region_of(name) for name in standard_controls} == set(REGIONS) - {"other"}
     assert TITLES["brow"] == "Brows"

@@ -21,7 +21,7 @@ CONTROLS = {"jaw_open": "jawOpen", "smile": "mouthCornerPullL", "pucker": "mouth
 
 @pytest.fixture(scope="module")
 def template(tmp_path_factory):
-    """The mean head with three expressions, as a DNA file."""
+    """The path of a DNA file of the mean head with three expressions."""
     form = head_form()
     every = zip(form.expression_names, form.expressions, strict=True)
     ways = {CONTROLS[name]: way[: form.skin] for name, way in every if name in CONTROLS}

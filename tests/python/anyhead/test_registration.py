@@ -33,7 +33,7 @@ def found(heads):
 
 
 def _mm(template, found, true):
-    """Errors along the surface, in mm of a head of 240 mm."""
+    """Errors of vertices along the surface, in mm for a head of 240 mm."""
     return any_heads.errors(template, found, true) * any_heads.HEAD_MM / np.ptp(true[:, 1])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of repair: lids and lips close, and expressions without faults stay unchanged."""
+"""Tests of repair: lids and lips close, and expressions without faults do not change."""
 
 import copy
 import sys
@@ -122,8 +122,8 @@ def test_lips_meet_where_an_open_jaw_is_closed(head, skin, mended):
     assert before.lip_gap > 1.5
     assert after.lip_gap <= 0.3
     assert after.lip_cut <= 0.15
-    # The gap is also measured without the code under test: the lines of the upper and the lower
-    # lip coincide at rest, and may be at most 0.5 mm apart in the repaired pose.
+    # Distances between the lower and the upper line of the lips, which coincide at rest; they are
+    # measured without the tested code.
     points = skin.points + mended.combinations[CLOSED]
     line = np.flatnonzero(np.abs(skin.points[:, 1] - MOUTH) < 0.01)
     middle = line[np.abs(skin.points[line, 0]) < 0.6 * HALF]

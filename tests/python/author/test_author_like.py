@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reusing joints, weights and levels of a joint rig for another person."""
+"""Tests that joints, weights and LODs of a joint rig can be used for another person."""
 
 import copy
 import importlib.util
@@ -20,7 +20,7 @@ from risorius.author import (
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 
-# This module poses vertices by the format's description, without code of risorius.author.
+# The module computes skinning and morphing from the format's description, without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle_like", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Packed or quantized heads equal the plain heads; damaged files are refused."""
+"""Tests that compressed or quantized heads equal plain heads; damaged files are refused."""
 
 import functools
 import sys
@@ -28,7 +28,7 @@ def rows(array, stride):
 
 
 def numbers():
-    """Quantized positions, displacements and texture coordinates of the head of face_shapes.py."""
+    """Quantized positions, displacements and texture coordinates of the head of face_shapes."""
     positions, _ = face_shapes.head()
     low = positions.min(axis=0) / 100
     whole = np.round((positions / 100 - low) / STEP).astype("<u2")
@@ -41,10 +41,10 @@ def numbers():
 
 
 def head(path, *, packed, change=None):
-    """Write a head like gltfpack.
+    """Write a head as gltfpack does, compressed only if `packed`.
 
-    It has quantized numbers, a node that scales them back, packed views, normals of eight bits, and
-    texture coordinates that the material scales.
+    It has quantized numbers, a node that scales them back, normals of eight bits, and texture
+    coordinates that the material scales.
     """
     low, whole, moved, uvs = numbers()
     glb = Glb()
@@ -197,7 +197,7 @@ def test_texture_coordinates_that_no_picture_has_are_one_sentence(tmp_path):
 
 
 def test_damaged_bytes_are_refused_or_read(tmp_path):
-    """Changed bytes and cut files raise only errors of Risorius."""
+    """Files with changed bytes or cut ends raise only errors of Risorius."""
     whole = head(tmp_path / "whole.glb", packed=True).read_bytes()
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261127)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The check of random acting finds penetrations and measures their depth."""
+"""Tests that the check of random acting finds penetrations and measures their depth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from acting_random import random_acting
 
 
 def sphere(radius=1.4, bulge=0.1):
-    """An eyeball with a cornea that looks along z."""
+    """Vertices of an eyeball with a cornea that looks along z."""
     up, side = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 40), np.linspace(-np.pi, np.pi, 80))
     rays = np.stack([np.sin(up) * np.sin(side), np.cos(up), np.sin(up) * np.cos(side)], axis=-1)
     rays = rays.reshape(-1, 3)
@@ -58,7 +58,7 @@ def test_what_lies_within_an_eye_is_no_part_of_its_surface():
 
 
 def teeth():
-    """A row of teeth: an arc of a wall from radius 3 to 3.4, height 0 to 1, with z above 0."""
+    """Vertices and triangles of an arc of a wall: radius 3 to 3.4, height 0 to 1, z above 0."""
     angle, height = np.meshgrid(np.radians(np.arange(-80, 81, 5)), [0.0, 1.0], indexing="ij")
     places = np.concatenate(
         [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius clip`: output, written files, exit codes."""
+"""Tests the command `risorius clip`: output, written files, exit codes."""
 
 from __future__ import annotations
 

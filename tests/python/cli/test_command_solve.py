@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius solve`, and the files it reads."""
+"""Tests the command `risorius solve`, and the files that it reads."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from skin_oracle import skinned, small_face
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
-    """A face's DNA file, control curves, and the vertices of each frame."""
+    """A face's DNA file, its control curves, and its vertices in each frame."""
     dna = small_face()
     path = tmp_path_factory.mktemp("solve") / "face.dna"
     dna.save(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ctrl-C, a full disk and a closed pipe end a command with one sentence and leave no file.
+"""Tests that Ctrl-C, a full disk or a closed pipe end a command with a sentence and leave no file.
 
 Each command reads a named pipe instead of an input file. When the pipe's other end can be opened,
 the command has started its work, even on a busy machine.
@@ -32,7 +32,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with n
 
 
 def started(arguments, folder):
-    """Start a command that reads a pipe. Returns the process, the pipe's open end, and its path."""
+    """Start a command that reads a pipe. Returns its process, the pipe's write end, its path."""
     name = next(a for a in arguments if a.startswith("in."))
     os.mkfifo(folder / name)
     process = subprocess.Popen(

@@ -35,7 +35,7 @@ def test_the_standard_library_reads_the_numbers_of_the_file():
         np.float32([mesh["positions"][axis] for axis in ("xs", "ys", "zs")]).T,
         dna.meshes[0].positions,
     )
-    # A file that the standard library wrote in another order loses nothing either.
+    # JSON that the standard library wrote in another order loses no value.
     shuffled = json.dumps(facts, sort_keys=True, separators=(",", ":"))
     assert risorius.Dna.from_json(shuffled).to_bytes() == dna.to_bytes()
 

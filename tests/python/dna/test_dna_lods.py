@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""LOD filters: the result is a complete file with the meshes and motion of the original."""
+"""Tests LOD filters: the result is a complete file with meshes and motion of the original."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def mapping(rows):
 
 
 def many_lods(count):
-    """A face with one joint, channel, map and mesh per LOD, and their controls.
+    """A face with one joint, channel, map and mesh for each LOD, and one raw control.
 
     LOD l lists the joints from l on, channel l, map l and mesh l.
     """
@@ -33,7 +33,7 @@ def many_lods(count):
     dna.mesh_names = [f"mesh{i}" for i in range(count)]
     dna.mesh_blend_shape_channel_mapping = [[i, i] for i in range(count)]
     dna.joint_row_count, dna.joint_column_count = 9 * count, 1
-    # The highest LOD's rows come first, because each LOD uses the leading rows.
+    # Rows that the coarsest LOD uses come first, because each LOD uses the first rows of a group.
     order = list(range(count))[::-1]
     dna.joint_groups = [
         risorius.JointGroup(
@@ -131,7 +131,7 @@ def test_any_number_of_lods(count):
     last = count - 1
     part = risorius.load(data, lods=[last])
     assert (part.lod_count, part.max_lod) == (1, last)
-    # The root stays as the parent of the last joint.
+    # Joint 0 stays, because it is the parent of the last joint.
     assert part.joint_names == [f"joint{i}" for i in sorted({0, last})]
     assert part.joint_parents.tolist() == [0] * len(part.joint_names)
     assert part.blend_shape_channel_names == [f"channel{last}"]

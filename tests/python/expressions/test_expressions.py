@@ -62,7 +62,7 @@ def test_no_two_are_mistaken_for_each_other(standard_controls):
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     alike = vectors @ vectors.T - np.eye(len(shown))
     first, second = divmod(int(alike.argmax()), len(shown))
-    # The two most similar expressions are visemes of the tongue, which look alike on people too.
+    # The two most similar expressions are sounds of the tongue, which also look alike on people.
     assert alike.max() < 0.91, (shown[first].name, shown[second].name)
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Long hair that swings: its joints, their weights, and the tables of VRM.
+"""Tests long hair that swings: its joints, their weights, and the tables of VRM.
 
-packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
+packaging/ship/gameface.sh tests such files in three-vrm and Blender's VRM reader.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ LENGTH = 0.18  # metres
 
 @pytest.fixture(scope="module")
 def haired(face, tmp_path_factory):  # noqa: F811
-    """A face with hair that hangs 18 cm, behind and beside the head."""
+    """The path of a face with hair that hangs 18 cm behind the head."""
     dna = risorius.load(face)
     path = tmp_path_factory.mktemp("haired") / "anna.dna"
     dna.mesh_names = [name.replace("eyeLeft", "hair") for name in dna.mesh_names]
@@ -120,7 +121,7 @@ def test_vrm_0_lists_the_first_bones_of_chains(haired, tmp_path):
     [ball] = table["colliderGroups"][0]["colliders"]
     [sphere] = new.json["extensions"]["VRMC_springBone"]["colliders"]
     x, y, z = sphere["shape"]["sphere"]["offset"]
-    # A VRM 0 model faces the opposite way, which negates x and z; Unity's z axis negates z again.
+    # VRM 0.x faces back, which reverses x and z, and Unity's z axis is opposite to glTF's.
     assert np.abs([ball["offset"][k] for k in "xyz"] - np.array([-x, y, z])).max() < 1e-6
 
 

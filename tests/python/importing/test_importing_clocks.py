@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Times of captures: units in many spellings, and clocks that stop or run backwards."""
+"""Tests times of captures: units in many spellings, and clocks that stop or run backwards."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FEW = ["JawOpen", "MouthSmileLeft"]
 
 
 def convert(tmp_path, name, text, *options):
-    """Run `risorius clip convert`.
+    """Run `risorius clip convert` on a file with this text.
 
-    Returns the exit code and the clip; the CSV's times are in seconds.
+    Returns the exit code and the converted clip, or None.
     """
     path, out = tmp_path / name, tmp_path / "out.rzc"
     path.write_text(text)
@@ -58,7 +58,7 @@ SPELLINGS = [
     ("timestamp (nanosec)", 33333333), ("time (min)", 1 / 1800), ("Time (millisec)", 33.333),
     ("time_millis", 33.333), ("timestamp_ms", 33.333), ("time in seconds", 1 / 30),
     ("elapsed (Sec.)", 1 / 30), ("time (h)", 1 / 108000),
-    # Times without a unit that are too large for seconds.
+    # These columns have no unit, but steps that are too large for seconds.
     ("timestamp", 33), ("time", 33333.0), ("t", 33333333),
 ]  # fmt: skip
 
@@ -119,12 +119,12 @@ def test_frame_numbers_need_a_rate(tmp_path, form, header, capsys):
 
 
 def stopped(form):
-    """A take whose times are whole seconds."""
+    """A take whose times are whole seconds, so that 20 frames have the same time."""
     return FORMS[form]("time (s)", [i // 20 for i in range(60)])
 
 
 def set_back(_):
-    """A take of Live Link Face whose clock jumps back an hour in its middle."""
+    """A take of Live Link Face whose clock is set back an hour in the middle."""
     seconds = 36000.0 + np.arange(60) / 30.0
     seconds[30:] -= 3600.0
     return live_link_face(capture(60, FEW), seconds, names=FEW)
@@ -178,8 +178,8 @@ def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, ba
             assert "give the timecode rate (clip convert --timecode-rate" in str(error)
             continue
         note = next(note for note in found.notes if note.startswith("the timecode counts"))
-        # Without the rows at a change of the second, takes at 48 and 50 frames per second look like
-        # takes at 60, the rate of nearly all phones.
+        # If rows at the change of the second are lost, 48 and 50 frames a second look like 60, the
+        # rate of nearly all phones.
         assert note.split()[3] in (str(base), "60")
 
 

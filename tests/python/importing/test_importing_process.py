@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Processing steps of clips, each compared with a formula."""
+"""Tests processing steps of clips; each is compared with a formula."""
 
 from __future__ import annotations
 
@@ -92,8 +92,8 @@ def test_smoothing_passes_cubics_and_takes_noise():
     np.testing.assert_allclose(only(process.smooth(clip(cubic), 0.2)), cubic, atol=1e-5)
     noise = np.random.default_rng(1).normal(size=5000)
     out = only(process.smooth(clip(noise), 0.2))  # half width 6: 13 frames
-    # Remaining variance of a cubic fit at the middle of 13 samples: 3 (3 m^2 + 3 m - 1) /
-    # ((2m+3)(2m+1)(2m-1)), m = 6.
+    # Remaining variance of noise at the middle of a cubic fit to 2 m + 1 = 13 samples: 3 (3 m^2 + 3
+    # m - 1) / ((2m+3)(2m+1)(2m-1)).
     expected = 3 * (3 * 36 + 18 - 1) / (15 * 13 * 11)
     assert abs(out[20:-20].var() / expected - 1.0) < 0.1
 
@@ -117,7 +117,7 @@ def test_smoothing_keeps_a_peaks_height_and_time():
     assert kept.max() > 0.97
     soft = only(process.gaussian(clip(blink), 0.05))
     assert int(np.argmax(soft)) == 60
-    # The squared widths of two successive Gaussians add up.
+    # The squared widths of successive Gaussians add up: the blink's 0.05 s and the filter's 0.05 s.
     assert soft.max() == pytest.approx(1 / np.sqrt(2), abs=0.01)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables: takes of Live Link Face as the app writes them, and CSV files of other programs."""
+"""Tests tables: takes of Live Link Face as the app writes them, and CSV of other programs."""
 
 from __future__ import annotations
 
@@ -455,6 +455,6 @@ def test_the_report_names_every_curve(tmp_path):
     assert all(name in words for row in report.mapped.values() for name in row)
     assert "more" not in words
     assert max(map(len, text.splitlines())) <= 100 + len(str(path))
-    # Curves of the clip that are no controls of the rig are reported too.
+    # The report also names curves that are no controls of the rig, but rotate the head.
     assert report.bones == list(clip.names) == ["head.yaw"]
     assert "for the bones of head and eyes: 1: head.yaw" in text

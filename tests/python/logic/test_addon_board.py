@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face board's table, its fit and its layout, tested without Blender."""
+"""Tests the face board without Blender: its table, its fit to raw controls and its layout."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _of_rows(names: list[str], rows: Rows, raw: int) -> Any:
 
 @pytest.fixture(scope="module")
 def sample() -> tuple[Any, list[str]]:
-    """The table of the sample man and the names of its raw controls."""
+    """The GUI table of the sample man and the names of its raw controls."""
     rows: Rows = []
     names, raw = [], []
     for gui, ways in sample_controls.gui_table():
@@ -47,7 +47,7 @@ def board(sample: tuple[Any, list[str]]) -> Any:
 
 
 def _raw_by_hand(table: Any, gui: np.ndarray) -> np.ndarray:
-    """The raw controls of a pose, from the table's rows one after the other."""
+    """Raw controls for GUI values, calculated row by row from the table."""
     out = np.zeros(table.raw_count)
     done = set()
     for row in table.rows:

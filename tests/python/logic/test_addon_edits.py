@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's search, transfer and writing of edits, tested without Blender."""
+"""Tests the add-on's search, transfer and writing of edits without Blender."""
 
 from __future__ import annotations
 

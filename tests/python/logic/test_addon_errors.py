@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on translates error messages of the package by rows with {names} of values."""
+"""Tests the translation of the package's error messages by rows with {names} of values."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The primary board, tested without Blender: controls and places of its handles, and poses."""
+"""Tests the primary board without Blender: controls and places of its handles, and poses."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ primary: Any = importlib.import_module("risorius_addon_logic.character.primary_t
 drawing: Any = importlib.import_module("risorius_addon_logic.character.primary_layout")
 view_fit: Any = importlib.import_module("risorius_addon_logic.character.view_fit")
 
-# A 3D view in a window of 1366 x 768 pixels as Blender opens it (width, height); its part that
-# toolbar, sidebar and headers leave free (left, bottom, right, top; measured in 4.3.2 and 5.2.2);
-# its lens in mm.
+# Size of a 3D view in a window of 1366 x 768 pixels as Blender opens it (width, height); the part
+# of it that no toolbar, sidebar or header covers (left, bottom, right, top; measured in 4.3.2 and
+# 5.2.2); its lens in mm.
 VIEW, FREE, LENS = (1119, 663), (58, 0, 827, 609), 50.0
 HEAD = (-10.1, -17.1, 142.9), (10.1, 4.8, 173.5)  # corners of the sample man's head, in cm
 
 
 @pytest.fixture(scope="module")
 def labels() -> list[str]:
-    """Names of the sample's raw controls."""
+    """Names of the sample man's raw controls."""
     table = sample_controls.gui_table()
     return list(dict.fromkeys(name for _gui, ways in table for name, _numbers in ways))
 
@@ -173,10 +173,10 @@ def test_a_handle_travels_40_pixels_in_a_small_window_beside_the_whole_head(
 
 
 def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None:
-    """Compares expressions with the handles that a click on them sets, on a face 240 mm high.
+    """Compares expressions with the poses of the handles that a click on an expression sets.
 
-    The error of a mesh, tongue and teeth included, is the root mean square over the vertices that
-    the expression moves by 0.1 mm or more.
+    The face is 240 mm high. The error of a mesh, tongue and teeth included, is the root mean square
+    over the vertices that the expression moves by 0.1 mm or more.
     """
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
@@ -229,7 +229,7 @@ def primary_errors(dna: Any) -> dict[str, Near]:
 
 
 def _at(surface: Any, raw: np.ndarray, mesh: int) -> np.ndarray:
-    """Vertices of a mesh in mm."""
+    """Vertices of a mesh in mm, for values of the raw controls."""
     places = surface.positions(raw.astype(np.float32), mesh)
     return np.asarray(places, np.float64) * surface.mm
 

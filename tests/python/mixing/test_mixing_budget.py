@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Mixing, solving and authoring use memory in proportion to their files.
+"""Tests that mixing, solving and authoring use memory in proportion to their files.
 
-Large counts in a file do not lead to dense tables.
+Large counts in a file must not lead to dense tables.
 """
 
 import copy
@@ -29,7 +29,7 @@ BASE, BYTES_PER_BYTE = (
 
 
 def peak_of(work):
-    """Run work(). Returns its result and the peak of memory in bytes."""
+    """Run work(). Returns its result and the largest memory in use, in bytes."""
     tracemalloc.start()
     try:
         return work(), tracemalloc.get_traced_memory()[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixing faces with all layers: equal data stay byte for byte, a difference gives one sentence."""
+"""Tests mixing of faces with all layers: equal data stay equal, a difference gives a sentence."""
 
 import copy
 
@@ -16,7 +16,7 @@ LAYERED = ["mlquat", "rbf", "tiny_v28", "twistswing"]
 
 
 def moved(dna):
-    """The face 1 unit higher: its meshes, and the root joint."""
+    """The face 1 unit higher: vertices of its meshes, and its root joint."""
     out = copy.copy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -41,7 +41,7 @@ def test_every_face_mixes_with_a_moved_copy_and_keeps_what_they_share(name):
     for m, mesh in enumerate(mixed.meshes):
         before = np.asarray(face.meshes[m].positions)
         np.testing.assert_allclose(mesh.positions, before + np.float32([0, 0.5, 0]), atol=1e-5)
-    # After the moved positions are set back, the mix equals the face byte for byte.
+    # Without the vertices and joint translations, the mix equals the face byte for byte.
     meshes = []
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):
         mesh.positions = own.positions

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wrinkles of the sample people: they appear where skin is compressed, across the compression."""
+"""Tests wrinkles of sample people: they appear where skin is compressed, across its direction."""
 
 import importlib.util
 import re
@@ -65,7 +65,7 @@ def test_skin_folds_as_far_as_it_is_pushed_together(sheet, share):
     found = folds(sheet, np.diag([1 - share, 1, 1]))
     expected = (share - wrinkles._LEAST) / (wrinkles._FULL - wrinkles._LEAST)
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
-    # The lines are across the compression: only yy of the tensor is not 0.
+    # Lines of folds are perpendicular to the compression: only yy of the tensor is not 0.
     np.testing.assert_allclose(found[:, 3], expected, atol=1e-9)
     np.testing.assert_allclose(found[:, 1:3], 0, atol=1e-9)
 
@@ -99,8 +99,8 @@ def test_folds_run_along_their_lines(way):
     inner = heights[20:76, 30:86]
     assert inner.min() < -0.9
     assert inner.max() <= 0
-    # `way` is the axis of the folds' lines, 0 for x: neighbours along it are similar, neighbours
-    # across it are not.
+    # If `way` is 0, lines are along x, so that neighbours in x are similar and neighbours in y are
+    # not.
     along = np.abs(np.diff(inner, axis=1 - way)).mean()
     across = np.abs(np.diff(inner, axis=way)).mean()
     assert across > 4 * along
@@ -223,7 +223,7 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
 
 
 def test_no_fold_is_made_where_two_sides_meet(sheet):
-    """Each side alone compresses the middle; both sides together only move the skin."""
+    """Each side alone compresses the middle, but both sides together only shift the skin."""
     part, positions = sheet
     surface = wrinkles.Surface(part.polygons, positions[:, :2], positions)
     left = np.clip(0.5 + (positions[:, :1] - 0.5) / 0.3, 0, 1)
@@ -236,8 +236,7 @@ def test_no_fold_is_made_where_two_sides_meet(sheet):
         )
 
     assert max(rows[:, 0].max() for rows in shared(way).values()) < 0.01
-    # If both sides together make folds, both controls show them, and each control its own side's
-    # share.
+    # If both sides together make folds, each side's control shows the folds of its side.
     together = positions * [[-0.4, 0, 0]]
     found, whole = shared(together), surface.folds(positions + together)
     np.testing.assert_allclose(found["L"] + found["R"], whole, atol=1e-9)

@@ -65,7 +65,7 @@ def face():
 
 
 def one(direct, raw, out, **options):
-    """A frame of one face: (Pose, meshes that were written)."""
+    """Evaluate a frame of one face. Returns (Pose, indices of the meshes that were written)."""
     return risorius.evaluate_faces([direct], [raw], [0], [{0: out}], **options)[0]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words and phonemes in files: written, corrected by other programs, and read."""
+"""Tests files of words and phonemes: written, corrected by other programs, and read."""
 
 import json
 import sys
