@@ -98,7 +98,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
 
 
 def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
-    """Replace the face board by the other kind. Pose and keys are converted as by `switch`.
+    """Replace the face board by a board of another kind, and convert the pose and the keys.
 
     Args:
         context: with a view layer.
@@ -106,7 +106,8 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        The result of the conversion to the new board; empty if the sliders lead.
+        The result of the conversion to the new board. If the sliders lead, nothing is converted
+        and all attributes have their defaults.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)

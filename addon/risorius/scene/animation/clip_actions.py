@@ -228,7 +228,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set a property of all keys from index `first` to the end."""
+    """Set the keyframe property `name` of all keyframes from index `first` to the end."""
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)
@@ -488,7 +488,10 @@ def turning_in(
 def _rows(
     curves: Sequence[bpy.types.FCurve | None], rest: Sequence[float], frames: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """float64[frames] for each channel of a property; a channel without a curve is at rest."""
+    """float64[frames] for each component of a property, sampled from its F-curve.
+
+    A component without an F-curve has its value from `rest` at all frames.
+    """
     return [
         np.full(len(frames), still) if curve is None else sampled(curve, frames)
         for curve, still in zip(curves, rest, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiles the layers of a character to native curves, and mixes them over sliders and bones.
+"""Compiles the animation layers of a character, and mixes them over sliders and bones.
 
 Compiled layers are cached for each character together with the settings they were made from. A
 frame of a character with layers costs one comparison of settings and one native call. The cache
@@ -68,7 +68,10 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Cache of compiled layer sources (clips or poses) and masks, by the settings of the layer."""
+    """Cache of compiled layer sources (clips or poses) and of compiled masks.
+
+    The keys of both tables are the settings of the layer from `_key`.
+    """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)

@@ -45,7 +45,10 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property without keys and drivers. Args: kind  from bpy.props, given  its arguments."""
+    """A property that cannot have keys or drivers, because it lacks the option ANIMATABLE.
+
+    Args: kind  function of bpy.props that makes the property, given  arguments of this function.
+    """
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 
@@ -75,7 +78,7 @@ class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_layer(bpy.types.PropertyGroup):
-    """A layer of animation above the keys of the sliders."""
+    """An animation layer, which is mixed over the keyframe animation of the controls."""
 
     name: bpy.props.StringProperty(name="Name", override=_OVERRIDE)
     kind: _still(bpy.props.EnumProperty, name="Source", items=KINDS)
@@ -185,7 +188,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")

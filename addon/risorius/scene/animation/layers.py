@@ -70,7 +70,10 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 
 
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
-    """The times and frames at which a layer plays its action, or the given action instead."""
+    """The timing of an action in a layer: start, played frames, speed and warp points.
+
+    Without `action`, the action of the layer is used.
+    """
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
@@ -165,7 +168,7 @@ def add_action(
 
     Args:
         controls: control armature of the character.
-        action: action to play; the layer starts at its first frame.
+        action: action to play; the layer starts at the first frame of the action.
         settings: other properties of the layer by name.
 
     Returns:
@@ -275,7 +278,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """Yields the F-curve collections that move no other datablock, and the list of drivers."""
+    """Yields the F-curve collections of actions that only this armature plays, then its drivers."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:
