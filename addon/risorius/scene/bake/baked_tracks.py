@@ -59,7 +59,7 @@ def rig_tracks(
         target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:
-        Tracks of bones, maps, channels, and other animated properties.
+        Tracks of bones, animated maps, blend shape channels, and other animated properties.
     """
     target = target or rig
     found = {t.path: t for t in _others(samples.others.get(rig, {}), rig)}
@@ -177,7 +177,7 @@ def _array(
 
 
 def _read_channels(rig: ArmatureObject) -> list[int]:
-    """The indices of the channels that the user's own drivers read."""
+    """The indices of the blend shape channels that the user's own drivers read."""
     ours = {m.data.shape_keys for m in parts.meshes_of(rig)}
     found = set()
     for owner, target in drivers.targets_at(rig):
@@ -197,9 +197,9 @@ def key_tracks(
 
     Args:
         key: the Key datablock.
-        names: channel -> key name.
+        names: index of a blend shape channel -> name of its shape key.
         weights: float32[N, B], blend shape weights at N frames.
-        others: path -> values of keys that the user animates, see Samples.
+        others: data path -> values of shape keys that the user animates, see Samples.
 
     Returns:
         One track for each key in `names`, and for each path in `others`.
@@ -228,8 +228,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider that stays at rest, or for a bone that
-        keeps its current value.
+        Tracks. `actions.write` makes no curve for a slider that stays at 0, or for a property of a
+        bone that keeps its current value.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

@@ -153,7 +153,9 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 
 
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action for a datablock; only of one slot if the action has slots.
+    """The F-curves of an action that move a datablock.
+
+    If the action has slots, these are the curves of one slot, see `slot_for`.
 
     Args:
         action: any action.

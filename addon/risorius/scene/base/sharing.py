@@ -198,7 +198,10 @@ def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
 
 
 def _noted(image: bpy.types.Image) -> tuple[str, str]:
-    """Digest and state of a marked image, as text, because users may give them another type."""
+    """The digest and the state that `mark` stored on an image, converted to text.
+
+    The conversion is needed because users can change the types of these custom properties.
+    """
     return str(image.get(DIGEST)), str(image.get(STATE))
 
 
