@@ -232,7 +232,8 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
         rig: the character.
 
     Returns:
-        Values of all existing sliders. If the board leads, it defines the sliders that it reaches.
+        Values of all existing sliders. If the board leads, sliders that its handles can move have
+        the values that the board gives them.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -243,7 +244,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Slider name -> value from the board, for the sliders that the board reaches.
+    """Slider name -> value from the board, for the sliders that its handles can move.
 
     Args:
         rig: the character.
@@ -286,8 +287,8 @@ def fit(
     Args:
         live: the character's Runtime.
         raw: float[N, R], wanted values of raw controls at N frames.
-        start: float[N, G], start of the search; None: from the inverted table of the file, or 0
-            if the file has no table.
+        start: float[N, G], start of the search; None: the raw values converted by the rig's
+            raw_to_gui, or 0 if the DNA file has no table from GUI controls to raw controls.
 
     Returns:
         float64[N, G], values of GUI controls.

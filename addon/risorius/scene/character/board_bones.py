@@ -149,10 +149,11 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
 
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
-    """GUI control -> its joint motion to the face's left divided by its total motion, -1 to 1.
+    """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
 
-    Only controls of the middle of the face that move it sideways are included. Their names do not
-    define the direction, because "left" in jawLeft may mean the viewer's left.
+    The motion is summed over all joints; +x is the left side of the face. Only controls that move
+    the middle of the face sideways are included. Their names do not define the direction, because
+    "left" in jawLeft may mean the viewer's left.
     """
     table = live.table
     chosen = [

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds mesh objects with skin weights, and switches their shape keys between two modes.
 
-In KEYS mode a mesh has a real key for each blend shape channel. In LIVE mode it has one live key,
-to which the evaluator writes the sum of all channels.
+In KEYS mode a mesh has a shape key for each blend shape channel, called a real key here. In LIVE
+mode the mesh has one shape key, the live key, to which the evaluator writes the sum of all
+channels.
 """
 
 from __future__ import annotations
@@ -31,13 +32,16 @@ _LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
 
 
-# Session uids of mesh objects that were built and not edited since, so their skin weights equal the
-# file.
+# Session uids of mesh objects that were not edited since they were built, so that their skin
+# weights equal the weights in the DNA file.
 _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 
 
 def fresh_weights(item: MeshObject) -> bool:
-    """Whether a mesh was not edited since its import, so that its skin weights equal the file."""
+    """Whether a mesh was not edited since its import.
+
+    Its skin weights then equal the weights in the DNA file.
+    """
     return item.session_uid in _fresh
 
 

@@ -57,7 +57,9 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Add the control armature to the selection; it enters pose mode if the active object is in it.
+    """Add the control armature to the selection.
+
+    If the active object is in pose mode, the control armature enters pose mode too.
 
     Args:
         context: a Blender context.
