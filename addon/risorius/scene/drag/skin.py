@@ -116,7 +116,7 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex nearest to the mirrored position at rest; None if none is near.
+        """The vertex nearest to the mirror image of a vertex, both at rest; None if none is near.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.

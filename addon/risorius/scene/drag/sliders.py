@@ -27,7 +27,8 @@ class Sliders:
 
     Attributes:
         before: property name -> value to restore.
-        start: float64[R], values of the sliders; if the face board leads, values that it gives.
+        start: float64[R], values of the sliders; if the face board leads, the values that the
+            board gives them.
         seen: float32[R], the raw controls of the face, with layers and eye bones.
         gain: float64[R], change of a raw control divided by the change of its slider.
         free: bool[R], sliders that can move.
@@ -159,7 +160,7 @@ def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: whether a control is in a region. Args: live  the Runtime; region  its name."""
+    """bool[R]: whether a raw control is in a region. Args: live  Runtime, region  name."""
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 

@@ -136,7 +136,9 @@ class Stroke:
         return at
 
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
-        """Move the point to its target with the relevant controls, and insert keys.
+        """Move the point to its target, and insert keys.
+
+        Controls that changed very little during the drag get their values before the drag again.
 
         Args:
             context: has the settings for keys.
@@ -316,8 +318,10 @@ class Stroke:
         return _Anchors(points, mirrored, rest.astype(np.float64), world, maps[:, :3, :3])
 
     def _seen(self, context: Context) -> Float:
-        """Evaluate the face. Returns: the world position of the point. Raises FaceError if Blender
-        refuses to write to the override."""
+        """Evaluate the face. Returns: the world position of the point.
+
+        Raises FaceError if the face is a library override that Blender does not allow to change.
+        """
         self.skin.show(context)
         if last_written.is_refused(self.rig):
             self.restore(context)

@@ -118,7 +118,8 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         known = _objects.now
         _notice_copies(depsgraph.updates)
-        # Blender reports a change of an image's colour space as an update, a change of pixels not.
+        # Blender reports a change of an image's colour space as an update, but does not report a
+        # change of its pixels.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
@@ -276,7 +277,7 @@ def _loaded(*_arguments: object) -> None:
 def _restored(*_arguments: object) -> None:
     """After load, undo and redo: forget the last written values, which may differ from the data.
 
-    Pose bones must not be read here: until the next update, those of restored objects point to
+    Pose bones must not be read here: until the next update, pose bones of restored objects point to
     freed bones, and Blender would crash.
     """
     session.end("undo")

@@ -69,7 +69,7 @@ class _Flat:
 
 
 def flatten(override: Override, loans: Loans, size: int) -> Generator[float, None, None]:
-    """Replace the materials of copied meshes by plain ones; a generator.
+    """Replace the materials of copied meshes by plain materials; a generator.
 
     Args:
         override: context override of the export, from export_animation.copies.
@@ -80,7 +80,7 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
         The progress, 0 to 1.
 
     Raises:
-        FaceError: Cycles is missing, or a mesh has no room for a UV map.
+        FaceError: Cycles is missing, or a mesh already has the maximum of eight UV maps.
     """
     items = [o for o in override["scene"].objects if o.type == "MESH"]
     for item in items:
@@ -102,7 +102,10 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
 
 
 def _join_slots(item: MeshObject) -> None:
-    """Merge neighbouring slots with equal node trees: an eye has two that differ in solid view."""
+    """Merge neighbouring material slots whose materials have equal node trees.
+
+    An eye has two such slots, because their materials have different colours in solid view.
+    """
     slots = item.data.materials
     for number in range(len(slots) - 1, 0, -1):
         one, other = slots[number - 1], slots[number]
@@ -206,7 +209,10 @@ def _shown_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer | None:
 
 
 def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.float32]) -> None:
-    """Write UV coordinates of some corners into the bake layer, a copy of the shown layer."""
+    """Write UV coordinates of some corners into the UV map for baking.
+
+    A missing UV map for baking is created as a copy of the UV map that is active for rendering.
+    """
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
     begins = layer or shown
@@ -222,7 +228,10 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 
 
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
-    """Move the coordinates of the bake layer into the shown UV map, and remove the bake layer."""
+    """Copy the coordinates of the UV map for baking into the UV map that is active for rendering.
+
+    The UV map for baking is then removed.
+    """
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
         return
@@ -299,7 +308,10 @@ def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
 
 
 def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
-    """Set up a material copy to emit some of its inputs, with an image as target of the bake."""
+    """Set up a copy of a material for a bake: it emits the inputs `wanted` as colour.
+
+    The image is the target of the bake.
+    """
     if flat.work is None:
         flat.work = flat.material.copy()
         compat.make_node_tree(flat.work)
@@ -487,7 +499,10 @@ def _pack(image: bpy.types.Image) -> None:
 
 
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
-    """Pack a baked image, or a copy of a reused one, with a new file name, appended to `files`."""
+    """Pack a baked image, or a copy of a reused image, under a new file name.
+
+    The file name is appended to `files`. Returns: the packed image.
+    """
     taken = name not in flat.baked
     if taken:
         image = image.copy()

@@ -96,8 +96,11 @@ def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
 
 
 def _meshes(live: runtime.Runtime) -> list[int]:
-    """Indices of the meshes to draw: for each mesh of the finest level, the finest level with at
-    most _MOST_FACES polygons, else the coarsest. Wet films are left out."""
+    """Indices of the meshes to draw.
+
+    Each mesh of LOD 0 is drawn in the finest LOD in which it has at most _MOST_FACES polygons. If
+    there is no such LOD, its coarsest LOD is drawn. Wet films are left out.
+    """
     dna = live.dna
     rows = dna.lod_mesh_mapping.rows or [range(len(dna.meshes))]
     chosen: dict[str, int] = {}

@@ -71,10 +71,10 @@ def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
 def joint_edits(
     context: Context, rig: ArmatureObject, plan: plans.CharacterPlan
 ) -> dict[int, JointEdit]:
-    """The joints whose rest a user moved or rotated in edit mode.
+    """The joints whose rest pose a user moved or rotated in edit mode.
 
-    The rest is compared with a newly built armature. Differences count only beyond the rounding of
-    a bone's direction in float32, because edit mode recomputes roll and tail.
+    The rest pose is compared with a newly built armature. Differences that the rounding of a bone's
+    direction to float32 can cause are ignored, because edit mode recomputes roll and tail.
 
     Args:
         context: a Blender context with a view layer.
@@ -293,7 +293,10 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Set joints to rest that the evaluator moved with the old file but not with the new file."""
+    """Reset the pose of joints that the evaluator no more moves with the new file.
+
+    With the old file the evaluator moved these joints.
+    """
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]

@@ -114,7 +114,10 @@ def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
 def _refit(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """Give one mesh object the polygons, weights, layers and shape keys of the new file."""
+    """Give one mesh object the polygons, skin weights, UVs, normals and shape keys of the new file.
+
+    The user's edits and attributes are transferred.
+    """
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
     same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
@@ -441,7 +444,10 @@ def _points(
     channel_map: Sequence[int],
     bearer: transfer.Carry,
 ) -> NDArray[np.float32] | None:
-    """New coordinates of a key. It first computes the relative key, and stores both in `done`."""
+    """New coordinates of the shape key `name`.
+
+    The shape key to which it is relative is computed first. Both results are stored in `done`.
+    """
     if name in done:
         return done[name]
     above = shape.relative[name]
@@ -469,8 +475,11 @@ def _drop_gone_keys(
     channel_map: Sequence[int],
     deltas: Mapping[int, meshes.Deltas],
 ) -> None:
-    """Remove keys of Risorius whose channel is missing in the new file. Keys that are edited,
-    masked or needed by the user's keys stay as the user's own keys."""
+    """Remove shape keys of Risorius whose blend shape channel is missing in the new file.
+
+    A shape key stays, without its driver, if the user edited it, if it has a vertex group, or if a
+    shape key of the user is relative to it.
+    """
     key = parts.keys_there(item)
     needed = {above for name, above in shape.relative.items() if name in shape.own}
     for name, channel in shape.channels.items():
@@ -515,7 +524,10 @@ def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
 
 
 def finish_shapes(change: Change) -> None:
-    """Set the mode of all meshes, which adds new keys. Drivers must have the new indices."""
+    """Set the shape key mode of all meshes, which adds shape keys for new channels.
+
+    The drivers must already read the new channel indices.
+    """
     live = runtime.there(change.rig)
     labels = build.channel_labels(live.dna)
     there = parts.meshes_of(change.rig)

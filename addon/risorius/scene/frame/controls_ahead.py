@@ -45,10 +45,11 @@ def is_edited() -> bool:
 
 
 def is_needed() -> bool:
-    """Whether a simulation or a foreign handler needs the faces before the add-on's handlers run.
+    """Whether the faces must be evaluated before Blender evaluates a frame.
 
-    If not, the evaluation ahead would only cost time. It is also needed at the first frame after an
-    edit, because edited objects may read a face.
+    A simulation, or a frame handler of another add-on, needs the poses at that time. They are also
+    needed at the first frame after an edit, because edited objects may read a face. In all other
+    cases the early evaluation would only cost time.
     """
     if is_edited():
         _simulated.now = caches.any_simulates()
@@ -187,7 +188,10 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 
 
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
-    """Whether a graph contains the rig of any face. Args: whole  True: or any face mesh."""
+    """Whether a graph contains the deforming armature of any of the faces.
+
+    Args: whole  True: meshes of the faces count too.
+    """
     return any(
         item.evaluated_get(graph).is_evaluated
         for rig, _controls in faces
