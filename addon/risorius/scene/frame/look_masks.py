@@ -75,7 +75,7 @@ def solo(rig: ArmatureObject, names: Collection[str]) -> None:
 
     Args:
         rig: deforming armature.
-        names: labels of these controls; empty: all controls.
+        names: labels of the controls that keep their effect; empty: all controls.
     """
     put(rig, replace(of(rig), solo=frozenset(names)))
 

@@ -51,7 +51,7 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """The index, from 0, of the group of `size` numbers that a number belongs to."""
+        """The integer quotient of a number and `size`: the index of its group of `size` numbers."""
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
@@ -148,7 +148,10 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A random displacement of each lock, up to `most` along each axis. The caller sets Scale."""
+    """A random displacement of each lock, up to `most` along each axis.
+
+    Returns: a node that scales the displacement; the caller connects its input Scale.
+    """
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
     parted.inputs["Max"].default_value = [most] * 3

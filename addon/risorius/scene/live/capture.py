@@ -153,7 +153,7 @@ def _tick() -> float | None:
     try:
         return _beat()
     except Exception:
-        # Blender drops a failing timer, so its sessions must end too.
+        # Blender removes a timer after an error, so the sessions that it updates must end too.
         _state.error = "Live capture ended by an error, which the console shows."
         for session in sessions.running():
             with contextlib.suppress(Exception):  # the first error is the one to show

@@ -163,7 +163,10 @@ def _reserve(key: tuple[str, int, str]) -> None:
 
 
 def neutral_now(session: Session) -> bool:
-    """Take the newest received face as the face at rest. Returns: whether there was one."""
+    """Use the newest received face as neutral face, which is subtracted from all later faces.
+
+    Returns: whether a face was received.
+    """
     frame = session.receiver.latest(session.subject)
     if frame is None:
         return False
@@ -173,6 +176,6 @@ def neutral_now(session: Session) -> bool:
 
 
 def forget_neutral(session: Session) -> None:
-    """Show received faces without subtracting a face at rest."""
+    """Show received faces without subtracting a neutral face."""
     session.shaper.capture(None)
     session.sequence = 0

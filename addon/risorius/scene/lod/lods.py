@@ -29,8 +29,10 @@ def shows(item: MeshObject, level: int) -> bool:
 
 
 def heads(rig: ArmatureObject) -> list[MeshObject]:
-    """The head mesh of the finest existing level, or all meshes of that level. Args: rig deforming
-    armature."""
+    """The head meshes of the finest existing level; all meshes of this level if none is a head.
+
+    Args: rig  the deforming armature.
+    """
     items = parts.meshes_of(rig)
     first = min((min(levels_of(item), default=0) for item in items), default=0)
     shown = [item for item in items if shows(item, first)]

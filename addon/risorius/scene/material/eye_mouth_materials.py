@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of eyes, teeth, tongue, gums, lashes and wet films. Textures are optional, because
-node patterns vary each surface."""
+"""Builds the materials of eyes, teeth, tongue, gums, lashes and wet films.
+
+Textures are optional, because procedural nodes can give each surface its details."""
 
 from __future__ import annotations
 
@@ -26,9 +27,9 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Depth in the mouth in eye distances, and colour by which the surface is multiplied there: lips and
-# cheeks shade the inside. Without cast shadows (Material Preview, exports) molars would be as
-# bright as incisors.
+# Depth in the mouth in eye distances, and colour by which the surface is multiplied at this depth.
+# The factor imitates the shadows of lips and cheeks: in Material Preview and exports, which have no
+# cast shadows, molars would otherwise be as bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -350,7 +351,7 @@ def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
 
 
 def _transparent(material: bpy.types.Material, method: str) -> None:
-    """Set EEVEE's method of transparency; light passes the clear parts in shadows too."""
+    """Set EEVEE's method of transparency, and let light pass through clear parts in shadows."""
     material.surface_render_method = method  # pyright: ignore[reportAttributeAccessIssue]
     material.use_transparency_overlap = False
     if hasattr(material, "use_transparent_shadow"):
