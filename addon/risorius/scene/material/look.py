@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs from which one material is built: sizes, areas, textures."""
+"""Defines Look, the inputs from which one material is built: sizes, areas of skin, textures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Look:
         unit: distance of the eyes in Blender units; patterns scale with it.
         vertices: number of vertices of the finest mesh.
         has_uvs: whether the mesh has a UV map.
-        simple: True leaves out subsurface scattering, relief and maps.
+        simple: True leaves out subsurface scattering, relief and animated maps.
         cornea: whether the face has a mesh of corneas over its eyes.
         uses: effects of the animated maps of the face.
         areas: skin areas of a face, such as the forehead, that this mesh has.
@@ -56,10 +56,10 @@ class Look:
     offsets: dict[str, bool] = field(default_factory=dict)
 
     def image(self, role: str, data: bool = False) -> bpy.types.Image | None:
-        """The image of a role, or None.
+        """The image that the mesh uses for a role, or None.
 
         Args:
-            role: such as "color", "cavity" or "normal:2", see texture_search.
+            role: purpose of a texture, such as "color", "cavity" or "normal:2", see texture_search.
             data: whether the pixels are numbers instead of colours.
         """
         return self.images.load(self.found.of(self.base, role), data)

@@ -52,7 +52,8 @@ def build_materials(
         built: mesh objects, in the order of the plan's meshes.
         made: receives every new datablock.
         found: texture_search.TexturePlan; None for no textures.
-        simple: True builds cheaper materials without subsurface scattering, relief and maps.
+        simple: True builds cheaper materials without subsurface scattering, relief and animated
+            maps.
 
     Returns:
         Sentences about textures that are missing, cannot be read or stay outside the .blend.
@@ -194,8 +195,10 @@ def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
 def _add_attributes(
     mesh: bpy.types.Mesh, plan: plans.MeshPlan, frame: skin_folds.FaceFrame | None
 ) -> set[str]:
-    """Write the mesh attributes that materials of this kind read. Returns: the areas of a face
-    on a skin mesh, else none."""
+    """Write the mesh attributes that the material of a mesh reads.
+
+    Returns: the areas of a face that a skin mesh has; empty for other meshes.
+    """
     if not len(plan.positions):
         return set()
     if plan.kind == "eyes":
@@ -289,7 +292,7 @@ def _tooth_coordinates(
 
 
 def map_drivers(material: bpy.types.Material | None) -> Iterator[bpy.types.FCurve]:
-    """The driver curves of the animated maps of a material."""
+    """The drivers (F-curves) through which animated maps change a material."""
     data = material.node_tree.animation_data if material and material.node_tree else None
     for curve in data.drivers if data else ():
         if skin_material.MAP_PREFIX in curve.data_path:
