@@ -2,7 +2,8 @@
 """Stores the sounds of a voice with its action, and updates the mouth's keys after corrections.
 
 In each curve only the keys between the last key before the changed frames and the first key after
-them are replaced. These two keys get new inner handles; all other keys are unchanged.
+the changed frames are replaced. These two keys stay, but their handles towards the replaced keys
+are set anew. All other keys are unchanged.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ class Spoken(Protocol):
 
 
 def of(action: bpy.types.Action) -> Spoken:
-    """The voice of an action. Args: action any; without a voice the list is empty."""
+    """The voice of an action. Args: action  any; without a voice the list of sounds is empty."""
     return cast(Spoken, getattr(action, PROPERTY))
 
 
@@ -209,7 +210,7 @@ def rebuild(action: bpy.types.Action) -> int:
 
 
 def trouble(action: bpy.types.Action) -> str:
-    """Why the voice of an action cannot be corrected, a Sentence; or ""."""
+    """The Sentence with the reason why the voice of an action cannot be corrected; "" if it can."""
     try:
         _check(action)
     except SpokenError as error:
@@ -318,7 +319,7 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Replace the keys between the last key before a span of frames and the first key after it."""
+    """Replace the keys between the last key before and the first key after a span of frames."""
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1

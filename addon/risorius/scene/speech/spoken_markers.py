@@ -18,8 +18,9 @@ from ...logic.animation.spoken import Board, Mark, Placing
 from ..base import parts, saved
 from . import spoken_keys, voices
 
-# Property of a scene, as JSON: the shown voice, its markers, and the user's own markers when they
-# were added. Markers cannot be tagged, because since Blender 5 they store frame and name only.
+# Property of a scene, as JSON: the shown voice, its markers, and the user's own markers at the time
+# when the markers of the voice were added. Markers have no tag of their own, because since Blender
+# 5 a marker stores only a frame and a name.
 _KEPT = "risorius_markers"
 
 

@@ -37,7 +37,8 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
     """The mapping from frames of an action to frames of the scene.
 
-    Repeats of a layer are ignored, and warped time is replaced by the line through its ends.
+    Repeats of a layer are ignored. If a layer has warp points, the mapping is the line through the
+    first and the last warp point.
 
     Args:
         controls: the face's control armature.

@@ -79,10 +79,11 @@ def _places(item: MeshObject) -> np.ndarray:
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:
-    """The height of the lower edge of the body's front: the highest edge in 8 vertical strips.
+    """The height of the lower edge of the body's front.
 
-    A hem may hang lower at the sides, and a picture that reaches down to the lowest point would
-    show a gap in the middle.
+    The lowest point in each of 8 vertical strips is found, and the highest of these points counts.
+    A hem may hang lower at the sides, and a picture that reaches down to the lowest point of all
+    would show a gap in the middle.
 
     Args:
         places: float64[V, 3] of each mesh, in the head's axes.
@@ -110,7 +111,10 @@ def _eyes(rig: ArmatureObject) -> np.ndarray:
 
 
 def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Guess the point between the eyes and their distance from the corners of bounding boxes."""
+    """Guess the midpoint between the eyes, and the distance between the eyes.
+
+    Args: corners  float64[n, 3], corners of bounding boxes, axes  float64[3, 3], axes of the head.
+    """
     inside = corners @ axes
     low, high = inside.min(axis=0), inside.max(axis=0)
     tall = max(float(high[2] - low[2]), 1e-6)

@@ -169,7 +169,8 @@ def _places(
     seen: Mapping[bpy.types.Object, _Seen],
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
-    """Matrices of the parts of a face in the world, or in the space of a foreign parent."""
+    """The matrix of each part of a face: world matrix, or matrix relative to a parent object that
+    does not belong to the face."""
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -242,8 +243,10 @@ def _is_held(item: bpy.types.Object) -> bool:
 
 
 def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
-    """The matrix that moves a part's data back, or None if no step has moved its transform into
-    them."""
+    """The matrix that moves the data of a part (vertices or bones) back to their earlier places.
+
+    None if no step of Blender has moved the transform of the part into its data.
+    """
     old, new = (
         np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
         for seen in (moved.before, now)

@@ -14,7 +14,8 @@ from ..character import armatures, values
 from ..frame import joint_turns
 from ..skinning import caches
 
-# Session uids of characters for which a sentence was returned that is not repeated.
+# Session uids of characters whose newer form, or whose late caches, `bring_up_all` has reported.
+# These sentences are returned only once for each character.
 _said: set[int] = session.keep("migrations.said", set, ("load",))
 
 

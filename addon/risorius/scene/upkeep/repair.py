@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Repairs renamed and deleted parts of a character, or describes the ones that cannot be repaired.
+"""Repairs renamed and deleted parts of a character, or describes parts that cannot be repaired.
 
 Objects, meshes, materials, collections, actions and joints' bones may have any name. Actions, pose
 assets and scripts depend on the names of control bones and sliders, so these are restored.
@@ -51,7 +51,7 @@ def heal_all() -> list[ArmatureObject]:
 
 
 def _bone_names(controls: ArmatureObject) -> list[str]:
-    """Restore the names of renamed control bones; Blender updates the paths of their curves."""
+    """Restore the names of renamed control bones; Blender updates the paths of their F-curves."""
     bones = controls.data.bones
     if controls.data.library is not None or controls.mode == "EDIT":
         return []
@@ -151,7 +151,7 @@ def outside(rig: ArmatureObject) -> list[bpy.types.Object]:
 
 
 def bring_back(item: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Restore deleted parts into the collection of the remaining ones.
+    """Restore deleted parts of a character into the collection of its remaining parts.
 
     Args:
         item: an object of the character.
