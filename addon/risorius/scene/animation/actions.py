@@ -33,7 +33,7 @@ class Track:
     Attributes:
         path: data path of the property.
         group: name of the group of its F-curves.
-        values: float32[frames, width].
+        values: float32[frames, width], the components of the property at each frame.
         now: float[width], current value of the property in the scene. A property that has this
             value at all frames needs no curve. None: always make a curve.
         first: array index that the first column of values animates.
@@ -127,7 +127,8 @@ def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:
 def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
-    """Yields each track with its values and a mask of the kept keys, both [frames, width]."""
+    """Yields each track, its values [frames, width], and a mask of the keys that remain after the
+    reduction, bool[frames, width]."""
     most = max(_AT_ONCE // len(frames), 16)  # columns
     waiting, width = [], 0
     for number, track in enumerate(tracks):
@@ -305,8 +306,8 @@ def _set(owner: Animated, path: str, number: float) -> None:
 def restore(owner: Animated) -> None:
     """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, or the user protected or edited
-    them. An action that the user assigned since `play` stays in the file.
+    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
+    or the user edited them. An action that the user assigned since `play` stays in the file.
     """
     if BEFORE not in owner:
         return

@@ -144,7 +144,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
 
 def animates_sliders(rig: ArmatureObject) -> bool:
-    """Whether a played action of a face has keys of sliders that the board reaches.
+    """Whether a played action of a face has keys of sliders that the face board can move.
 
     Args:
         rig: the character.
@@ -158,7 +158,10 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 
 
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
-    """Convert the current pose to the board or to the sliders. Returns: the loss."""
+    """Convert the current pose to the board or to the sliders.
+
+    Returns: the changes of raw controls by the conversion.
+    """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
     assert face is not None

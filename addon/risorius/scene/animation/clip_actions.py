@@ -176,8 +176,8 @@ def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
     Args:
         scene: its range is changed.
         report: result of the import, with the first and last frame.
-        mode: "EXTEND" moves the end of the scene to the end of the animation if that is later;
-            "FIT" begins and ends it with the animation; "KEEP" leaves it.
+        mode: "EXTEND": the last frame of the range becomes the last frame of the animation if this
+            is later; "FIT": the range becomes the range of the animation; "KEEP": the range stays.
     """
     first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
     if mode == "FIT":

@@ -70,7 +70,7 @@ class Bones:
 class Kept:
     """Cache of compiled layer sources (clips or poses) and of compiled masks.
 
-    The keys of both tables are the settings of the layer from `_key`.
+    The settings of a layer, see `_key`, identify its source and its mask.
     """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
@@ -83,7 +83,8 @@ class Stack:
 
     Attributes:
         made_of: the settings that the layers were compiled from.
-        mixer: its channels are the character's slider labels, then `clip_units.BONES`.
+        mixer: mixes the values of the sliders and of the bone components `clip_units.BONES`, in
+            this order.
         layers: risorius.Layer, bottom to top, at weight 1.
         places: index of each compiled layer in the collection of settings.
         weights: the weights in the mixer, by the index of the layer in that collection.

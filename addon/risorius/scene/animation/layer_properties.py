@@ -89,7 +89,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Edition of Risorius' built-in expressions; older files do not store it and mean edition 1.
+    # Edition of the built-in expressions that the layer plays. The default is 1, because .blend
+    # files from the time of edition 1 do not store it.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0

@@ -108,7 +108,7 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point at a scene frame, with the source frame that the layer shows there.
+    """Add a warp point at a scene frame, with the frame of the animation that the layer shows then.
 
     The first warp point also adds one at each end of the layer, so that the timing does not change.
     """

@@ -60,7 +60,7 @@ def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
 
 
 def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
-    """The LOD and the index of the face mesh with the vertex count of a source.
+    """The face mesh that has as many vertices as a source object: (its LOD, its index).
 
     Args:
         rig: the face.

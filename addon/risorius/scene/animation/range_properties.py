@@ -107,7 +107,7 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
 
 
 def of(controls: ArmatureObject) -> "native.Ranges | None":
-    """The ranges to which captured values of a face are stretched.
+    """The ranges of a face from which captured values are stretched to the range 0 to 1.
 
     None if the ranges are switched off or missing.
 

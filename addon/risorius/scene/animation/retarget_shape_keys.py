@@ -18,7 +18,7 @@ from . import clip_actions
 
 
 def sources(context: Context) -> list[MeshObject]:
-    """Mesh objects of the scene with animated shape keys that belong to no face."""
+    """Mesh objects of the scene that have animated shape keys and belong to no face."""
     items = [item for item in context.scene.objects if item.type == "MESH"]
     meshes = cast(list[MeshObject], items)
     return [item for item in meshes if parts.rig_of(item) is None and _moves(item)]

@@ -323,8 +323,8 @@ def _take_all(
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
     """The curves of sliders, handles and control bones in an action, by data path and index.
 
-    All channels of the bones are included, because Blender also keys channels that the face does
-    not use.
+    F-curves of location, rotation and scale of these bones are included, because Blender also keys
+    properties that the face does not use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}

@@ -65,7 +65,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
 
 
 def words() -> Mapping[str, str]:
-    """Name of each landmark -> its description for the user, in the order of the package."""
+    """Name of each landmark -> its description for the user, in the order of the package's list."""
     found: Mapping[str, str] = native.part("anyhead.landmarks.names").landmark_words()
     return found
 

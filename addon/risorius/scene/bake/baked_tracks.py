@@ -130,7 +130,10 @@ _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 
 
 def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
-    """Tracks of the rig's object transform if it follows the control armature and moves."""
+    """Tracks of the rig's object transform.
+
+    Empty unless the rig follows the control armature and the control armature moves.
+    """
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
     matrices = samples.places
@@ -163,8 +166,10 @@ def _array(
     group: str,
     indices: Iterable[int] | None = None,
 ) -> list[Track]:
-    """Tracks of an array property, one for each index, all by default. The property gets the
-    values of the first frame."""
+    """Tracks of an array property, one for each of the given indices; None: all indices.
+
+    The property gets the values of the first frame.
+    """
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
     target[name][:] = values[0].tolist()

@@ -316,7 +316,7 @@ def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
 
 
 def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:
-    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order.
+    """The data paths of a datablock that an action, an NLA strip or a driver animates.
 
     Args:
         owner: the object or the shape keys.

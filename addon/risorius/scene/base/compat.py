@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions that work alike in Blender 4.2 to 5.2."""
+"""Hides differences of the API between Blender 4.2 and 5.2 behind common functions."""
 
 from __future__ import annotations
 

@@ -51,7 +51,9 @@ def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.Dri
 
 
 class Entries:
-    """Redirects drivers that read a channel or a map by index after the indices have changed.
+    """Redirects drivers that read a blend shape channel or an animated map by its index.
+
+    This is needed if another DNA file gives the channels and maps other indices.
 
     Args:
         rig: deforming armature.

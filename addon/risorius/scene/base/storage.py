@@ -29,7 +29,7 @@ _SIGNATURE = b"DNA"  # first bytes of every DNA file
 
 
 class ContentError(FaceError):
-    """A Text has no intact DNA file. The error text is meant to follow a colon."""
+    """A Text has no intact DNA file. The error text is the end of a sentence, after a colon."""
 
 
 def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text:

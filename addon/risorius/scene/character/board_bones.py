@@ -215,7 +215,7 @@ def _box(
 
 
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a complete board: at +x of the head, with a height of _SHARE head sizes."""
+    """The place of a complete board: beside the head at +x, _SHARE times as high as the head."""
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height

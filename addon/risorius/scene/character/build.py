@@ -203,7 +203,10 @@ def _connect(
 
 
 def _source(path: Path) -> str:
-    """The path that Reload uses; relative to the .blend if it is saved on the same drive."""
+    """The path of a DNA file for the operator Reload.
+
+    The path is relative to the .blend file if both files are on the same drive.
+    """
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:  # another drive

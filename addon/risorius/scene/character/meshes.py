@@ -123,10 +123,11 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
-    """Shape key name -> channel, for the real keys that Risorius made.
+    """Name of a real key that Risorius made -> index of its blend shape channel.
 
-    They are identified by the variable name of their drivers, so a key that the user drives by a
-    channel does not count. If a driver was copied to another key, only the first key counts.
+    Real keys are identified by the variable name of their drivers, so a shape key that the user
+    drives by a channel does not count. If a driver was copied to another shape key, only the first
+    of both counts.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}

@@ -88,7 +88,7 @@ def carry_on_largest(rig: ArmatureObject) -> None:
 
 
 def point_materials(rig: ArmatureObject, owner: bpy.types.Object) -> None:
-    """Point the drivers of a character's materials at the object with their values.
+    """Point the drivers of a character's materials at the object that stores the animated maps.
 
     Args:
         rig: deforming armature.

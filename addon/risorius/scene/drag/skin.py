@@ -28,7 +28,8 @@ class Skin:
     It holds Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
-        surface: the face in file space, at the visible level of detail.
+        surface: the face in file space (axes and unit of the DNA file), at the visible level of
+            detail.
         items: mesh index -> mesh object.
         size: largest extent of the face at rest, in Blender units.
         depsgraph: dependency graph of the view.

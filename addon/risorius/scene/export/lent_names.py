@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renames datablocks during an export, so that copies have the user's names in the file."""
+"""Renames datablocks during an export, so that exported copies have the names of the originals."""
 
 from __future__ import annotations
 

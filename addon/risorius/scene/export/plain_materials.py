@@ -31,7 +31,8 @@ from .lent_names import Loans
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
 _MASKS = ("alpha", "roughness")  # baked into one image, as red and green
 _SOCKETS = {"color": "Base Color", "roughness": "Roughness", "normal": "Normal"}
-# Inputs whose numbers are copied, because glTF and USD support them; their textures are left out.
+# Inputs of the Principled shader whose numbers are copied, because glTF and USD support these
+# inputs. Textures of these inputs are left out.
 _NUMBERS = ("Metallic", "Specular IOR Level", "IOR", "Coat Weight", "Coat Roughness", "Coat IOR")
 _FILM = 0.05  # opacity of a wet film: low to show the iris, not 0 because its highlight fades too
 _LAYER = "risorius_flat"  # name of the UV layer and of the image node of a bake

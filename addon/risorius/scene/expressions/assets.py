@@ -26,7 +26,7 @@ _HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
 
 
 def all_expressions() -> dict[str, native.Expression]:
-    """Name -> built-in expression, in the order of the files."""
+    """Name -> built-in expression, in the order of the files of expressions."""
     return native.part("expressions").load()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Applies expressions to the sliders of a face, and makes expressions of its pose."""
+"""Applies expressions to the sliders of a face, and makes expressions from its pose."""
 
 from __future__ import annotations
 

@@ -38,7 +38,8 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """float64[4, 4]: factor by which the file's local matrix is multiplied from the right."""
+        """float64[4, 4]: factor by which the joint's local matrix in the file is multiplied from
+        the right."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
@@ -257,7 +258,7 @@ def _followers(
 ) -> list[tuple[str, str | None, Matrix | None]]:
     """The user's own bones, parents first: (name, new parent, matrix relative to the parent).
 
-    With these values the bones follow their joints. A new parent of None keeps the parent.
+    With these values the bones follow their joints. New parent None: the bone keeps its parent.
     """
     ours = set(kept.values()) | set(gone)
     found = []
@@ -293,10 +294,7 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Reset the pose of joints that the evaluator no more moves with the new file.
-
-    With the old file the evaluator moved these joints.
-    """
+    """Reset the pose of joints that the evaluator moves with the old file but not with the new."""
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]

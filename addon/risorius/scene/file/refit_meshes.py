@@ -37,11 +37,13 @@ class Shape:
     Attributes:
         points: float32[V, 3], the basis.
         moved: float64[V, 3], offsets of the basis by the user's edit.
-        keys: key name -> float32[V, 3] positions; most unedited keys of Risorius are left out.
-        relative: key name -> name of its relative key.
-        channels: name of a key of Risorius -> index of its channel in the old file.
-        edits: name of an edited key of Risorius -> float64[V, 3] offsets by the edit.
-        own: names of the user's own keys.
+        keys: name of a shape key -> float32[V, 3] positions; most unedited shape keys of Risorius
+            are left out.
+        relative: name of a shape key -> name of the shape key to which it is relative.
+        channels: name of a shape key of Risorius -> index of its blend shape channel in the old
+            file.
+        edits: name of an edited shape key of Risorius -> float64[V, 3] offsets by the edit.
+        own: names of the user's own shape keys.
     """
 
     points: NDArray[np.float32]
@@ -372,7 +374,10 @@ def _rebuild(
     surface: transfer.OldSurface,
     bearer: transfer.Carry,
 ) -> None:
-    """Replace the polygons inside the mesh datablock, so that keys, drivers and pointers stay."""
+    """Replace the polygons inside the mesh datablock.
+
+    So the shape keys, the drivers and the pointers to the datablock stay.
+    """
     mesh = item.data
     own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
     count = len(mesh.vertices)

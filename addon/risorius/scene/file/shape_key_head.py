@@ -177,7 +177,7 @@ def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.Head
         head: mesh object of the head, whose location is the origin.
 
     Raises:
-        HeadError: the keys are not relative.
+        HeadError: the shape keys are not relative.
     """
     if item.data.shape_keys is None:
         return part_at_rest(context, item, head)
@@ -263,7 +263,7 @@ def rig_task(
     Args:
         shapes: the head and its shapes, from shapes_of.
         wishes: options of the rig.
-        said: the user's assignment of keys to controls, see risorius.author.input.said.
+        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
     """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
@@ -329,7 +329,7 @@ def joint_rig(
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
     """Give the meshes of LOD 0 the materials of the objects that the face was made from.
 
-    Both must have the same polygons in the same order.
+    The new meshes and these objects must have the same polygons in the same order.
 
     Args:
         meshes: mesh objects of the new face.

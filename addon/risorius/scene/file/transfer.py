@@ -118,8 +118,8 @@ def triangles_of(
 
 
 def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Values]], list[str]]:
-    """The user's attributes of a mesh: (name, type, domain, values) of transferable ones, and the
-    names of all others."""
+    """The user's attributes of a mesh: (name, type, domain, values) of each attribute that can be
+    transferred, and the names of the other attributes of the user."""
     kept, other = [], []
     attributes: list[Attribute] = list(mesh.attributes)
     for layer in attributes:

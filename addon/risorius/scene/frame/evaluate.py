@@ -352,7 +352,7 @@ def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment
 
 
 def bring_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a change by an operator: evaluate one character and the scene.
+    """Show the change that an operator made: evaluate one character and the scene.
 
     Args:
         context: its view layer is evaluated before and after.

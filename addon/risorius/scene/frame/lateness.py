@@ -23,7 +23,7 @@ class _Late:
     """Record of a late face.
 
     Attributes:
-        cause: name of the control or constraint that is the reason.
+        cause: name of the control or constraint that makes the face late.
         wiring: result of _wiring when the reason was found.
         frames: number of late frames.
     """
@@ -40,7 +40,7 @@ _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether the inputs of a face are known to depend on a face.
+    """Whether it is known that the inputs of a face depend on this or another face.
 
     The record is dropped if parents, drivers or constraints have changed.
 
@@ -57,7 +57,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that the inputs of a face depend on a face.
+    """Note that the inputs of a face depend on this or another face.
 
     Args:
         rig, controls: deforming and control armature of the face.

@@ -82,7 +82,7 @@ def _cards_at_finest(live: runtime.Runtime, name: str) -> int:
 
     Args:
         live: Runtime of the character.
-        name: name of the mesh at its own LOD, in the file.
+        name: name of the mesh in the file; the mesh may belong to any LOD.
     """
     finest = _LEVEL.sub("_lod0_", name)
     found = _ROWS.fullmatch(live.dna.metadata.get(f"hair:{finest}", ""))

@@ -142,14 +142,14 @@ def finish_take(
         clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: see recordings.finish; the recording is kept there.
+        clip_units.ClipError: see recordings.finish; the recording is kept in `recordings`.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None
 
 
 def _tick() -> float | None:
-    """Called by the timer. Returns: seconds until the next call, or None to end."""
+    """Called by the timer. Returns: seconds until the next call; None ends the timer."""
     try:
         return _beat()
     except Exception:

@@ -35,7 +35,7 @@ class Settings:
         port: port to listen on.
         everywhere: True: other computers can send; False: only this one.
         subject: name of the phone; "" for the first one received.
-        smoothing: 0 to 1.
+        smoothing: strength of the smoothing, 0 (none) to 1.
         gain, head_gain: factors of all captured controls and of head rotations; head_gain 0: the
             head does not turn.
         mapping: name or file of the mapping to controls.

@@ -21,7 +21,7 @@ class Look:
     Attributes:
         kind: kind of the mesh, see MeshPlan.
         base: mesh name without LOD.
-        rig: the deforming armature, whose `maps` array drives the map values.
+        rig: the deforming armature of the character, whose animated maps the material reads.
         extent: float64[3] size of the mesh in Blender units.
         unit: distance of the eyes in Blender units; patterns scale with it.
         vertices: number of vertices of the finest mesh.

@@ -17,8 +17,8 @@ from .image_loading import Images
 from .look import Look
 from .nodes import Graph
 
-# Colours of the solid view. Lashes are cards: opaque ones would cover the lids with black bands.
-# Cards with a picture get its colour and opacity, see card_color.
+# Colours of the solid view. Lashes are cards, and opaque cards would cover the lids with black
+# bands. Cards with a picture get the colour and opacity of the picture, see card_color.
 _VIEW_COLORS = {
     "skin": (0.62, 0.36, 0.27, 1.0),
     "eyes": (0.75, 0.70, 0.66, 1.0),
@@ -146,8 +146,8 @@ def _build(
 def _choose_picture(look: Look, graph: Graph) -> None:
     """Make the colour image active, because the solid view's *Texture* mode shows the active image.
 
-    Without an image a pattern becomes active, so that the view shows the material's colour.
-    Otherwise it would show the first image, such as a mask.
+    Without a colour image, a node with a procedural pattern becomes active, so that the view shows
+    the material's colour. The view would otherwise show the first image, such as a mask.
     """
     pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
     colors = [n for n in pictures if n.image == look.image("color")]

@@ -30,7 +30,7 @@ class Plan:
     """The way in which a face is shown: by Direct mode or by Blender's modifiers.
 
     Attributes:
-        direct: session uids of the mesh objects in Direct mode, which get finished positions.
+        direct: session uids of the mesh objects in Direct mode, which get final vertex positions.
         posed: whether the bones of the deforming armature are posed.
         why: why bones are posed, or why a mesh is not in `direct`; empty if all meshes are in
             `direct` and no bones are posed.
@@ -593,5 +593,5 @@ def _has_driver_on(owner: bpy.types.ID | None, rig: ArmatureObject) -> bool:
 
 
 def _drives_more(material: bpy.types.Material, rig: ArmatureObject) -> bool:
-    """Whether a driver of a material or of its node tree reads the rig itself."""
+    """Whether a driver of a material or of its node tree reads the deforming armature."""
     return _has_driver_on(material, rig) or _has_driver_on(material.node_tree, rig)

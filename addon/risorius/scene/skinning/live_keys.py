@@ -80,7 +80,8 @@ def bears_simulation(item: bpy.types.Object) -> bool:
 def reach(depsgraph: Depsgraph) -> None:
     """Tag live shape keys for an update if a dependency graph has other positions.
 
-    This happens if a position was written without notifying Blender and the graph was not known.
+    This happens if positions were written without notifying Blender, and the graph belongs to a
+    render or an exporter.
 
     Args:
         depsgraph: the evaluated graph.

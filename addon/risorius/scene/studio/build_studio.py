@@ -51,8 +51,8 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
 
 
 def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
-    """The matrix in the world, without scale, of the point between the eyes; the distance between
-    the eyes; the low and high corner of the face's bounding box in this space."""
+    """World matrix, without scale, of the midpoint between the eyes; distance between the eyes; low
+    and high corner of the face's bounding box in the space of this matrix."""
     meshes = parts.meshes_of(rig)
     world = np.array(rig.matrix_world, np.float64)
     eyes = _eyes(rig)

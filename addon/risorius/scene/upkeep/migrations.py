@@ -79,7 +79,7 @@ def newer(rig: ArmatureObject) -> str:
 
 
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """Add the property Needs Risorius; store muted tracks of a baked character by name."""
+    """Add the property Needs Risorius; store muted NLA tracks of a baked character by name."""
     changed = []
     if not controls.override_library:
         controls[form.NEEDS] = form.WORDS
