@@ -374,7 +374,7 @@ def clip_of_action(
 
 
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
-    """Replace Blender's shortened slider names by DNA names, so that other characters know them.
+    """Replace Blender's shortened slider names by DNA names, which other characters know too.
 
     A slider keeps Blender's name if its DNA name occurs twice. Names that belong to no slider stay.
 

@@ -473,8 +473,8 @@ def in_set(controls: ArmatureObject, keying_set: bpy.types.KeyingSet, path: str)
 
     Args:
         controls: the control armature.
-        keying_set: a keying set of the scene with paths, or a built-in one, whose bl_idname gives
-            the channels of bones that it keys.
+        keying_set: a keying set of the scene with paths, or a built-in keying set, whose bl_idname
+            tells which properties the set keys.
         path: data path of the property.
     """
     if keying_set.is_path_absolute:

@@ -3,7 +3,7 @@
 
 Compiled layers are cached for each character together with the settings they were made from. A
 frame of a character with layers costs one comparison of settings and one native call. The cache
-holds no Blender object.
+holds no Blender object. Fired reactions (short animations that start at a frame) are mixed too.
 """
 
 from __future__ import annotations
@@ -409,7 +409,10 @@ def _span_times(span: logic.Span, rate: float) -> Times:
 def _idle_source(
     _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
 ) -> Source:
-    """Idle life with the length of the layer, or an endless loop if the layer has no length."""
+    """A generated clip of idle motion, such as blinks, with the length of the layer.
+
+    If the layer has no length, the clip is an endless loop.
+    """
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
     clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Defines the layers of a character as properties, which Blender saves, copies and overrides."""
+"""Defines the layers of a character as properties, which Blender saves, copies and overrides.
+
+Reactions are properties too: short animations that start (are fired) at a frame.
+"""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads, orders and changes the animation layers of a character."""
+"""Reads, orders and changes the animation layers and the reactions of a character.
+
+A reaction is a short animation from Risorius' files that starts (is fired) at a frame.
+"""
 
 from __future__ import annotations
 
@@ -251,7 +254,7 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 
 
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
-    """Add a copy of a layer, with the keys of its weight, above it.
+    """Add a copy of a layer directly above this layer, and copy the keys of its weight.
 
     Args:
         controls: control armature of the character.

@@ -78,7 +78,7 @@ def touch() -> None:
 
 
 def changes() -> int:
-    """Number of calls of `touch`. A cache of ranges compares it to notice changes."""
+    """Number of calls of `touch`. A cache of ranges compares this number to notice changes."""
     return _changes.now
 
 

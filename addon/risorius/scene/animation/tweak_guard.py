@@ -162,8 +162,10 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """The pose of the controls without the tweak. On a face with NLA strips it is cached, because
-    Blender has to evaluate the strips."""
+    """The pose of the controls without the tweak.
+
+    On a face with NLA strips the pose is cached, because Blender has to evaluate the strips.
+    """
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
     uid, strips = controls.session_uid, _strips(controls)

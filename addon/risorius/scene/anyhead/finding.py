@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds landmarks of heads with the package risorius, and converts them for Blender."""
+"""Finds landmarks of heads with the Python package risorius, and converts them for Blender.
+
+In this file, "the package" is risorius. Its coordinates are in cm, with x to the left of the head,
+y up and z to the front.
+"""
 
 from __future__ import annotations
 

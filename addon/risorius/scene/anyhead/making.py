@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Background tasks on a head without expressions: making its rig, or conforming a face to it."""
+"""Runs background tasks on a head without expressions: make a rig, or conform a face to it."""
 
 from __future__ import annotations
 

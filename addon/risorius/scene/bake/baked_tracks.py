@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Computes the baked values of all animated properties from the samples of a face."""
+"""Computes the baked values of all animated properties from the samples of a face.
+
+A track (actions.Track) has the values of one property at all baked frames.
+"""
 
 from __future__ import annotations
 

@@ -195,8 +195,8 @@ class _Reader:
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
         hold = rig_placement.body_of(self.controls)
         if hold is not None:
-            # Without the body's armature in the scene, Blender would skip bones of it that no
-            # visible object depends on.
+            # If the body's armature were not in the scene, Blender would not evaluate bones of the
+            # body on which no visible object depends.
             self.objects.append(hold.target)
         if drivers.moves(rig):
             size = len(rig.pose.bones)

@@ -2,7 +2,8 @@
 """Shares equal data between characters of a .blend: Texts of DNA files, packed images.
 
 An image is shared until any tool edits it. Then the other characters get a copy of the unedited
-image. Meshes and shape keys are never shared, because the values of keys belong to one face.
+image. A marked image is an image on which `mark` stored the digest of its packed bytes. Meshes and
+shape keys are never shared, because the values of shape keys belong to one face.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
         made: a new Text is appended to this list.
 
     Returns:
-        The Text. It must not be changed, because characters with equal files share it.
+        The Text. The Text must not be changed, because characters with equal files share it.
     """
     digest = hash_of(content)
     there = _holding(content, digest)

@@ -389,7 +389,8 @@ def mark(rig: ArmatureObject, sign: float) -> None:
 
     Args:
         rig: the character.
-        sign: the mark, a value that no user sets; it is stored as z of each handle's location.
+        sign: the mark, a value that no user sets; the mark is stored as z of each handle's
+            location.
     """
     for handle in handles_in(rig):
         parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign

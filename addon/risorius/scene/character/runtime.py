@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiles the DNA of characters, and caches the result by the hash of the DNA's content.
 
-The cache holds no Blender object, so it stays valid after load, undo and append.
+The cache holds no Blender object, so it stays valid after load, undo and append. In this file, look
+controls are the raw controls that rotate an eye, such as eyeLookUpL.
 """
 
 from __future__ import annotations

@@ -22,8 +22,9 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
 
     The slider bone is selected if it is keyed; it is locked, so nobody moves it by accident.
     Outside pose mode the keyed bones of head and eyes are selected too, so that moving a column of
-    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Keyed
-    handles of a face board are selected only if none of them is selected, in every mode.
+    keys moves their keys. In pose mode these bones are selected only if no keyed bone is selected
+    yet. In every mode, keyed handles of a face board are selected only if no keyed handle is
+    selected yet.
 
     Args:
         controls: control armature of the face.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chooses the drag handles of a face: the vertices that its controls move most."""
+"""Chooses the drag handles of a face: the vertices that its controls move most.
+
+These handles are dots on the skin; the handles of a face board are bones.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads vertices of a face's visible meshes in world space, and finds mirrored vertices."""
+"""Reads vertices of a face's visible meshes in world space, and finds mirrored vertices.
+
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex).
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts between sliders and the raw controls of the drag solver, including layers."""
+"""Converts between sliders and the raw controls of the drag solver.
+
+The raw controls include the animation layers; the sliders do not.
+"""
 
 from __future__ import annotations
 

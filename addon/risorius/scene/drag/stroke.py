@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs one drag of a face from mouse press to release: solves sliders for a target position.
 
-Each target is solved from the pose at the press, so the result depends on the position of the
-pointer and not on its path.
+Each target is solved from the pose at the mouse press, so the result depends on the position of the
+pointer and not on its path. A point is a vertex of a face: (index of the mesh in the DNA file,
+index of the vertex). File space has the axes and the unit of the DNA file.
 """
 
 from __future__ import annotations
@@ -246,7 +247,11 @@ class Stroke:
         return native.module().ControlLimits(free, self.state.low, self.state.high)
 
     def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
-        """Targets float64[P, 3] of the points and axes float64[P, 3, 3] that weigh the errors."""
+        """Targets float64[P, 3] of the points in file space, and axes float64[P, 3, 3].
+
+        The solver measures the error of a point along its three axes; the length of an axis is the
+        weight of the error along this axis.
+        """
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
         along = np.eye(3)

@@ -75,8 +75,10 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether a render changed the frame. During a render job the interface may change it too, but
-    only in the main thread."""
+    """Whether a render changed the frame.
+
+    During a render job the interface may change the frame too, but only in the main thread.
+    """
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -183,7 +185,10 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Remove outlines of newly appended faces from the scene; the user may link them later."""
+    """Remove the bone outlines of newly appended faces from the collections of the scene.
+
+    This is done only once, because the user may link outlines to a collection later.
+    """
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
@@ -191,7 +196,10 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters whose controls, body or camera were updated."""
+    """The characters whose controls were updated, or their body, or the camera.
+
+    The body of a character is the armature to which its face is attached.
+    """
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     found = (u.id.original for u in depsgraph.updates if u.id is not None)

@@ -313,7 +313,7 @@ def remove(item: Item) -> None:
 
 
 def read_all(where: Path) -> list[native.Expression]:
-    """The expressions of a folder; fails if any of them is unusable.
+    """The expressions of a folder; an error is raised if any expression is unusable.
 
     Args:
         where: a folder with TOML files.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes pictures of expressions on a character, and caches them in files by a hash of their input.
+"""Makes pictures of expressions on a character, and caches the pictures in files.
 
-The files are in the add-on's user folder, so that every .blend with this character shares them.
+The name of a file is a hash of the data from which the picture was drawn. The files are in the
+add-on's user folder, so that every .blend with this character uses the same files.
 """
 
 from __future__ import annotations

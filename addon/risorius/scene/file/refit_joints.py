@@ -294,7 +294,10 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Reset the pose of joints that the evaluator moves with the old file but not with the new."""
+    """Reset the pose of joints that the evaluator moved with the old file.
+
+    Joints that the evaluator moves with the new file too are left out.
+    """
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]

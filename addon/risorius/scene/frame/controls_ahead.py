@@ -27,8 +27,8 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Session uid of the user's scene -> temporary scene with its controls.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# _edited: whether the file may have been edited since the last frame. _simulated: whether it has
-# a simulation.
+# _edited: whether the file may have been edited since the last frame. _simulated: whether the file
+# has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes that Blender evaluated since the last load, undo or redo.
@@ -98,7 +98,8 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
             _edited.now = False
             return graph, known
         # The graph contains a face: either Blender rebuilt the graph while controls pointed to
-        # their faces, or an object of the graph depends on a face. Rebuild it to find out.
+        # their faces, or an object of the graph depends on a face. Rebuild the graph to find out
+        # which of these is the cause.
         _close()
         graph = _evaluated(user, known)
         if _faces_in(graph, known, whole=True):

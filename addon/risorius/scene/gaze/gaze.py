@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lets both eyes look at their target, and moves the lids with the eyes.
 
-The values of the look controls are found by evaluating the rig repeatedly, because these controls
-also move the centres of the eyes and rotate them slightly sideways. The search always starts at the
-same values, so that a frame depends only on its own controls. A few repetitions suffice.
+Look controls are the raw controls that rotate an eye, such as eyeLookUpL. Their values are found by
+evaluating the rig repeatedly, because these controls also move the centres of the eyes and rotate
+the eyes slightly sideways. The search always starts at the same values, so that a frame depends
+only on its own controls. A few repetitions suffice.
 """
 
 from __future__ import annotations

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the geometry nodes that turn hair cards into strands."""
+"""Builds the geometry nodes that turn hair cards into strands.
+
+A card is a strip of polygons; each of its rows has a left and a right vertex. A lock is a group of
+strands of one card that share a root and a direction.
+"""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def last_error() -> str:
 
 
 def start(rig: ArmatureObject, settings: Settings) -> Session:
-    """Start the live capture of a character, which ends an earlier capture of it.
+    """Start the live capture of a character, and end an earlier capture of the same character.
 
     Args:
         rig: its deforming armature.

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Manages the live capture sessions of characters, and the receivers that sessions share.
 
-No Blender object is kept: a character is found again each time and may be deleted.
+A session is the live capture of one character. A subject is a captured face, with the name that the
+sending app gives it. No Blender object is kept: a character is found again each time and may be
+deleted.
 """
 
 from __future__ import annotations

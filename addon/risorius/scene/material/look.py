@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Defines Look, the inputs from which one material is built: sizes, areas of skin, textures."""
+"""Defines Look, the inputs from which one material is built: sizes, areas of skin, textures.
+
+The role of a texture is its purpose in the material, such as "color" or "normal". A wrinkle map is
+a texture of wrinkled skin, which an animated map fades in.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the material of skin: subsurface scattering, pores, and effects of animated maps.
 
-Animated maps change colours and normals."""
+An animated map is a value of the rig that changes colours and normals of the skin in an area, such
+as the forehead. A texture set is a numbered set of textures of wrinkled skin.
+"""
 
 from __future__ import annotations
 

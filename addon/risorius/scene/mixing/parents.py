@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the files of a mix, shows the preview mesh, and writes the mixed face."""
+"""Reads the files of a mix, shows the preview mesh, and writes the mixed face.
+
+The parents are the faces that are mixed. The share of a parent is its fraction of the mixed face.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the causes of a vertex's motion, firing correctives, and the correctives of a control.
 
-Motions are in millimetres.
+Motions are in millimetres. A corrective fires if its value is not 0. The index of a control counts
+raw controls, correctives, network outputs and outputs of RBF poses, in this order (written
+raw | corrective | network | pose).
 """
 
 from __future__ import annotations

@@ -254,7 +254,7 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether it has changed.
+    """Update the colours of a character if its pose has changed. Returns: whether the pose changed.
 
     Args:
         rig: its deforming armature, with a heat map.

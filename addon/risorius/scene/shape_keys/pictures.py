@@ -80,8 +80,8 @@ _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo
 def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
     """Name of a key -> path of its picture, which may not exist; None before the first `model_of`.
 
-    Panels call this often, so it computes no hashes: edited keys keep their old pictures until
-    they are drawn again.
+    Panels call this function often, so it computes no hashes: edited shape keys keep their old
+    pictures until new pictures are drawn.
 
     Args:
         item: the head.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the voices that a face plays, and maps their frames to frames of the scene."""
+"""Finds the voices that a face plays, and maps their frames to frames of the scene.
+
+A voice is an action that was made from recorded speech.
+"""
 
 from __future__ import annotations
 

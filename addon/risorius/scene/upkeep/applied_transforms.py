@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undoes Apply Transform, Set Origin and similar steps on parts of a face.
 
-Joints, meshes and controls must fit each other. These steps move an object's transform into its
-data: the rig, which follows the controls, would be transformed twice, and a mesh would leave its
-joints. Blender does not report these steps, so the state of each part is stored and compared.
+The parts of a face are its deforming armature (rig), its control armature and its meshes. They must
+fit each other. These steps of Blender move an object's transform into its data: the rig, which
+follows the controls, would be transformed twice, and a mesh would leave its joints. Blender does
+not report these steps, so the state of each part is stored and compared.
 """
 
 from __future__ import annotations
@@ -264,7 +265,7 @@ def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
     if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
         return None
     # Set Origin moves an object with a constraint by a wrong distance, so world positions do not
-    # show whether it was used. A changed location or centred data show it.
+    # show whether Set Origin was used. A changed location or centred data show its use.
     told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
     return Matrix.Translation(Vector(shift.tolist())) if told else None
 
