@@ -358,7 +358,7 @@ def _play_again(
 def _is_used(action: bpy.types.Action) -> bool:
     """Whether a datablock or a fake user uses an action.
 
-    `users` alone is not enough: Blender 4.3 counts one too many after an object is duplicated.
+    `users` alone is not enough: Blender 4.3 counts one user too many if an object was duplicated.
     """
     return bool(
         action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])

@@ -80,12 +80,15 @@ _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
 # Session uid of a control armature whose action was checked since load or undo -> its cached pose
 # without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of a control armature -> reason why the tweak refused its last key.
+# Session uid of a control armature -> reason why the tweak could not store the last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """The reason why the tweak refused the last key, or "". Args: controls  a control armature."""
+    """The reason why the tweak could not store the last key; "" if it could.
+
+    Args: controls  a control armature.
+    """
     return _troubles.get(controls.session_uid, "")
 
 

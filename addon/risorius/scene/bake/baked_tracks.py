@@ -201,7 +201,7 @@ def key_tracks(
     weights: NDArray[np.float32],
     others: Mapping[str, list[list[float]]] | None = None,
 ) -> list[Track]:
-    """Tracks of the shape keys of a mesh. The keys get the values of the first frame.
+    """Tracks of the shape keys of a mesh. The shape keys get the values of the first frame.
 
     Args:
         key: the Key datablock.

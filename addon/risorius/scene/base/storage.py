@@ -61,7 +61,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend with these unpacked bytes, or None."""
+    """A Text of this .blend whose DNA file has these bytes, or None."""
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text

@@ -371,7 +371,7 @@ def add_live_key(item: MeshObject) -> None:
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
     block.value = 1.0
     block.interpolation = _LIVE_MARK
-    # Edits of this key are lost at the next change of a control, so edit mode must not open it.
+    # Edits of the live key are lost at the next change of a control, so the user must not edit it.
     block.lock_shape = True
     item.active_shape_key_index = 0
     item[parts.MODE] = "LIVE"

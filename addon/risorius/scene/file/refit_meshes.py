@@ -154,7 +154,7 @@ class _Nothing:
         return np.zeros((self._count, *np.shape(values)[1:]))
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The indices, limited to the last vertex."""
+        """The given indices; an index beyond the last new vertex becomes the last new vertex."""
         return [min(i, self._count - 1) for i in indices]
 
 

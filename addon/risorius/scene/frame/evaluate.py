@@ -113,7 +113,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     if native.problem() or is_paused():
         return
     # If joint rotations are read from bones with constraints, these constraints must see the neck
-    # and head of this frame, so the face is evaluated before it.
+    # and head of this frame, so the face is evaluated before the frame.
     read = _look_at_joints(controls_ahead.is_edited())
     if not controls_ahead.is_needed() and not read:
         return

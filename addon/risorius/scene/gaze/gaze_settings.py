@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the gaze, lids and head of a character, as properties of its control armature."""
+"""Defines settings of gaze, lids and head of a character, as properties of its control armature."""
 
 from __future__ import annotations
 

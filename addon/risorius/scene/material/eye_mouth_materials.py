@@ -60,10 +60,11 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 
 
 def eyes(graph: Graph, look: Look) -> None:
-    """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
+    """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The coat keeps the smooth normal of the eyeball, so that the highlight is round. The hollow
-    iris is lit on the side away from the light, as a real one is by refraction.
+    The clear coat over these is the cornea. The coat keeps the smooth normal of the eyeball, so
+    that the highlight is round. The hollow iris is lit on the side away from the light, as
+    refraction lights a real iris.
 
     Args:
         graph: Graph of the material.
@@ -97,7 +98,7 @@ def eyes(graph: Graph, look: Look) -> None:
 
 
 def _ball(graph: Graph, look: Look) -> None:
-    """The eyeball under a separate cornea mesh: a dry iris with relief and a wet sclera.
+    """Build the material of eyeballs under a separate cornea mesh: dry iris and wet sclera.
 
     Args:
         graph: Graph of the material.
@@ -161,8 +162,9 @@ def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
 
 
 def teeth(graph: Graph, look: Look) -> None:
-    """Enamel that yellows towards the gum; a coarse mesh without texture also gets single teeth
-    and gums.
+    """Build the material of teeth: enamel that gets yellower towards the gum.
+
+    On a coarse mesh without a texture, the nodes also draw single teeth and gums.
 
     Args:
         graph: Graph of the material.
@@ -201,7 +203,7 @@ def teeth(graph: Graph, look: Look) -> None:
 
 
 def tongue(graph: Graph, look: Look) -> None:
-    """The tongue: wet flesh with papillae as relief.
+    """Build the material of a tongue: wet flesh with papillae as relief.
 
     Args:
         graph: Graph of the material.
@@ -211,7 +213,7 @@ def tongue(graph: Graph, look: Look) -> None:
 
 
 def gum(graph: Graph, look: Look) -> None:
-    """Wet, mottled flesh: gums, caruncles, cartilage.
+    """Build the material of gums, caruncles and cartilage: wet, mottled flesh.
 
     Args:
         graph: Graph of the material.
@@ -263,7 +265,9 @@ def _flesh(
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards, from an alpha or colour texture, or else from a noise pattern.
+    """Build the material of lashes: hairs on cards.
+
+    The hairs come from an alpha texture, a colour texture with alpha, or else a noise pattern.
 
     Args:
         graph: Graph of the material.
@@ -294,7 +298,7 @@ def _strands(graph: Graph, look: Look) -> Socket:
 
 
 def wet(graph: Graph, look: Look) -> None:
-    """A clear film that reflects like water at each angle.
+    """Build the material of wet films: a clear film that reflects like water at each angle.
 
     The film is transparent and does not refract, because a refracting shell keeps light from the
     eye under it in both engines. Only a cornea refracts, in Cycles and for camera rays alone, so

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loads textures once, packs them into the .blend, and sets the colour space of their role."""
+"""Loads each texture once, packs it into the .blend, and sets its space: colours or numbers."""
 
 from __future__ import annotations
 

@@ -331,8 +331,10 @@ class Skin:
         return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
     def _normal(self) -> Socket:
-        """Pores and folds as one height field, because engines evaluate each height field three
-        times."""
+        """The normal of the skin, from a height field of pores and folds.
+
+        There is only one height field, because engines evaluate each height field three times.
+        """
         graph, look = self.graph, self.look
         normal = self._normal_map()
         pores = graph.cells(self.points, 75.0 / look.unit)

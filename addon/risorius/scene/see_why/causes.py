@@ -59,7 +59,7 @@ class Found:
 
     Attributes:
         mesh, vertex: index of the mesh in the file, and of the vertex.
-        moved: distance from neutral in millimetres.
+        moved: distance of the vertex from its neutral position in millimetres.
         causes: causes, the strongest first.
     """
 

@@ -195,7 +195,7 @@ def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) ->
         colors: float64[F, 3].
         length: float64[V], motion of each vertex.
         triangles: int64[F, 3].
-        furthest: motion with the full colour.
+        furthest: motion that gets the full colour, in the unit of `length`.
     """
     share = np.sqrt(length / max(furthest, 1e-12))
     share = np.where(share > _FAINT, share, 0.0)[triangles].mean(axis=1)[:, None] * _STRONG

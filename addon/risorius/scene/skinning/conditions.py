@@ -272,8 +272,8 @@ def note_restored() -> None:
 
 
 def look_quickly() -> None:
-    """Mark plans as outdated if settings that are quick to compare have changed: modes, selection,
-    modifiers and keys."""
+    """Mark plans as outdated if settings that are quick to compare have changed, such as object
+    modes, selection, modifiers and shape keys."""
     for rig in parts.rigs():
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
@@ -469,8 +469,8 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
         rig: the deforming armature.
 
     Returns:
-        In Direct mode the modifier that the add-on disabled, whatever it points to; otherwise the
-        first armature modifier of this rig.
+        In Direct mode the modifier that the add-on disabled, even if the user has changed its
+        object; otherwise the first armature modifier of this rig.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None

@@ -281,7 +281,7 @@ def write(jobs: Sequence[Job]) -> None:
 
 
 def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
-    """Index of a mesh -> memory address and number of the points of its live key."""
+    """Index of a mesh -> memory address of the points of its live shape key, number of points."""
     found = {}
     for number, item in items.items():
         block = meshes.live_block(item)

@@ -101,7 +101,10 @@ def _hem(places: list[np.ndarray], apart: float) -> float:
 
 
 def _eyes(rig: ArmatureObject) -> np.ndarray:
-    """float64[2, 3]: the eyes' joints at rest in the rig's space; no rows unless there are two."""
+    """float64[2, 3]: positions of the eye joints at rest in the rig's space.
+
+    float64[0, 3] unless the face has two eye joints at different positions.
+    """
     live = runtime.of(rig)
     if live is None:
         return np.zeros((0, 3))
