@@ -69,7 +69,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
         with_keys: also convert the keys of the active action, in a copy of the action.
 
     Returns:
-        The loss, the earlier action and the number of new F-curves.
+        The result of the conversion.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     done = Converted()
@@ -228,7 +228,7 @@ def convert(
 
 
 def _frames(curves: Iterable[bpy.types.FCurve]) -> NDArray[np.float64]:
-    """The frames of all keys of F-curves, and all whole frames between them."""
+    """The frames of all keys of F-curves, and all whole frames from the first to the last key."""
     keys = np.concatenate([clip_actions.key_points(curve)[0] for curve in curves])
     whole = np.arange(np.floor(keys.min()), np.ceil(keys.max()) + 1.0)
     inside = whole[(whole >= keys.min()) & (whole <= keys.max())]

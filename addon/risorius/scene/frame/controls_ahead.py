@@ -69,8 +69,8 @@ def is_safe(user: bpy.types.Scene) -> bool:
     """Whether the separate graph may be built before a frame of a scene.
 
     Building it makes Blender rebuild the scene's own graph. Blender 4.2 and 4.3 crash if that graph
-    was never evaluated, such as after switching a window to the scene. If this is False, the faces
-    are updated after the frame.
+    was never evaluated, such as after switching a window to the scene. If the result is False, the
+    faces must be updated after the frame.
 
     Args:
         user: the scene to be evaluated.
