@@ -77,7 +77,7 @@ def timing_of(
     Args:
         clip: the clip to place.
         scene: gives the frames per second.
-        start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
+        start: the frame of the clip's first sample; with keep_clock, the frame of second 0.
         keep_clock: count from second 0 of the clip, to keep several clips of one take in step.
         whole: True: keys on whole frames only.
     """
@@ -444,7 +444,7 @@ class Turning:
     rest: tuple[float, ...]
 
     def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64[frames, 3 or 4]: the rotation; a component without a curve is at rest."""
+        """float64[frames, 3 or 4]: the rotation; components without a curve have rest values."""
         return np.stack(_rows(self.curves, self.rest, frames), axis=1)
 
 

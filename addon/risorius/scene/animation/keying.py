@@ -42,7 +42,8 @@ class Rules:
         available: key only properties with an F-curve.
         needed: key only if the value differs from the curve.
         kind: type of the key, such as KEYFRAME or EXTREME.
-        interpolation, handles: for the first keys of a curve; a later key copies the key before it.
+        interpolation, handles: interpolation and handle types of the first keys of a curve; a later
+            key copies the key before it.
         keying_set: key only the paths of this set; None: no limit.
     """
 

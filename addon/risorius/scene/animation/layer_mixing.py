@@ -344,7 +344,9 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """Names that a layer may move: sliders, and components of control bones (`clip_units.BONES`).
+    """The names of sliders and of control bone components that a layer may move.
+
+    The components have names from `clip_units.BONES`.
 
     Args:
         live: Runtime of the character, for the names of its sliders.

@@ -83,7 +83,7 @@ def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
 def recorded(
     context: Context, item: MeshObject, first: int, last: int, progress: Callable[[float], None]
 ) -> Floats:
-    """float32[F, V, 3]: an object's evaluated vertices in its own space, frame by frame.
+    """float32[F, V, 3]: an object's evaluated vertices in object space, frame by frame.
 
     Args:
         context: scene and view layer.

@@ -68,7 +68,7 @@ def uid_of(modifier: bpy.types.Modifier) -> int:
 
 
 def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
-    """The object that stores the selection of a bone: since 5.0 the pose bone."""
+    """The object that stores the selection of a bone: the Bone; since Blender 5.0 the PoseBone."""
     return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
 
 

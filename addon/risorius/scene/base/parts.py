@@ -88,7 +88,9 @@ def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
 
 
 def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
-    """Set a custom property that points to another part, also on overrides of linked characters.
+    """Set a custom property that points to another part of the character.
+
+    This works also on overrides of linked characters.
 
     The property is marked as overridable, because Blender would otherwise reset it to the value in
     the library when the file is opened.

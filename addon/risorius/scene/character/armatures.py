@@ -166,8 +166,8 @@ def build_rig(
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False
-    # The rig follows the control armature (rig_placement.py). If the user moved both together, the
-    # rig would move twice as far.
+    # The rig is locked because it follows the control armature (rig_placement.py). If the user
+    # moved both together, the rig would move twice as far.
     lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)

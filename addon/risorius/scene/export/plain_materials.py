@@ -185,8 +185,8 @@ def _ends(parts: Iterable[NDArray[np.float32]]) -> NDArray[np.int64]:
 
 
 def _corners(item: MeshObject, slot: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """The corners of the polygons with a material slot, int64[n], and the number of corners of each
-    of these polygons, int32[polygons]."""
+    """The corners of the polygons that use a material slot, int64[n], and the number of corners of
+    each of these polygons, int32[polygons]."""
     mesh = item.data
     index, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("material_index", index)

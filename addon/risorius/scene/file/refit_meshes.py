@@ -205,7 +205,7 @@ def _own_groups(change: Change, item: MeshObject) -> list[str]:
 def _things(
     change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
 ) -> list[str]:
-    """Descriptions of the user's edits of a mesh and additions to it, for a report."""
+    """Descriptions of the user's edits of a mesh and of the user's additions, for a report."""
     layers, lost = transfer.own_attributes(item.data)
     things = {
         "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),

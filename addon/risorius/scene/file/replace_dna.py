@@ -189,7 +189,8 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
         if saved.whole(rig, key, lods.SAME - 1) not in (*levels, lods.SAME):
             rig.pop(key, None)
             rig[key] = levels[0]
-    # Bones, channels and maps have new indices, so forget the last written values.
+    # Bones, blend shape channels and animated maps have new indices, so forget the last written
+    # values.
     last_written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)

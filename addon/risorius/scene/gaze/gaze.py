@@ -222,7 +222,7 @@ def frame_of(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion] | None = None,
 ) -> tuple[Float, Float]:
-    """Place and rotation of a joint, in the armature's axes.
+    """Position and rotation of a joint, in the armature's axes.
 
     Args:
         live: the character's Runtime.
@@ -231,7 +231,7 @@ def frame_of(
         turns: rotations of "neck" and "head", applied as on the bones of the rig.
 
     Returns:
-        float64[3] place in Blender units and float64[3, 3] rotation; joint scales are ignored.
+        float64[3] position in Blender units and float64[3, 3] rotation; joint scales are ignored.
     """
     chain = live.chain(joint)
     moved = np.asarray(deltas[chain.joints], np.float64)

@@ -159,7 +159,10 @@ def close(session: Session) -> None:
 
 
 def _reserve(key: tuple[str, int, str]) -> None:
-    """Let a receiver reserve a place for each subject that a session chose by name."""
+    """Let a receiver reserve a place for each subject that a session chose by name.
+
+    Other senders then cannot displace these subjects.
+    """
     chosen = {s.subject for s in _sessions.values() if s.key == key and s.subject}
     _receivers[key].reserve(chosen)
 

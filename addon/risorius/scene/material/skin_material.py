@@ -350,8 +350,11 @@ class Skin:
         return graph.bump(graph.total(heights), look.unit * 0.03, normal)
 
     def _normal_map(self) -> Socket | None:
-        """The normal of the textures with wrinkle sets mixed in by their amounts; None without
-        normal textures."""
+        """The normal from the normal textures; None if there are none.
+
+        The normals of the texture sets are mixed into the normal of the base texture by their
+        amounts.
+        """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)
         if base is None and not self.wrinkles:

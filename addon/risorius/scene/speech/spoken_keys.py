@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stores the sounds of a voice with its action, and updates the mouth's keys after corrections.
 
-A voice is an action that was made from recorded speech. A sound is a phoneme and the frame at which
-it begins. In each curve only the keys between the last key before the changed frames and the first
-key after the changed frames are replaced. These two keys stay, but their handles towards the
+A voice is the recorded speech from which an action was made. A sound is a phoneme and the frame at
+which it begins. In each curve only the keys between the last key before the changed frames and the
+first key after the changed frames are replaced. These two keys stay, but their handles towards the
 replaced keys are set anew. All other keys are unchanged.
 """
 

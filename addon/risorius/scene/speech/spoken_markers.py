@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shows the sounds of a voice as scene markers, and reads them back after the user moved them.
 
-A voice is an action that was made from recorded speech; its sounds are phonemes. Scene markers are
-used instead of action markers, because timeline, dope sheet, graph editor and NLA all show scene
-markers, even if the voice is a layer and not the active action. The user's own markers are never
+A voice is the recorded speech from which an action was made; its sounds are phonemes. Scene markers
+are used instead of action markers, because timeline, dope sheet, graph editor and NLA all show
+scene markers, even if a layer plays the action of the voice. The user's own markers are never
 changed.
 """
 

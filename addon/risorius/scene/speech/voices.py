@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the voices that a face plays, and maps their frames to frames of the scene.
 
-A voice is an action that was made from recorded speech.
+A voice is the recorded speech from which an action was made.
 """
 
 from __future__ import annotations
