@@ -81,7 +81,7 @@ def show(
     head: MeshObject,
     found: Mapping[str, Place],
 ) -> None:
-    """Show landmarks that were found. Landmarks that the user moved or placed keep their places.
+    """Show landmarks that were found. Landmarks that the user moved or placed stay unchanged.
 
     Args:
         context: has the scene.

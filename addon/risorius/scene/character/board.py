@@ -2,7 +2,7 @@
 """Reads and sets the handles of a face board, and decides whether board or sliders lead the face.
 
 The location of a handle in its own axes gives the value of its GUI control, independent of the
-places of board, armature and face. Raw controls without a GUI control keep their sliders. Either
+positions of board, armature and face. Raw controls without a GUI control keep their sliders. Either
 the board or the sliders lead, that is, move the face; the others have no effect. All code that
 reads or sets the pose of a face uses this module.
 """

@@ -191,7 +191,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 
 
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a primary board: beside the head meshes."""
+    """The position and unit of a primary board, which is beside the head meshes."""
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
 
@@ -215,7 +215,10 @@ def _box(
 
 
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a complete board: beside the head at +x, _SHARE times as high as the head."""
+    """The position and unit of a complete board.
+
+    The board is beside the head at +x, and _SHARE times as high as the head.
+    """
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height

@@ -154,7 +154,7 @@ def attach(
         body: an armature object, at any scale.
         base: the body's bone that carries the whole face.
         neck, head: the body's bones that rotate the face's own neck and head; "": none.
-        fit: "NONE": keep the place of the face; "MOVE": move the face so that its head bone is at
+        fit: "NONE": do not move the face; "MOVE": move the face so that its head bone is at
             the rest position of the body's head bone (without head bones: neck bones); "SCALE":
             also scale the face so that the neck lengths are equal.
     """
@@ -277,7 +277,7 @@ def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, s
 
 
 def detach(controls: ArmatureObject) -> None:
-    """Detach a face from its body; the face keeps its place."""
+    """Detach a face from its body; the face stays at its current position."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()

@@ -28,7 +28,7 @@ _BESIDE = 0.02  # of the face's size: largest distance of a vertex from the mirr
 class Skin:
     """A face's meshes in the scene.
 
-    It holds Blender objects, so it must not outlive the operator that creates it.
+    It refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         surface: the face in file space (axes and unit of the DNA file), at the visible level of

@@ -79,7 +79,7 @@ class _Anchors:
 class Stroke:
     """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    It holds Blender objects, so it must not outlive the operator that creates it.
+    It refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         rig, live: the character and its Runtime.

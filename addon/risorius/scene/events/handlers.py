@@ -158,8 +158,7 @@ def _note_mended(rig: ArmatureObject) -> None:
 
 
 def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
-    # Compare the objects and not their number: one step may remove as many objects as it
-    # adds.
+    # Compare the objects and not their number: one step may remove as many objects as it adds.
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)

@@ -58,7 +58,7 @@ def outward_normal(graph: Graph) -> Socket:
 
 
 def see_through(graph: Graph) -> None:
-    """Make places without hair transparent; EEVEE dithers them."""
+    """Make the parts of the cards without hair transparent; EEVEE dithers the transparency."""
     material = graph.material
     material.surface_render_method = "DITHERED"
     material.use_transparency_overlap = False

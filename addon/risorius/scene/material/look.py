@@ -37,7 +37,8 @@ class Look:
         border: whether the mesh has an open border away from the face, such as at the neck.
         found: texture_search.TexturePlan.
         images: loader of images.
-        atlas, places: image with the wrinkle masks, and the place of each region in it.
+        atlas, places: image with the wrinkle masks of all regions; region -> its tile and colour
+            channel in this image.
         offsets: role -> whether that wrinkle map stores differences; filled when needed.
     """
 

@@ -310,7 +310,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh nearest to a place in the current pose; -1: none.
+    """The vertex of a mesh nearest to a position in the current pose; -1 if there is none.
 
     Args:
         rig: deforming armature.

@@ -23,7 +23,7 @@ _EDGE = (0.010, 0.011, 0.014, 1.0)
 
 
 def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.Collection:
-    """Build the studio of a face at its current place, scaled to its head.
+    """Build the studio around a face at its current position, scaled to the size of the head.
 
     Args:
         context: Blender context; the studio is added to its scene.
@@ -149,7 +149,7 @@ def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
 
 
 def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
-    """The matrix of a camera or lamp that looks from a place to a target."""
+    """The matrix of a camera or lamp at a position, directed at a target."""
     way = Vector(target) - Vector(place)
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 

@@ -231,14 +231,17 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """Restore the place of a child of a part. Blender fails to do so under some bones."""
+    """Restore the world transform of a child of a part.
+
+    Blender itself does not restore the transforms of some children of bones.
+    """
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
 
 
 def _is_held(item: bpy.types.Object) -> bool:
-    """Whether the place of a part is locked and not animated."""
+    """Whether the transform of a part is locked, not animated and without constraints."""
     locked = all((*item.lock_location, *item.lock_rotation, *item.lock_scale))
     return locked and item.animation_data is None and not item.constraints
 

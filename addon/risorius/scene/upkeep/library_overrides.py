@@ -209,7 +209,7 @@ def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
 
 
 def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
-    """Move an override to the place of an instance of the linked collection.
+    """Move an override to the position of an instance of the linked collection.
 
     The instance then shows nothing, and is deleted if no other datablock uses it.
     """
