@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Chooses the drag handles of a face: the vertices that its controls move most.
 
-These handles are dots on the skin; the handles of a face board are bones.
+These handles are vertices of the skin; the handles of a face board are bones.
 """
 
 from __future__ import annotations

@@ -55,7 +55,10 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """The integer quotient of a number and `size`: the index of its group of `size` numbers."""
+        """The integer quotient of a number and `size`.
+
+        If numbers form groups of `size` successive numbers, this is the index of a number's group.
+        """
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
