@@ -135,7 +135,8 @@ _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
     """Tracks of the rig's object transform.
 
-    Empty unless the rig follows the control armature and the control armature moves.
+    Empty if the rig does not follow the control armature, has a parent or constraints, or does not
+    move.
     """
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
@@ -236,8 +237,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider that stays at 0, or for a property of a
-        bone that keeps its current value.
+        Tracks. `actions.write` makes no curve for a slider that always has its rest value, or for a
+        property of a bone that always has its current value.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

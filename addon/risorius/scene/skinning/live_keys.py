@@ -70,7 +70,7 @@ def write(
 def bears_simulation(item: bpy.types.Object) -> bool:
     """Whether an edit of an object resets a simulation.
 
-    The object may be simulated, or influence the simulation of another object by a force field.
+    The object may be simulated, or influence other simulated objects, for example by a force field.
     """
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None
