@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animates the controls of a character: actions, clips, layers, keys and tweaks."""
+"""Animates the controls of a character with keyframes, clips, animation layers and tweaks."""

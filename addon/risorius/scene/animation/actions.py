@@ -33,7 +33,7 @@ class Track:
     Attributes:
         path: data path of the property.
         group: name of the group of its F-curves.
-        values: float32[frames, width].
+        values: float32[frames, width], the components of the property at each frame.
         now: float[width], current value of the property in the scene. A property that has this
             value at all frames needs no curve. None: always make a curve.
         first: array index that the first column of values animates.
@@ -50,7 +50,8 @@ class Track:
 
 @dataclass
 class Counts:
-    """Totals of written F-curves: keys, keys before the reduction, its largest error, curves."""
+    """Totals over the written F-curves: number of keyframes, number of keyframes before the
+    reduction, largest error of the reduction, and number of F-curves."""
 
     keys: int = 0
     all_keys: int = 0
@@ -126,7 +127,8 @@ def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:
 def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
-    """Yields each track with its values and a mask of the kept keys, both [frames, width]."""
+    """Yields each track, its values [frames, width], and a mask of the keys that remain after the
+    reduction, bool[frames, width]."""
     most = max(_AT_ONCE // len(frames), 16)  # columns
     waiting, width = [], 0
     for number, track in enumerate(tracks):
@@ -163,15 +165,18 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
     points = curve.keyframe_points
     points.add(len(times))
     places = np.stack([times, values], axis=1).ravel()
-    # Linear keys ignore their handles. Placing these at the key saves Blender their slow
-    # computation.
+    # Linear keyframes ignore their handles. The handles are placed at the keyframe, because
+    # Blender would otherwise compute them, which is slow.
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether the keys of an action changed since `stamp`; True if it has no stamp."""
+    """Whether the keys of an action changed since the last call of `stamp`.
+
+    True if `stamp` was never called for the action.
+    """
     return action.get(_DIGEST) != _digest(action)
 
 
@@ -198,12 +203,14 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action alone, and keep its earlier animation.
+    """Let a datablock play a baked action and no other animation.
+
+    The earlier animation of the datablock is stored for `restore`.
 
     Args:
-        owner: object or shape keys whose animation `restore` brings back later.
+        owner: object or shape keys that play the action.
         action, slot: the results of `write`.
-        muted: data paths whose drivers are muted, since they are baked.
+        muted: data paths of baked properties, whose drivers are muted.
         strip: put the action on a new NLA track instead of making it the active one.
     """
     keep(owner)
@@ -299,8 +306,8 @@ def _set(owner: Animated, path: str, number: float) -> None:
 def restore(owner: Animated) -> None:
     """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, or the user protected or edited
-    them. An action that the user assigned since `play` stays in the file.
+    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
+    or the user edited them. An action that the user assigned since `play` stays in the file.
     """
     if BEFORE not in owner:
         return
@@ -351,7 +358,7 @@ def _play_again(
 def _is_used(action: bpy.types.Action) -> bool:
     """Whether a datablock or a fake user uses an action.
 
-    `users` alone is not enough: Blender 4.3 counts one too many after an object is duplicated.
+    `users` alone is not enough: Blender 4.3 counts one user too many if an object was duplicated.
     """
     return bool(
         action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
@@ -373,12 +380,12 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Convert the stored track states of an old file, which names no tracks, to texts of `_noted`.
+    """Convert stored states of NLA tracks from the format of old .blend files to texts of `_noted`.
 
-    The old file stores the states in the order of the tracks.
+    The old format stores no track names, only the states in the order of the tracks.
 
     Returns:
-        Whether any stored track was rewritten.
+        Whether the stored states had the old format and were converted.
     """
     state = saved.table(owner, BEFORE) or {}
     lines = saved.texts(state, "tracks")
@@ -428,7 +435,10 @@ def _remove_track(
 def _baked_strips(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """The tracks and strips with the baked action, also if the user renamed or moved them."""
+    """The NLA strips that play the baked action, each with its track.
+
+    Strips and tracks that the user renamed or moved are found too.
+    """
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")
     own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]

@@ -69,7 +69,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
         with_keys: also convert the keys of the active action, in a copy of the action.
 
     Returns:
-        The loss, the earlier action and the number of new F-curves.
+        The result of the conversion.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     done = Converted()
@@ -98,7 +98,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
 
 
 def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
-    """Replace the face board by the other kind. Pose and keys are converted as by `switch`.
+    """Replace the face board by a board of another kind, and convert the pose and the keys.
 
     Args:
         context: with a view layer.
@@ -106,7 +106,8 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        The result of the conversion to the new board; empty if the sliders lead.
+        The result of the conversion to the new board. If the sliders lead, nothing is converted
+        and all attributes have their defaults.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)
@@ -143,7 +144,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
 
 def animates_sliders(rig: ArmatureObject) -> bool:
-    """Whether a played action of a face has keys of sliders that the board reaches.
+    """Whether a played action of a face has keys of sliders that the face board can move.
 
     Args:
         rig: the character.
@@ -157,7 +158,10 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 
 
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
-    """Convert the current pose to the board or to the sliders. Returns: the loss."""
+    """Convert the current pose to the board or to the sliders.
+
+    Returns: the changes of raw controls by the conversion.
+    """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
     assert face is not None
@@ -224,7 +228,7 @@ def convert(
 
 
 def _frames(curves: Iterable[bpy.types.FCurve]) -> NDArray[np.float64]:
-    """The frames of all keys of F-curves, and all whole frames between them."""
+    """The frames of all keys of F-curves, and all whole frames from the first to the last key."""
     keys = np.concatenate([clip_actions.key_points(curve)[0] for curve in curves])
     whole = np.arange(np.floor(keys.min()), np.ceil(keys.max()) + 1.0)
     inside = whole[(whole >= keys.min()) & (whole <= keys.max())]

@@ -77,7 +77,7 @@ def timing_of(
     Args:
         clip: the clip to place.
         scene: gives the frames per second.
-        start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
+        start: the frame of the clip's first sample; with keep_clock, the frame of second 0.
         keep_clock: count from second 0 of the clip, to keep several clips of one take in step.
         whole: True: keys on whole frames only.
     """
@@ -103,7 +103,7 @@ def make_action(
     Args:
         rig: the character's deforming armature.
         clip: risorius.Clip; curves such as "head.yaw" rotate the bones of head, neck and eyes.
-        timing: place of the clip in the scene, from timing_of.
+        timing: frames of the scene at which the clip plays, from timing_of.
         name: name of the action.
         with_eyes: animate the eye bones too if the clip has eye rotations.
         tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a
@@ -176,8 +176,8 @@ def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
     Args:
         scene: its range is changed.
         report: result of the import, with the first and last frame.
-        mode: "EXTEND" moves the end of the scene to the end of the animation if that is later;
-            "FIT" begins and ends it with the animation; "KEEP" leaves it.
+        mode: "EXTEND": the last frame of the range becomes the last frame of the animation if this
+            is later; "FIT": the range becomes the range of the animation; "KEEP": the range stays.
     """
     first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
     if mode == "FIT":
@@ -228,7 +228,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set a property of all keys from index `first` to the end."""
+    """Set the keyframe property `name` of all keyframes from index `first` to the end."""
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)
@@ -374,7 +374,7 @@ def clip_of_action(
 
 
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
-    """Replace Blender's shortened slider names by DNA names, so that other characters know them.
+    """Replace Blender's shortened slider names by DNA names, which other characters know too.
 
     A slider keeps Blender's name if its DNA name occurs twice. Names that belong to no slider stay.
 
@@ -444,7 +444,7 @@ class Turning:
     rest: tuple[float, ...]
 
     def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64[frames, 3 or 4]: the rotation; a component without a curve is at rest."""
+        """float64[frames, 3 or 4]: the rotation; components without a curve have rest values."""
         return np.stack(_rows(self.curves, self.rest, frames), axis=1)
 
 
@@ -488,7 +488,10 @@ def turning_in(
 def _rows(
     curves: Sequence[bpy.types.FCurve | None], rest: Sequence[float], frames: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """float64[frames] for each channel of a property; a channel without a curve is at rest."""
+    """float64[frames] for each component of a property, sampled from its F-curve.
+
+    A component without an F-curve has its value from `rest` at all frames.
+    """
     return [
         np.full(len(frames), still) if curve is None else sampled(curve, frames)
         for curve, still in zip(curves, rest, strict=True)

@@ -35,7 +35,7 @@ def colour_of(region: str, step: int = 0) -> Colour:
 
     Args:
         region: name of the region; an unknown name gives the colour of "other".
-        step: number of a curve in its region, from 0; neighbours get different saturation.
+        step: number of a curve in its region, from 0; successive numbers get different saturation.
     """
     share = (step * 2 % _STEPS) / (_STEPS - 1)
     return colorsys.hsv_to_rgb(_HUES.get(region, _HUES["other"]), 0.75 - 0.3 * share, 0.95)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiles the layers of a character to native curves, and mixes them over sliders and bones.
+"""Compiles the animation layers of a character, and mixes them over sliders and bones.
 
 Compiled layers are cached for each character together with the settings they were made from. A
 frame of a character with layers costs one comparison of settings and one native call. The cache
-holds no Blender object.
+holds no Blender object. Fired reactions (short animations that start at a frame) are mixed too.
 """
 
 from __future__ import annotations
@@ -68,7 +68,10 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Cache of compiled layer sources (clips or poses) and masks, by the settings of the layer."""
+    """Cache of compiled layer sources (clips or poses) and of compiled masks.
+
+    The settings of a layer, see `_key`, identify its source and its mask.
+    """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
@@ -80,7 +83,8 @@ class Stack:
 
     Attributes:
         made_of: the settings that the layers were compiled from.
-        mixer: its channels are the character's slider labels, then `clip_units.BONES`.
+        mixer: mixes the values of the sliders and of the bone components `clip_units.BONES`, in
+            this order.
         layers: risorius.Layer, bottom to top, at weight 1.
         places: index of each compiled layer in the collection of settings.
         weights: the weights in the mixer, by the index of the layer in that collection.
@@ -340,7 +344,9 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """Names that a layer may move: sliders, and components of control bones (`clip_units.BONES`).
+    """The names of sliders and of control bone components that a layer may move.
+
+    The components have names from `clip_units.BONES`.
 
     Args:
         live: Runtime of the character, for the names of its sliders.
@@ -405,7 +411,10 @@ def _span_times(span: logic.Span, rate: float) -> Times:
 def _idle_source(
     _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
 ) -> Source:
-    """Idle life with the length of the layer, or an endless loop if the layer has no length."""
+    """A generated clip of idle motion, such as blinks, with the length of the layer.
+
+    If the layer has no length, the clip is an endless loop.
+    """
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
     clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads, orders and changes the animation layers of a character."""
+"""Reads, orders and changes the animation layers and the reactions of a character.
+
+A reaction is a short animation from Risorius' files that starts (is fired) at a frame.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +73,10 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 
 
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
-    """The times and frames at which a layer plays its action, or the given action instead."""
+    """The timing of an action in a layer: start, played frames, speed and warp points.
+
+    Without `action`, the action of the layer is used.
+    """
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
@@ -105,7 +111,7 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point at a scene frame, with the source frame that the layer shows there.
+    """Add a warp point at a scene frame, with the frame of the animation that the layer shows then.
 
     The first warp point also adds one at each end of the layer, so that the timing does not change.
     """
@@ -165,7 +171,7 @@ def add_action(
 
     Args:
         controls: control armature of the character.
-        action: action to play; the layer starts at its first frame.
+        action: action to play; the layer starts at the first frame of the action.
         settings: other properties of the layer by name.
 
     Returns:
@@ -248,7 +254,7 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 
 
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
-    """Add a copy of a layer, with the keys of its weight, above it.
+    """Add a copy of a layer directly above this layer, and copy the keys of its weight.
 
     Args:
         controls: control armature of the character.
@@ -275,7 +281,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """Yields the F-curve collections that move no other datablock, and the list of drivers."""
+    """Yields the F-curve collections of actions that only this armature plays, then its drivers."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:

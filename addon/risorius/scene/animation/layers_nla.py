@@ -61,7 +61,7 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
 def obstacle(
     controls: ArmatureObject, layer: RISORIUS_PG_layer, curve: bpy.types.FCurve | None = None
 ) -> str:
-    """The reason why no strip can represent a layer; empty if one can.
+    """The reason why no strip can represent a layer; "" if a strip can.
 
     Args:
         controls: control armature.

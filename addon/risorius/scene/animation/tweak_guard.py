@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Moves edits by Blender's own buttons into the active tweak.
 
-Blender inserts its keys into the action of the face. While a tweak is on, the file keeps a copy of
-that action, so that undo and redo restore it. New keys of the action are removed again, and their
-values are stored in the tweak. Moves of sliders, bones and handles without a key are stored in the
-tweak when the frame changes. Other edits of the action stay: moved or deleted keys, and keys of
-properties that a tweak cannot store, such as the location of the whole face.
+Blender inserts its keys into the action of the face. While a tweak is on, the .blend file has a
+copy of that action, so that undo and redo restore the copy too. New keys of the action are removed
+again, and their values are stored in the tweak. If the user moves a slider, bone or handle without
+a key, its value is stored in the tweak when the frame changes. Other edits of the action stay:
+moved or deleted keys, and keys of properties that a tweak cannot store, such as the location of
+the whole face.
 """
 
 from __future__ import annotations
@@ -79,12 +80,15 @@ _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
 # Session uid of a control armature whose action was checked since load or undo -> its cached pose
 # without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of a control armature -> reason why the tweak refused its last key.
+# Session uid of a control armature -> reason why the tweak could not store the last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """The reason why the tweak refused the last key, or "". Args: controls  a control armature."""
+    """The reason why the tweak could not store the last key; "" if it could.
+
+    Args: controls  a control armature.
+    """
     return _troubles.get(controls.session_uid, "")
 
 
@@ -104,7 +108,10 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
 
 def end(controls: ArmatureObject) -> None:
-    """Store moved controls that have no new key in the tweak, and end it. Its layer stays."""
+    """Store in the tweak the controls that were moved without a key, and end the tweak.
+
+    The layer of the tweak stays.
+    """
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -158,8 +165,10 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """The pose of the controls without the tweak. On a face with NLA strips it is cached, because
-    Blender has to evaluate the strips."""
+    """The pose of the controls without the tweak.
+
+    On a face with NLA strips the pose is cached, because Blender has to evaluate the strips.
+    """
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
     uid, strips = controls.session_uid, _strips(controls)
@@ -172,7 +181,10 @@ def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweak
 
 
 def _strips(controls: ArmatureObject) -> tuple[object, ...]:
-    """Settings of the NLA strips of a face and of the active action, to notice changes."""
+    """The blending settings of the active action and the settings of all NLA strips of a face.
+
+    `_below` compares them to notice changes.
+    """
     data = controls.animation_data
     assert data is not None
     own = (data.use_nla, data.action_influence, data.action_blend_type)
@@ -186,7 +198,9 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 
 
 def settle(controls: ArmatureObject) -> None:
-    """Store moved controls that have no new key in the tweak, unless the frame is outside it.
+    """Store in the tweak the controls that were moved without a key.
+
+    Nothing is stored if they were moved at a frame outside the tweak.
 
     Args:
         controls: a control armature. The scene may have changed its frame since the move.
@@ -300,7 +314,7 @@ def _take_all(
     """Store the moved controls of several frames in the tweak. Then set controls that were keyed at
     other frames to their pose without the tweak at the current frame.
 
-    hands: one for each frame, the current frame last.
+    hands: the moved controls, one _Hand for each frame; the last is of the current frame.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
@@ -314,8 +328,8 @@ def _take_all(
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
     """The curves of sliders, handles and control bones in an action, by data path and index.
 
-    All channels of the bones are included, because Blender also keys channels that the face does
-    not use.
+    F-curves of location, rotation and scale of these bones are included, because Blender also keys
+    properties that the face does not use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}
@@ -335,7 +349,10 @@ def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
 ) -> list[float] | None:
-    """The frames of keys that were inserted or overwritten since `before`; None for other edits."""
+    """The frames of keys of `curve` that its earlier copy `before` lacks or has with other values.
+
+    None if the keys differ in another way, for example because keys were deleted.
+    """
     frames, values = clip_actions.key_points(curve)
     if before is None:
         return frames.tolist()

@@ -223,7 +223,9 @@ def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -
 
 @contextmanager
 def curves_so_far(controls: ArmatureObject) -> Iterator[Curves]:
-    """Yields a copy of the curves of the tweak's layer, which stays unchanged by inserted keys.
+    """Context manager: a copy of the curves of the tweak's layer.
+
+    Keys that are inserted later do not change the copy.
 
     Args:
         controls: the control armature; without a tweak or layer the result is empty.

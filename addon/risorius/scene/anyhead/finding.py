@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds landmarks of heads with the package risorius, and converts them for Blender."""
+"""Finds landmarks of heads with the Python package risorius, and converts them for Blender.
+
+In this file, "the package" is risorius. Its coordinates are in cm, with x to the left of the head,
+y up and z to the front.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +41,8 @@ class Head(NamedTuple):
 
     Attributes:
         parts: the meshes, the face first, in the coordinates of the package.
-        turn: float64[3, 3], from the coordinates of the head's object to the package's.
+        turn: float64[3, 3], rotation matrix from the coordinates of the head's object to the
+            coordinates of the package.
         fixed: landmarks that the user moved or placed, in the coordinates of the package.
         named: name of the object that is the face; "": the package chooses one of the meshes.
     """
@@ -64,7 +69,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
 
 
 def words() -> Mapping[str, str]:
-    """Name of each landmark -> its description for the user, in the order of the package."""
+    """Name of each landmark -> its description for the user, in the order of the package's list."""
     found: Mapping[str, str] = native.part("anyhead.landmarks.names").landmark_words()
     return found
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Background tasks on a head without expressions: making its rig, or conforming a face to it."""
+"""Runs background tasks on a head without expressions: make a rig, or conform a face to it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ _FITTED = 0.6  # share of the total time after which the head has its expression
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task that first fits the head (`stage` FIT), then makes joints (`stage` JOINTS)."""
+    """A task that first fits a template face to the head, then makes the joints.
+
+    The attribute `stage` is FIT or JOINTS.
+    """
 
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """The progress function of a stage, which counts from 0 to 1.
+        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
@@ -121,7 +124,10 @@ def rig_task(
 def _carry_over(
     head: finding.Head, template: Template, transfer: Transfer, progress: Callable[[float], bool]
 ) -> tuple[native.Onto, native.Read]:
-    """The head with the expressions of the template, and the face of blend shapes made of it."""
+    """The head with the expressions of the template, and a face whose rig has only blend shapes.
+
+    The face is made from the head with its expressions; it has no joints.
+    """
     dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
     options = onto.OntoOptions(
@@ -150,7 +156,7 @@ def _write(dna: native.Dna, read: native.Read, path: str) -> None:
 
 
 def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:
-    """A task that gives a face the form of a head. A cancelled task writes no file.
+    """A task that gives a face the shape of a head. A cancelled task writes no file.
 
     Args:
         head: the result of finding.read; it may be a sculpt with the topology of the face.

@@ -32,7 +32,7 @@ class Point(NamedTuple):
     """A landmark that is shown as an empty.
 
     Attributes:
-        name: the name of the landmark in the package.
+        name: the name of the landmark in the package risorius.
         place: float64[3], in the coordinates of the head's object.
         state: FOUND, MOVED (found, then moved), or PLACED (not found, placed by the user).
         item: the empty.
@@ -81,7 +81,7 @@ def show(
     head: MeshObject,
     found: Mapping[str, Place],
 ) -> None:
-    """Show landmarks that were found. Landmarks that the user moved or placed keep their places.
+    """Show landmarks that were found. Landmarks that the user moved or placed stay unchanged.
 
     Args:
         context: has the scene.

@@ -44,8 +44,8 @@ class Samples:
         turns: for each frame, rotations as "neck", "head" -> Quaternion, see inputs.read_inputs.
         basis: control bone -> float64[N, 4, 4], relative to its rest, after constraints and layers.
         places: float64[N, 4, 4], world matrices of the control armature.
-        bones: channel such as "location" -> float32[N, bones, width], values of the deforming
-            armature's bones from the user's own animation; None if there is none.
+        bones: property such as "location" -> float32[N, bones, width], values of the deforming
+            armature's bones from the user's own animation; None if there is no such animation.
         others: datablock -> {data path: list of values} of other animated properties.
     """
 
@@ -195,8 +195,8 @@ class _Reader:
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
         hold = rig_placement.body_of(self.controls)
         if hold is not None:
-            # Without the body's armature in the scene, Blender would skip bones of it that no
-            # visible object depends on.
+            # If the body's armature were not in the scene, Blender would not evaluate bones of the
+            # body on which no visible object depends.
             self.objects.append(hold.target)
         if drivers.moves(rig):
             size = len(rig.pose.bones)
@@ -245,7 +245,7 @@ class _Reader:
         the pose. The earlier pose is restored at the end.
 
         Args:
-            depsgraph: at the frame; it is evaluated once more.
+            depsgraph: dependency graph at this frame; it is evaluated again with the posed rig.
             raw, own: results of inputs.read_mixed.
         """
         if not joint_readings.of(self.rig, self.live).places:
@@ -273,7 +273,11 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the control bones' matrices. Args: own  rotations and gaze target with layers."""
+        """Store the matrices of the control bones for one frame.
+
+        Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
+        gaze target after the layers are mixed.
+        """
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -312,7 +316,7 @@ def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
 
 
 def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:
-    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order.
+    """The data paths of a datablock that an action, an NLA strip or a driver animates.
 
     Args:
         owner: the object or the shape keys.

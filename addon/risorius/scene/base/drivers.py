@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes drivers that read a character's properties, and finds the existing ones in the file."""
+"""Makes drivers that read a character's properties, and finds the drivers of a .blend file."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.Dri
 
 
 class Entries:
-    """Redirects drivers that read a channel or a map by index after the indices have changed.
+    """Redirects drivers that read a blend shape channel or an animated map by its index.
+
+    This is needed if another DNA file gives the channels and maps other indices.
 
     Args:
         rig: deforming armature.
@@ -91,7 +93,10 @@ class Entries:
         return None
 
     def _stand_in(self, target: bpy.types.DriverTarget, array: str, label: str) -> str:
-        """Path of a property with value 0 for a removed label, so that its drivers stay valid."""
+        """Data path of a property with value 0 that replaces a removed channel or map.
+
+        Drivers that read the removed channel or map stay valid with this path.
+        """
         key = _gone_key(array, label)
         assert target.id is not None
         target.id[key] = 0.0
@@ -110,7 +115,10 @@ def _gone_key(array: str, label: str) -> str:
 
 
 def moves(owner: bpy.types.Object) -> bool:
-    """Whether an object has an action, an NLA track, or a driver other than the add-on's PULL."""
+    """Whether an object has an action, an NLA track, or a driver of the user.
+
+    The add-on's driver of the property PULL does not count.
+    """
     data = owner.animation_data
     return data is not None and bool(
         data.action

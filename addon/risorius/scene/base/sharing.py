@@ -2,7 +2,8 @@
 """Shares equal data between characters of a .blend: Texts of DNA files, packed images.
 
 An image is shared until any tool edits it. Then the other characters get a copy of the unedited
-image. Meshes and shape keys are never shared, because the values of keys belong to one face.
+image. A marked image is an image on which `mark` stored the digest of its packed bytes. Meshes and
+shape keys are never shared, because the values of shape keys belong to one face.
 """
 
 from __future__ import annotations
@@ -198,7 +199,10 @@ def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
 
 
 def _noted(image: bpy.types.Image) -> tuple[str, str]:
-    """Digest and state of a marked image, as text, because users may give them another type."""
+    """The digest and the state that `mark` stored on an image, converted to text.
+
+    The conversion is needed because users can change the types of these custom properties.
+    """
     return str(image.get(DIGEST)), str(image.get(STATE))
 
 

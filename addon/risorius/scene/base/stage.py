@@ -84,8 +84,8 @@ class Stage:
 def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
     """Context manager: the controls do not point to their faces while a graph is built.
 
-    A graph includes all objects that custom properties point to: the meshes and their keys would be
-    copied at each frame.
+    A graph includes all objects that custom properties point to. The meshes of the face and their
+    shape keys would therefore be copied at each frame.
 
     Args:
         armatures: control armatures.
@@ -122,7 +122,9 @@ def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
 
 @contextmanager
 def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]:
-    """Context manager: the control armature evaluated at a frame with keys, strips and drivers.
+    """Context manager: the control armature, evaluated at a frame.
+
+    The evaluation includes its action, NLA strips and drivers.
 
     A property without animation keeps its present value. Blender also writes the animated values to
     the original; the caller must restore the user's edits.

@@ -41,7 +41,11 @@ class Task(Generic[Result]):
     """
 
     def __init__(self, work: Work[Result]) -> None:
-        """Args: work  function that calls progress(0 to 1), and ends early if cancelled()."""
+        """Prepare the thread without starting it.
+
+        Args: work  function with two arguments: `progress`, which it calls with its progress (0 to
+        1), and `cancelled`, which returns True if the work must end early.
+        """
         self.share = 0.0
         self.result: Result | None = None
         self.error: Exception | None = None

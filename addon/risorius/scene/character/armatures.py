@@ -166,8 +166,8 @@ def build_rig(
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False
-    # The rig follows the control armature (rig_placement.py). If the user moved both together, the
-    # rig would move twice as far.
+    # The rig is locked because it follows the control armature (rig_placement.py). If the user
+    # moved both together, the rig would move twice as far.
     lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
@@ -251,7 +251,7 @@ def joints_are_shown(rig: ArmatureObject) -> bool:
 
 
 def hide_joints(rig: ArmatureObject) -> None:
-    """Hide the bones of a deforming armature; their names and selection stay."""
+    """Hide the bones of a deforming armature by hiding its bone collections."""
     for shelf in rig.data.collections_all:
         shelf.is_visible = False
     rig.pop(parts.JOINTS_SHOWN, None)
@@ -354,7 +354,10 @@ def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
 
 
 def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[float, float]:
-    """x of the centre and half the width of a head at eye height, which excludes the shoulders."""
+    """The x coordinate of a head's centre, and half the width of the head.
+
+    Only vertices near the height of the eyes count, so that the shoulders are excluded.
+    """
     near = np.abs(points[:, 2] - height) < 0.1 * size
     # A face without skin near its eyes uses the width of the whole face.
     across = points[near if near.any() else slice(None), 0]

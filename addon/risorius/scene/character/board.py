@@ -2,7 +2,7 @@
 """Reads and sets the handles of a face board, and decides whether board or sliders lead the face.
 
 The location of a handle in its own axes gives the value of its GUI control, independent of the
-places of board, armature and face. Raw controls without a GUI control keep their sliders. Either
+positions of board, armature and face. Raw controls without a GUI control keep their sliders. Either
 the board or the sliders lead, that is, move the face; the others have no effect. All code that
 reads or sets the pose of a face uses this module.
 """
@@ -232,7 +232,8 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
         rig: the character.
 
     Returns:
-        Values of all existing sliders. If the board leads, it defines the sliders that it reaches.
+        Values of all existing sliders. If the board leads, sliders that its handles can move have
+        the values that the board gives them.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -243,7 +244,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Slider name -> value from the board, for the sliders that the board reaches.
+    """Slider name -> value from the board, for the sliders that its handles can move.
 
     Args:
         rig: the character.
@@ -286,8 +287,8 @@ def fit(
     Args:
         live: the character's Runtime.
         raw: float[N, R], wanted values of raw controls at N frames.
-        start: float[N, G], start of the search; None: from the inverted table of the file, or 0
-            if the file has no table.
+        start: float[N, G], start of the search; None: the raw values converted by the rig's
+            raw_to_gui, or 0 if the DNA file has no table from GUI controls to raw controls.
 
     Returns:
         float64[N, G], values of GUI controls.
@@ -388,7 +389,8 @@ def mark(rig: ArmatureObject, sign: float) -> None:
 
     Args:
         rig: the character.
-        sign: the mark, a value that no user sets; it is stored as z of each handle's location.
+        sign: the mark, a value that no user sets; the mark is stored as z of each handle's
+            location.
     """
     for handle in handles_in(rig):
         parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign

@@ -23,7 +23,7 @@ class Room:
 
     Attributes:
         middle: x of the face's centre.
-        eyes: x between the eyes.
+        eyes: x of the midpoint between the eyes.
         wide: half the width of the face.
         top: z of the highest point of all meshes, hair included.
     """

@@ -33,7 +33,7 @@ class BuildOptions:
         texture_folder: folder to search first; "": none.
         simple_materials: make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None: the scene's unit.
-        nearest_lods: build the finest level of the file if it has none of the chosen levels.
+        nearest_lods: build the finest level of the file if the file has no level of `lods`.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -203,7 +203,10 @@ def _connect(
 
 
 def _source(path: Path) -> str:
-    """The path that Reload uses; relative to the .blend if it is saved on the same drive."""
+    """The path of a DNA file for the operator Reload.
+
+    The path is relative to the .blend file if both files are on the same drive.
+    """
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:  # another drive
@@ -276,8 +279,9 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
     Args:
         rig: the deforming armature.
-        mode: "AUTO": each mesh has one key with final positions; "LIVE": one key with the sum of
-            the channels, before the armature deforms it; "KEYS": one key per channel.
+        mode: "AUTO": each mesh has one shape key with the final positions; "LIVE": one shape key
+            with the sum of the blend shape channels, which the armature then deforms; "KEYS": one
+            shape key for each blend shape channel.
 
     Returns:
         Sentences about meshes that could not be switched.
@@ -298,7 +302,10 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Remove a character and its data from the file; data with other users stay."""
+    """Remove a character and its datablocks from the .blend file.
+
+    Datablocks that have other users stay.
+    """
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds mesh objects with skin weights, and switches their shape keys between two modes.
 
-In KEYS mode a mesh has a real key for each blend shape channel. In LIVE mode it has one live key,
-to which the evaluator writes the sum of all channels.
+In KEYS mode a mesh has a shape key for each blend shape channel, called a real key here. In LIVE
+mode the mesh has one shape key, the live key, to which the evaluator writes the sum of all
+channels.
 """
 
 from __future__ import annotations
@@ -31,13 +32,16 @@ _LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
 
 
-# Session uids of mesh objects that were built and not edited since, so their skin weights equal the
-# file.
+# Session uids of mesh objects that were not edited since they were built, so that their skin
+# weights equal the weights in the DNA file.
 _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 
 
 def fresh_weights(item: MeshObject) -> bool:
-    """Whether a mesh was not edited since its import, so that its skin weights equal the file."""
+    """Whether a mesh was not edited since its import.
+
+    Its skin weights then equal the weights in the DNA file.
+    """
     return item.session_uid in _fresh
 
 
@@ -119,10 +123,11 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
-    """Shape key name -> channel, for the real keys that Risorius made.
+    """Name of a real key that Risorius made -> index of its blend shape channel.
 
-    They are identified by the variable name of their drivers, so a key that the user drives by a
-    channel does not count. If a driver was copied to another key, only the first key counts.
+    Real keys are identified by the variable name of their drivers, so a shape key that the user
+    drives by a channel does not count. If a driver was copied to another shape key, only the first
+    of both counts.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}
@@ -366,7 +371,7 @@ def add_live_key(item: MeshObject) -> None:
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
     block.value = 1.0
     block.interpolation = _LIVE_MARK
-    # Edits of this key are lost at the next change of a control, so edit mode must not open it.
+    # Edits of the live key are lost at the next change of a control, so the user must not edit it.
     block.lock_shape = True
     item.active_shape_key_index = 0
     item[parts.MODE] = "LIVE"

@@ -49,7 +49,8 @@ def show(controls: ArmatureObject) -> None:
 def stand_beside(rig: ArmatureObject) -> int:
     """Place the outlines as on a newly imported face.
 
-    In older files they cover the eyes. Sizes and positions that the user changed are lost.
+    On faces that older versions of the add-on imported, the outlines cover the eyes. Sizes and
+    positions that the user changed are lost.
 
     Args:
         rig: the character's deforming armature.

@@ -154,8 +154,9 @@ def attach(
         body: an armature object, at any scale.
         base: the body's bone that carries the whole face.
         neck, head: the body's bones that rotate the face's own neck and head; "": none.
-        fit: "NONE": keep the place of the face; "MOVE": move its head bone (or neck bone) onto the
-            body's bone at rest; "SCALE": also scale the face so that the neck lengths are equal.
+        fit: "NONE": do not move the face; "MOVE": move the face so that its head bone is at
+            the rest position of the body's head bone (without head bones: neck bones); "SCALE":
+            also scale the face so that the neck lengths are equal.
     """
     detach(controls)
     if fit != "NONE":
@@ -173,7 +174,10 @@ def attach(
 
 
 def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[str]:
-    """The body's bones from the neck bone to the head's parent, because a neck may have several."""
+    """The neck bones of a body, from `neck` to the parent of `head`, without `base`.
+
+    A body may have more than one neck bone.
+    """
     if not neck:
         return []
     bone = body.data.bones.get(head)
@@ -203,7 +207,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes, without bones at rest.
+        "neck" and "head" -> Quaternion in the control armature's axes; bones at rest are left out.
     """
     hold = body_of(controls)
     if hold is None:
@@ -242,7 +246,11 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move the face so that its head (or neck) bone meets the body's at rest, and scale it."""
+    """Move the face so that its head bone meets the body's head bone in rest position.
+
+    Without head bones, the neck bones are used. `scale`: also scale the face, so that its neck is
+    as long as the neck of the body.
+    """
     own = controls.data.bones
     pairs = [
         (
@@ -269,7 +277,7 @@ def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, s
 
 
 def detach(controls: ArmatureObject) -> None:
-    """Detach a face from its body; the face keeps its place."""
+    """Detach a face from its body; the face stays at its current position."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()

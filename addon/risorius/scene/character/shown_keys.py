@@ -22,8 +22,9 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
 
     The slider bone is selected if it is keyed; it is locked, so nobody moves it by accident.
     Outside pose mode the keyed bones of head and eyes are selected too, so that moving a column of
-    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Keyed
-    handles of a face board are selected only if none of them is selected, in every mode.
+    keys moves their keys. In pose mode these bones are selected only if no keyed bone is selected
+    yet. In every mode, keyed handles of a face board are selected only if no keyed handle is
+    selected yet.
 
     Args:
         controls: control armature of the face.
@@ -57,7 +58,9 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Add the control armature to the selection; it enters pose mode if the active object is in it.
+    """Add the control armature to the selection.
+
+    If the active object is in pose mode, the control armature enters pose mode too.
 
     Args:
         context: a Blender context.

@@ -22,7 +22,9 @@ _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 
 
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
-    """Slider name -> value, for a face or a region. If the face board leads, it gives the values.
+    """Slider name -> value, for a face or a region.
+
+    If the face board leads, the values come from the positions of its handles.
 
     Args:
         rig: the character.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stores points of a face on its control armature: pins, and selected and hidden handles.
 
-A pinned point keeps its position while other points are dragged.
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex). A pinned
+point keeps its position while other points are dragged.
 """
 
 from __future__ import annotations

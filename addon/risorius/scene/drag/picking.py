@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the face and the vertex under a ray through the scene."""
+"""Finds the face and the vertex under a ray through the scene.
+
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex). Handles are
+points that the user can drag.
+"""
 
 from __future__ import annotations
 

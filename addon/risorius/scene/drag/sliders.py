@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts between sliders and the raw controls of the drag solver, including layers."""
+"""Converts between sliders and the raw controls of the drag solver.
+
+The raw controls include the animation layers; the sliders do not.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,8 @@ class Sliders:
 
     Attributes:
         before: property name -> value to restore.
-        start: float64[R], values of the sliders; if the face board leads, values that it gives.
+        start: float64[R], values of the sliders; if the face board leads, the values that the
+            board gives them.
         seen: float32[R], the raw controls of the face, with layers and eye bones.
         gain: float64[R], change of a raw control divided by the change of its slider.
         free: bool[R], sliders that can move.
@@ -159,7 +163,7 @@ def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: whether a control is in a region. Args: live  the Runtime; region  its name."""
+    """bool[R]: whether a raw control is in a region. Args: live  Runtime, region  name."""
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 

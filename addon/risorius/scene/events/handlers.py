@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handlers that update characters at frames, edits, load, undo, save and render."""
+"""Defines handlers that update characters at frames, edits, load, undo, save and render."""
 
 from __future__ import annotations
 
@@ -75,8 +75,10 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether a render changed the frame. During a render job the interface may change it too, but
-    only in the main thread."""
+    """Whether a render changed the frame.
+
+    During a render job the interface may change the frame too, but only in the main thread.
+    """
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -118,7 +120,8 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         known = _objects.now
         _notice_copies(depsgraph.updates)
-        # Blender reports a change of an image's colour space as an update, a change of pixels not.
+        # Blender reports a change of an image's colour space as an update, but does not report a
+        # change of its pixels.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
@@ -155,7 +158,7 @@ def _note_mended(rig: ArmatureObject) -> None:
 
 
 def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
-    # Compare the objects and not their number: one step may remove as many as it adds.
+    # Compare the objects and not their number: one step may remove as many objects as it adds.
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
@@ -182,7 +185,10 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Remove outlines of newly appended faces from the scene; the user may link them later."""
+    """Remove the bone outlines of newly appended faces from the collections of the scene.
+
+    This is done only once, because the user may link outlines to a collection later.
+    """
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
@@ -190,7 +196,10 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters whose controls, body or camera were updated."""
+    """The characters whose controls were updated, or their body, or the camera.
+
+    The body of a character is the armature to which its face is attached.
+    """
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     found = (u.id.original for u in depsgraph.updates if u.id is not None)
@@ -276,7 +285,7 @@ def _loaded(*_arguments: object) -> None:
 def _restored(*_arguments: object) -> None:
     """After load, undo and redo: forget the last written values, which may differ from the data.
 
-    Pose bones must not be read here: until the next update, those of restored objects point to
+    Pose bones must not be read here: until the next update, pose bones of restored objects point to
     freed bones, and Blender would crash.
     """
     session.end("undo")

@@ -19,7 +19,8 @@ from ..skinning import conditions
 _LOOK_AGAIN = 0.5  # seconds between two checks whether an export dialog is open
 
 DIALOG, GLTF = "dialog", "gltf"  # readers: an export dialog, the glTF exporter
-# Reader -> names of the deforming armatures that may not use Direct mode while it works.
+# Reader of the face (DIALOG or GLTF) -> names of the deforming armatures that may not use Direct
+# mode while this reader works.
 _held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
 _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
 

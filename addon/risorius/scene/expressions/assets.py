@@ -26,7 +26,7 @@ _HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
 
 
 def all_expressions() -> dict[str, native.Expression]:
-    """Name -> built-in expression, in the order of the files."""
+    """Name -> built-in expression, in the order of the files of expressions."""
     return native.part("expressions").load()
 
 
@@ -101,7 +101,10 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
 
 
 def _named(name: str) -> bpy.types.Action | None:
-    """The action with a name, ignoring case, because labels of older versions were lower case."""
+    """The action with the given name, or None.
+
+    Case is ignored, because older versions of the add-on used lower case names.
+    """
     wanted = name.casefold()
     return next((action for action in bpy.data.actions if action.name.casefold() == wanted), None)
 

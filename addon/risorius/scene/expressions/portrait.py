@@ -2,7 +2,7 @@
 """Draws small pictures of a face with an expression, in NumPy.
 
 A Sitter contains all data for drawing and no Blender data. So a thread can draw the pictures, and
-the user's scene does not change.
+the user's scene does not change. File space has the axes and the unit of the DNA file.
 """
 
 from __future__ import annotations

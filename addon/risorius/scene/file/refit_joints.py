@@ -38,7 +38,8 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """float64[4, 4]: factor by which the file's local matrix is multiplied from the right."""
+        """float64[4, 4]: factor by which the joint's local matrix in the file is multiplied from
+        the right."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
@@ -71,10 +72,10 @@ def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
 def joint_edits(
     context: Context, rig: ArmatureObject, plan: plans.CharacterPlan
 ) -> dict[int, JointEdit]:
-    """The joints whose rest a user moved or rotated in edit mode.
+    """The joints whose rest pose a user moved or rotated in edit mode.
 
-    The rest is compared with a newly built armature. Differences count only beyond the rounding of
-    a bone's direction in float32, because edit mode recomputes roll and tail.
+    The rest pose is compared with a newly built armature. Differences that the rounding of a bone's
+    direction to float32 can cause are ignored, because edit mode recomputes roll and tail.
 
     Args:
         context: a Blender context with a view layer.
@@ -257,7 +258,7 @@ def _followers(
 ) -> list[tuple[str, str | None, Matrix | None]]:
     """The user's own bones, parents first: (name, new parent, matrix relative to the parent).
 
-    With these values the bones follow their joints. A new parent of None keeps the parent.
+    With these values the bones follow their joints. New parent None: the bone keeps its parent.
     """
     ours = set(kept.values()) | set(gone)
     found = []
@@ -293,7 +294,10 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Set joints to rest that the evaluator moved with the old file but not with the new file."""
+    """Reset the pose of joints that the evaluator moved with the old file.
+
+    Joints that the evaluator moves with the new file too are left out.
+    """
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]

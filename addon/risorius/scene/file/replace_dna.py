@@ -189,7 +189,8 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
         if saved.whole(rig, key, lods.SAME - 1) not in (*levels, lods.SAME):
             rig.pop(key, None)
             rig[key] = levels[0]
-    # Bones, channels and maps have new indices, so forget the last written values.
+    # Bones, blend shape channels and animated maps have new indices, so forget the last written
+    # values.
     last_written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
@@ -226,7 +227,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
 
 
 def _share_materials(change: Change, item: MeshObject) -> None:
-    """Give a mesh of a new level of detail the materials of the same part's other level."""
+    """Give a mesh of a new level of detail the materials of the same mesh in another level."""
     by_index = {m.index: m for m in change.new.meshes}
     base = by_index[item[parts.MESH]].base
     for other in parts.meshes_of(change.rig):
@@ -248,7 +249,10 @@ def _number_meshes(rig: ArmatureObject) -> None:
 
 
 def _sliders(change: Change) -> None:
-    """Add the sliders of the new file; remove obsolete ones unless they have keys."""
+    """Add the sliders of the new file, and remove sliders that only the old file has.
+
+    Sliders with keys or drivers are not removed.
+    """
     controls = parts.controls_there(change.rig)
     face = controls.pose.bones[parts.FACE]
     maximum = parts.maximum_of(controls)

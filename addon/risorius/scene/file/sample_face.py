@@ -11,7 +11,7 @@ from ..base.task import Task, telling
 
 
 class SampleTask(Task[bool]):
-    """Builds a person and writes the DNA file with its textures; the result is True.
+    """Builds a sample person and writes the DNA file with its textures; the result is True.
 
     Attributes:
         fetched: progress of the download, 0 to 1; None while nothing is downloaded.
@@ -21,7 +21,7 @@ class SampleTask(Task[bool]):
 
 
 def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
-    """A task that builds a person.
+    """A task that builds the DNA file of a sample person.
 
     Args:
         path: path of the new DNA file; its folder may contain the data package (.whl).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solo and mute: shows a face with some controls only, or without its joints, shapes or maps.
+"""Solo and mute: shows a face with some controls only, or without joints, shapes or animated maps.
 
 The controls keep their values, so keys, bakes and exports do not change. The deforming armature
 stores the setting, so that undo restores it. Saving removes the setting during the save, so that
@@ -75,7 +75,7 @@ def solo(rig: ArmatureObject, names: Collection[str]) -> None:
 
     Args:
         rig: deforming armature.
-        names: labels of these controls; empty: all controls.
+        names: labels of the controls that keep their effect; empty: all controls.
     """
     put(rig, replace(of(rig), solo=frozenset(names)))
 

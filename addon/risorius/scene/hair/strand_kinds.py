@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Defines number and shape of the strands that replace hair cards, for each kind of hair."""
+"""Defines number and shape of the strands that replace hair cards, for each kind of hair.
+
+A lock is a group of strands of one card that share a root and a direction.
+"""
 
 from __future__ import annotations
 

@@ -49,7 +49,10 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
 
 
 def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
-    """A colour to the power of an exponent: below 1 lightens, and dark colours most."""
+    """A colour to the power of an exponent.
+
+    An exponent below 1 makes the colour lighter; dark colours change most.
+    """
     node = tree.nodes.new("ShaderNodeGamma")
     node.inputs["Gamma"].default_value = exponent
     tree.links.new(colour, node.inputs["Color"])

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the geometry nodes that turn hair cards into strands."""
+"""Builds the geometry nodes that turn hair cards into strands.
+
+A card is a strip of polygons; each of its rows has a left and a right vertex. A lock is a group of
+strands of one card that share a root and a direction.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +55,10 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """The index, from 0, of the group of `size` numbers that a number belongs to."""
+        """The integer quotient of a number and `size`.
+
+        If numbers form groups of `size` successive numbers, this is the index of a number's group.
+        """
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
@@ -148,7 +155,10 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A random displacement of each lock, up to `most` along each axis. The caller sets Scale."""
+    """A random displacement of each lock, up to `most` along each axis.
+
+    Returns: a node that scales the displacement; the caller connects its input Scale.
+    """
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
     parted.inputs["Max"].default_value = [most] * 3

@@ -20,7 +20,7 @@ class Blink:
     """Timing of a blink in frames of the scene.
 
     Attributes:
-        close, hold, open: length of each part.
+        close, hold, open: length of each phase: the lids close, stay closed, and open.
         strength: slider value of the closed lids, 0 to 1.
         offset: delay of the character's right eye; negative: the right eye closes first.
         sides: L, R or both.
@@ -61,7 +61,7 @@ def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
 
 
 def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) -> int:
-    """Key a blink on the lid sliders; their keys within the blink are removed.
+    """Key a blink on the lid sliders; existing keys of these sliders during the blink are removed.
 
     Args:
         rig: the character.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material of cloth: threads across and along, a soft sheen at the edges."""
+"""Builds the material of cloth: threads in two directions, and a soft sheen at the edges."""
 
 from __future__ import annotations
 

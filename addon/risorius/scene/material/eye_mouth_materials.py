@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of eyes, teeth, tongue, gums, lashes and wet films. Textures are optional, because
-node patterns vary each surface."""
+"""Builds the materials of eyes, teeth, tongue, gums, lashes and wet films.
+
+Textures are optional, because procedural nodes can give each surface its details."""
 
 from __future__ import annotations
 
@@ -26,9 +27,9 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Depth in the mouth in eye distances, and colour by which the surface is multiplied there: lips and
-# cheeks shade the inside. Without cast shadows (Material Preview, exports) molars would be as
-# bright as incisors.
+# Depth in the mouth in eye distances, and colour by which the surface is multiplied at this depth.
+# The factor imitates the shadows of lips and cheeks: in Material Preview and exports, which have no
+# cast shadows, molars would otherwise be as bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -59,10 +60,11 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 
 
 def eyes(graph: Graph, look: Look) -> None:
-    """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
+    """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The coat keeps the smooth normal of the eyeball, so that the highlight is round. The hollow
-    iris is lit on the side away from the light, as a real one is by refraction.
+    The clear coat over these is the cornea. The coat keeps the smooth normal of the eyeball, so
+    that the highlight is round. The hollow iris is lit on the side away from the light, as
+    refraction lights a real iris.
 
     Args:
         graph: Graph of the material.
@@ -96,7 +98,7 @@ def eyes(graph: Graph, look: Look) -> None:
 
 
 def _ball(graph: Graph, look: Look) -> None:
-    """The eyeball under a separate cornea mesh: a dry iris with relief and a wet sclera.
+    """Build the material of eyeballs under a separate cornea mesh: dry iris and wet sclera.
 
     Args:
         graph: Graph of the material.
@@ -160,8 +162,9 @@ def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
 
 
 def teeth(graph: Graph, look: Look) -> None:
-    """Enamel that yellows towards the gum; a coarse mesh without texture also gets single teeth
-    and gums.
+    """Build the material of teeth: enamel that gets yellower towards the gum.
+
+    On a coarse mesh without a texture, the nodes also draw single teeth and gums.
 
     Args:
         graph: Graph of the material.
@@ -200,7 +203,7 @@ def teeth(graph: Graph, look: Look) -> None:
 
 
 def tongue(graph: Graph, look: Look) -> None:
-    """The tongue: wet flesh with papillae as relief.
+    """Build the material of a tongue: wet flesh with papillae as relief.
 
     Args:
         graph: Graph of the material.
@@ -210,7 +213,7 @@ def tongue(graph: Graph, look: Look) -> None:
 
 
 def gum(graph: Graph, look: Look) -> None:
-    """Wet, mottled flesh: gums, caruncles, cartilage.
+    """Build the material of gums, caruncles and cartilage: wet, mottled flesh.
 
     Args:
         graph: Graph of the material.
@@ -262,7 +265,9 @@ def _flesh(
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards, from an alpha or colour texture, or else from a noise pattern.
+    """Build the material of lashes: hairs on cards.
+
+    The hairs come from an alpha texture, a colour texture with alpha, or else a noise pattern.
 
     Args:
         graph: Graph of the material.
@@ -293,7 +298,7 @@ def _strands(graph: Graph, look: Look) -> Socket:
 
 
 def wet(graph: Graph, look: Look) -> None:
-    """A clear film that reflects like water at each angle.
+    """Build the material of wet films: a clear film that reflects like water at each angle.
 
     The film is transparent and does not refract, because a refracting shell keeps light from the
     eye under it in both engines. Only a cornea refracts, in Cycles and for camera rays alone, so
@@ -350,7 +355,7 @@ def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
 
 
 def _transparent(material: bpy.types.Material, method: str) -> None:
-    """Set EEVEE's method of transparency; light passes the clear parts in shadows too."""
+    """Set EEVEE's method of transparency, and let light pass through clear parts in shadows."""
     material.surface_render_method = method  # pyright: ignore[reportAttributeAccessIssue]
     material.use_transparency_overlap = False
     if hasattr(material, "use_transparent_shadow"):

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the causes of a vertex's motion, firing correctives, and the correctives of a control.
 
-Motions are in millimetres.
+Motions are in millimetres. A corrective fires if its value is not 0. The index of a control counts
+raw controls, correctives, network outputs and outputs of RBF poses, in this order (written
+raw | corrective | network | pose).
 """
 
 from __future__ import annotations
@@ -31,14 +33,15 @@ class Cause:
     """A control that moves a vertex.
 
     Attributes:
-        control: its index in raw | corrective | network | pose.
-        name: its name in lists.
-        is_raw: whether it is a raw control, which has a slider.
+        control: index of the control, counted through raw controls, correctives, network outputs
+            and pose outputs in this order.
+        name: name of the control in lists.
+        is_raw: whether the control is a raw control, which has a slider.
         value: current value.
-        now: motion in millimetres that it currently causes.
-        full: motion in millimetres between its rest and its full value, with all others unchanged;
-            0 if it is no raw control.
-        label: label of its slider; "" for none.
+        now: motion of the vertex in millimetres that the control currently causes.
+        full: motion of the vertex in millimetres between rest and full value of the control, with
+            all other controls unchanged; 0 if the control is no raw control.
+        label: label of the control's slider; "" for none.
     """
 
     control: int
@@ -56,7 +59,7 @@ class Found:
 
     Attributes:
         mesh, vertex: index of the mesh in the file, and of the vertex.
-        moved: distance from neutral in millimetres.
+        moved: distance of the vertex from its neutral position in millimetres.
         causes: causes, the strongest first.
     """
 
@@ -189,7 +192,7 @@ def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
 
 
 def without(now: present.Present, control: int) -> Poses:
-    """The joint deltas and channel weights of the current pose without a corrective.
+    """Joint deltas and blend shape weights of the current pose without the effect of a corrective.
 
     Args:
         now: the current face.
@@ -274,7 +277,9 @@ def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
 
 
 def sliders_of(rig: ArmatureObject, control: int) -> list[str]:
-    """The labels of the raw controls that a control depends on: its own, or those of its factors.
+    """The labels of the raw controls on which a control depends, directly or through its factors.
+
+    A raw control depends only on itself.
 
     Args:
         rig: deforming armature.
@@ -305,7 +310,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh nearest to a place in the current pose; -1: none.
+    """The vertex of a mesh nearest to a position in the current pose; -1 if there is none.
 
     Args:
         rig: deforming armature.

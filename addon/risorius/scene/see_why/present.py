@@ -51,7 +51,9 @@ class Present:
 
 
 def of(rig: ArmatureObject) -> Present | None:
-    """The current pose of a character; None if its data or controls are lost, or it is baked.
+    """The current pose of a character.
+
+    None if its data or controls are lost, or if the character is baked.
 
     Args:
         rig: its deforming armature.

@@ -33,8 +33,9 @@ class Row(NamedTuple):
             left out by the user; MUTED: left out because the key is muted.
         controls: raw controls without prefix.
         expression: name of the expression, or "".
-        by: title of the vocabulary that knows the name, or WORDS; "" for none.
-        is_known: whether its name is known, regardless of the user's assignment.
+        by: title of the vocabulary that contains the name; WORDS if the name was recognised by its
+            words; "" if it was not recognised.
+        is_known: whether the name of the key is known, regardless of the user's assignment.
         is_said: whether the user assigned the key.
         holder: another key with the same assignment; "" for none.
     """

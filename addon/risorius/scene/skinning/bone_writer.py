@@ -27,7 +27,8 @@ class Writer:
         space: risorius.BoneSpace of these bones, in the same order.
         turning: for each joint of neck and head: (name of the control bone, row in `where`, share
             of the rotation, rest rotation).
-        buffers: channel -> float32 for all bones; None if the evaluator owns every bone.
+        buffers: property such as "location" -> float32, its values for all bones, flat; None if
+            the evaluator writes every bone.
         driving: joint -> index of its pose bone, for joints whose rotation is in raw controls.
     """
 
@@ -57,7 +58,8 @@ def write(
         live: its Runtime.
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> additional Quaternion in the armature's axes.
-        depsgraph: graph for reading animated values of other bones; None if they have none.
+        depsgraph: graph for reading animated values of other bones; None if the other bones have no
+            animation.
         keyed: indices of pose bones of neck and head that also keep the user's values.
 
     Returns:

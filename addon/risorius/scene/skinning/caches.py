@@ -91,7 +91,7 @@ def note_old(rig: ArmatureObject) -> bool:
         rig: its deforming armature.
 
     Returns:
-        Whether any of them still exists.
+        Whether any of these caches still exists.
     """
     if rig.session_uid not in _late:
         _late[rig.session_uid] = {key for scene in rig.users_scene for key in _baked(scene)}

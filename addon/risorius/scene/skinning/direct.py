@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct mode: writes final vertex positions to the live keys of meshes, without posing bones.
+"""Direct mode: writes final vertex positions to live shape keys of meshes, without posing bones.
 
 A mesh in Direct mode has the property FINISHED, which survives undo, duplication and automatic
-saves. Its live key has final positions, and its armature modifier is disabled.
+saves. Its live shape key has final positions, and its armature modifier is disabled.
 """
 
 from __future__ import annotations
@@ -168,7 +168,9 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
-    """float32[V, 3]: the live key that a mesh has in Live mode, before skinning; None without keys.
+    """float32[V, 3]: positions of a mesh after its blend shapes and before skinning.
+
+    In LIVE mode the live shape key has these positions. None if the mesh has no shape keys.
 
     Args:
         item: the mesh object.
@@ -219,7 +221,7 @@ def prepare(
     items: Sequence[MeshObject],
     anew: bool,
 ) -> Job:
-    """Note the shown inputs of a face, and compile its data if bones or skins have changed.
+    """Store the inputs of a face as shown, and compile its data if bones or skins have changed.
 
     Args:
         rig: deforming armature; nothing is written to it.
@@ -257,7 +259,7 @@ def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
 
 
 def write(jobs: Sequence[Job]) -> None:
-    """Write finished positions to the live keys of faces, all faces at once.
+    """Write final vertex positions to the live shape keys of all given faces at once.
 
     Args:
         jobs: see `prepare`.
@@ -279,7 +281,7 @@ def write(jobs: Sequence[Job]) -> None:
 
 
 def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
-    """Index of a mesh -> memory address and number of the points of its live key."""
+    """Index of a mesh -> memory address of the points of its live shape key, number of points."""
     found = {}
     for number, item in items.items():
         block = meshes.live_block(item)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Switches faces from Direct mode to the ordinary form that files have, and back.
+"""Switches faces from Direct mode to the ordinary form, and back.
 
-In the ordinary form the bones are posed and the armature modifiers are enabled.
+In the ordinary form the bones are posed and the armature modifiers are enabled. Faces are saved in
+this form.
 """
 
 from __future__ import annotations

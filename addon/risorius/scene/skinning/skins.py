@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the bones and skin weights of a face from Blender, compiled for the native skinning."""
+"""Reads the bones and skin weights of a face from Blender, compiled for the native skinning.
+
+The skin of a mesh is the compiled form of its skin weights.
+"""
 
 from __future__ import annotations
 

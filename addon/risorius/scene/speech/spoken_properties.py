@@ -124,5 +124,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the property; values in files stay."""
+    """Remove the property; its values in .blend files stay."""
     delattr(bpy.types.Action, spoken_keys.PROPERTY)

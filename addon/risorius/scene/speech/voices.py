@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the voices that a face plays, and maps their frames to frames of the scene."""
+"""Finds the voices that a face plays, and maps their frames to frames of the scene.
+
+A voice is the recorded speech from which an action was made.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,8 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
     """The mapping from frames of an action to frames of the scene.
 
-    Repeats of a layer are ignored, and warped time is replaced by the line through its ends.
+    Repeats of a layer are ignored. If a layer has warp points, the mapping is the line through the
+    first and the last warp point.
 
     Args:
         controls: the face's control armature.

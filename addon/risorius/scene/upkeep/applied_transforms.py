@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undoes Apply Transform, Set Origin and similar steps on parts of a face.
 
-Joints, meshes and controls must fit each other. These steps move an object's transform into its
-data: the rig, which follows the controls, would be transformed twice, and a mesh would leave its
-joints. Blender does not report these steps, so the state of each part is stored and compared.
+The parts of a face are its deforming armature (rig), its control armature and its meshes. They must
+fit each other. These steps of Blender move an object's transform into its data: the rig, which
+follows the controls, would be transformed twice, and a mesh would leave its joints. Blender does
+not report these steps, so the state of each part is stored and compared.
 """
 
 from __future__ import annotations
@@ -169,7 +170,8 @@ def _places(
     seen: Mapping[bpy.types.Object, _Seen],
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
-    """Matrices of the parts of a face in the world, or in the space of a foreign parent."""
+    """The matrix of each part of a face: world matrix, or matrix relative to a parent object that
+    does not belong to the face."""
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -229,21 +231,26 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """Restore the place of a child of a part. Blender fails to do so under some bones."""
+    """Restore the world transform of a child of a part.
+
+    Blender itself does not restore the transforms of some children of bones.
+    """
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
 
 
 def _is_held(item: bpy.types.Object) -> bool:
-    """Whether the place of a part is locked and not animated."""
+    """Whether the transform of a part is locked, not animated and without constraints."""
     locked = all((*item.lock_location, *item.lock_rotation, *item.lock_scale))
     return locked and item.animation_data is None and not item.constraints
 
 
 def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
-    """The matrix that moves a part's data back, or None if no step has moved its transform into
-    them."""
+    """The matrix that moves the data of a part (vertices or bones) back to their earlier places.
+
+    None if no step of Blender has moved the transform of the part into its data.
+    """
     old, new = (
         np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
         for seen in (moved.before, now)
@@ -261,7 +268,7 @@ def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
     if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
         return None
     # Set Origin moves an object with a constraint by a wrong distance, so world positions do not
-    # show whether it was used. A changed location or centred data show it.
+    # show whether Set Origin was used. A changed location or centred data show its use.
     told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
     return Matrix.Translation(Vector(shift.tolist())) if told else None
 

@@ -62,7 +62,10 @@ def separate(rig: ArmatureObject) -> list[str]:
 
 
 def _own_mesh(item: MeshObject) -> list[str]:
-    """Give a mesh object its own mesh datablock, if another object uses its shapes too."""
+    """Give a mesh object its own mesh datablock if another object uses its datablock too.
+
+    Two faces cannot share a mesh datablock with shape keys.
+    """
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
     users = [o for o in bpy.data.objects if o.data == item.data]

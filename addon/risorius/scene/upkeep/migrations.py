@@ -14,7 +14,8 @@ from ..character import armatures, values
 from ..frame import joint_turns
 from ..skinning import caches
 
-# Session uids of characters for which a sentence was returned that is not repeated.
+# Session uids of characters whose newer form, or whose late caches, `bring_up_all` has reported.
+# These sentences are returned only once for each character.
 _said: set[int] = session.keep("migrations.said", set, ("load",))
 
 
@@ -78,7 +79,7 @@ def newer(rig: ArmatureObject) -> str:
 
 
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """Add the property Needs Risorius; store muted tracks of a baked character by name."""
+    """Add the property Needs Risorius; store muted NLA tracks of a baked character by name."""
     changed = []
     if not controls.override_library:
         controls[form.NEEDS] = form.WORDS
