@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Conversion of coordinates and units between DNA files and Blender.
 
-Blender: z up, a face looks along -y, its left is +x, right-handed, metres / scene unit scale.
+Blender's axes are right-handed: z is up, a face looks along -y, the face's left is +x. A Blender
+unit is `unit_scale` metres.
 Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
 also if `axes` mirrors.
 """
