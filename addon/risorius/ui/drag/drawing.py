@@ -104,7 +104,7 @@ def is_drawing() -> bool:
 
 
 def colours_of(far: Float) -> Float32:
-    """The colours of vertices, float32[V, 4]; the one that moves farthest is the most opaque.
+    """The colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
 
     Args: far  float64[V], distance that each vertex moves.
     """

@@ -65,7 +65,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
 
 
 class _FileOperator(FaceOperator):
-    """Base of operators on a face that may lack its controls or DNA, which a file restores."""
+    """Base of operators on a face that may lack controls or DNA; the operator restores both."""
 
     whole_face = False
 

@@ -39,7 +39,7 @@ class HandOperator(FaceOperator):
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Prepare for a frame; called before each `move`."""
+        """Let a subclass prepare for a frame, before `move` is called for this frame."""
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

@@ -100,10 +100,12 @@ def value_of(row: assigned.Row) -> assigned.Said:
 
 
 def sample_of(row: assigned.Row) -> str:
-    """The value of the assigned.Choice whose picture the sample man shows for a key; "" for none.
+    """The value of the assigned.Choice that a shape key is assigned to; "" for none.
+
+    The panel shows the picture of the sample man for this value.
 
     Args:
-        row: row of the key, from assigned.of.
+        row: row of the shape key, from assigned.of.
     """
     if row.kind == assigned.EXPRESSION:
         return f"@{row.expression}" if row.expression in _expressions() else ""
