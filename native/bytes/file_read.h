@@ -21,9 +21,9 @@ struct FileBytes {
 
 enum class ReadBy {
   kCopy,
-  /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short
-  /// the process crashes, and if it is written to the bytes change: use it only for files that are
-  /// replaced as a whole (write_file_atomically). Systems without maps get a copy.
+  /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short,
+  /// the process crashes; if the file is written to, the bytes change. So use kMap only for files
+  /// that are replaced as a whole (write_file_atomically). Systems without maps make a copy.
   kMap,
 };
 

@@ -150,8 +150,8 @@ void ask_contacts(Work& work, const Look& look) {
   for (const auto& [v, sum] : sums) work.asked.places[v] = work.x[v] + sum.first / sum.second;
 }
 
-/// Asks for shorter edges of faces that are stretched too far, or further than any face of the pose
-/// before the repair.
+/// Sets shorter edges as goals for two kinds of faces: faces stretched beyond the allowed stretch,
+/// and faces stretched more than every face was before the repair.
 void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t f = 0; f < topology.face_count(); ++f) {
@@ -267,9 +267,10 @@ double share_left(const FaultSums& now, const FaultSums& before) {
   return out;
 }
 
-/// The share of a motion that is undone at a vertex: 1 up to kWhole from a fault, 0 from `reach`
-/// on.
-/// In: distance, reach  mm
+/// The share of a motion that is undone at a vertex: 1 for vertices up to kWhole from a fault, 0
+/// for vertices `reach` or more from it.
+/// In: distance  from the vertex to the fault, in mm
+///     reach     mm
 double fading(double distance, double reach) {
   const double t = std::clamp((distance - kWhole) / (reach - kWhole), 0.0, 1.0);
   return 1.0 - t * t * (3.0 - 2.0 * t);
@@ -445,7 +446,7 @@ bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best
   return true;
 }
 
-/// Limits each allowed depth and stretch to the largest one of the pose.
+/// Limits each allowed depth and stretch to the largest depth and stretch of the pose.
 void limit(Work& work, const SkinFaults& first) {
   work.deepest = std::ranges::max(first.depth);
   work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));

@@ -157,7 +157,8 @@ class Simplex {
     }
   }
 
-  /// Removes the candidates whose loss adds the least error, until at most `count` are left.
+  /// Removes candidates one by one, always the candidate whose removal adds the least error, until
+  /// at most `count` are left.
   void limit(std::size_t count) {
     while (passive_.size() > count) {
       const auto n = static_cast<Eigen::Index>(passive_.size());

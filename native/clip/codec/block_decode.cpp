@@ -258,7 +258,7 @@ core::Status EncodedCurves::refuse(std::size_t control, const char* message) con
               parts_[control].offset);
 }
 
-// Fills a control that needs no decoding. Out: false if the control is coded
+// Writes all frames of a control to `out` if its curve is not coded. Out: false if it is coded
 core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
   const Part& part = parts_[control];
   if (part.kind == Part::kConstant) {
