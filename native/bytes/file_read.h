@@ -15,7 +15,7 @@ struct FileBytes {
   std::span<const std::uint8_t> bytes;  // aligned to 64
   std::shared_ptr<const void> owner;    // keeps the bytes alive
   /// The user of this process owns the file and nobody else may write to it. Checked on the open
-  /// file, not on its name. Always false on systems without such modes (Windows).
+  /// file, not on its name. Always false on systems without access modes (Windows).
   bool is_own = false;
 };
 

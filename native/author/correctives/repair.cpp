@@ -30,8 +30,8 @@ constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
 // ends well within the tolerance.
 constexpr double kBeyond = 0.5;
 // After a repair, vertices without a fault get back up to the share kKept of their motion. If this
-// causes a fault, the vertices near it get back the share kLess less, in each of at most kBacks
-// rounds.
+// causes a fault, the motion that vertices near this fault get back is reduced by the share kLess,
+// in each of at most kBacks rounds.
 constexpr double kKept = 0.91, kLess = 0.2;
 constexpr std::size_t kBacks = 12;
 // A repair may move the deepest vertex of the skin deeper by kDeeper mm, and multiply the largest
@@ -247,8 +247,9 @@ void solve(Work& work, const std::vector<Vec3>& base) {
 }
 
 /// Whether a repair worsens neither a sum of faults nor, beyond small tolerances, the deepest
-/// vertex and the widest face of the skin. The sums do not count faults that a part of the pose has
-/// alone, because they are allowed; but undoing another part must not cause them.
+/// vertex and the most stretched face of the skin. The sums leave out the faults that a part of the
+/// pose has if it is applied alone, because these faults are allowed. But undoing another part must
+/// not cause them.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&

@@ -36,8 +36,8 @@ struct Problem {
   std::vector<Pivot> pivots;
   bool to_pivots = false;  // whether joints are placed at their pivots
   double smoothness = 0.0;
-  /// The share of the last change by which weights continue, because consecutive rounds mostly go
-  /// the same way.
+  /// The share of a weight's last change that is added to the weight again, because consecutive
+  /// rounds mostly change it in the same direction.
   double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] weight of a vertex's squared error, mean 1
