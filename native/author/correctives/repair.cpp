@@ -308,7 +308,7 @@ struct Best {
   }
 };
 
-/// Undoes a part of the pose around its faults, more in each round, until no fault is left.
+/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
 /// In: undo   [V] the displacement in mm that undoes the part everywhere
 ///     reach  mm from a fault at which nothing is undone
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {

@@ -116,7 +116,7 @@ void find_shown(Topology& out) {
   }
 }
 
-/// Keeps the deepest contact of each vertex.
+/// Stores a contact, unless `best` already has a deeper contact of the same vertex.
 void keep_deeper(std::vector<Contact>& best, const Contact& found) {
   if (found.depth > best[found.vertex].depth) best[found.vertex] = found;
 }

@@ -88,7 +88,7 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
 /// `least`.
 void leave_expressions(const Problem& problem, State& state, double least);
 /// Computes the displacements that the joints do not reproduce.
-/// Out: left  [V][3][E] displacements minus the joints' part
+/// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Adds joints where the present ones leave the largest error, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
