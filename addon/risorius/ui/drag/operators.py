@@ -223,7 +223,7 @@ class RISORIUS_OT_drag(Operator):
 
 
 def can_drag(cls: type[Operator]) -> bool:
-    """Poll: whether the file has a face; otherwise set the reason. Args: cls  the operator."""
+    """Poll: whether the file has a face; if not, set the poll message. Args: cls  operator."""
     if not usable(cls):
         return False
     if not parts.rigs():

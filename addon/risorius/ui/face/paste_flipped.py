@@ -65,7 +65,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if led:
             board.mark(rig, _MARK)
         tools = context.scene.tool_settings
-        # Blender would key the sliders when it pastes them, before they are swapped.
+        # Blender would insert keyframes when it pastes the sliders, before they are swapped.
         auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
         try:
             bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
