@@ -81,7 +81,7 @@ using Progress = std::function<bool(double)>;
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
-/// Initial weights: rows as in Fit, with any sum above 0.
+/// Initial weights: rows as in Fit. The weights of a vertex may have any sum above 0.
 struct StartWeights {
   std::size_t influences = 0;
   std::vector<std::uint16_t> joints;  // [V][influences]

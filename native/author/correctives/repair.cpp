@@ -112,7 +112,7 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
   return out;
 }
 
-/// Lets the vertices near a fault move: those within SkinChecker::kAround.
+/// Lets the vertices move that are within SkinChecker::kAround of a fault.
 void mark(Work& work, const std::vector<std::uint32_t>& faults) {
   const auto& neutral = work.topology.neutral;
   work.place.assign(neutral.size(), Work::kStill);

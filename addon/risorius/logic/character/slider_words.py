@@ -38,7 +38,7 @@ def title_in_region(control: str, region: str, sided: bool = True, swapped: bool
         control: name of the control.
         region: name of the region.
         sided: True: keep a final L or R; False: both sides share the label.
-        swapped: swap left and right, as seen by the viewer.
+        swapped: True: swap left and right, so that the title names the viewer's side.
     """
     text, side = _without_side(title(control))
     if swapped:

@@ -260,7 +260,7 @@ def find(
         folders: folders to search; a match in an earlier folder wins.
 
     Returns:
-        The plan. A name in the DNA file that contains a folder is ignored.
+        The plan. A name in the DNA file that contains a folder matches no file.
     """
     plan = TexturePlan()
     known = dict(meshes)
