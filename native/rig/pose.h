@@ -23,7 +23,7 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
-/// Memory of the caller for a pose. The lengths are those of Pose's lists.
+/// Memory of the caller for a pose. Each array is as long as the Pose's list of the same name.
 struct PoseView {
   float* joints = nullptr;
   float* blend_shapes = nullptr;

@@ -354,7 +354,7 @@ std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Infl
   return row;
 }
 
-/// Adds momentum to the solved weights (Nesterov 1983), on both sides alike.
+/// Adds momentum to the solved weights (Nesterov 1983), equally on both sides of the mesh.
 void go_on(const Problem& problem, State& state, std::vector<std::vector<Influence>> solved) {
   state.weights = solved;
   if (!state.solved.empty()) {

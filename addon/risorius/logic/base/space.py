@@ -81,8 +81,8 @@ class Space:
 
         Args:
             matrices: rotations in Blender's axes.
-            near: float64[n, 3], angles in the file's unit; of all equivalent angles, those nearest
-                to `near` are returned.
+            near: float64[n, 3], angles in the file's unit. Of all equivalent angles, the angles
+                nearest to `near` are returned.
         """
         turned = self.axes.T @ matrices @ self.axes
         units = self.radians * self.signs
@@ -195,7 +195,7 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
     Args:
         matrices: float64[n, 3, 3] rotations for column vectors.
         sequence: three axis numbers; sequence[0] is applied first.
-        near: float64[n, 3] radians; of all equivalent angles, those nearest to `near` are returned.
+        near: float64[n, 3] radians; of all equivalent angles, the nearest to these are returned.
 
     Returns:
         float64[n, 3] radians about x, y and z.

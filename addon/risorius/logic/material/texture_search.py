@@ -252,7 +252,7 @@ def find(
     meshes: Iterable[tuple[str, str]],
     folders: Sequence[Path],
 ) -> TexturePlan:
-    """Find textures: first those that the DNA file names, then files with known names.
+    """Find textures: first the files that the DNA file names, then files with known names.
 
     Args:
         wanted: (mesh base, role) -> file name, from from_metadata.
