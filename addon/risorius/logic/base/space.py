@@ -3,6 +3,7 @@
 
 Blender's axes are right-handed: z is up, a face looks along -y, the face's left is +x. A Blender
 unit is `unit_scale` metres.
+
 Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
 also if `axes` mirrors.
 """

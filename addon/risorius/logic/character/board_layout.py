@@ -173,7 +173,7 @@ _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
         ),
     ),
 )
-# Labels for names that are long or unclear without their region.
+# Name of a handle -> label; for names that are too long, or unclear without their region.
 _LABELS = {
     "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
     "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
@@ -561,7 +561,7 @@ def _moved(line: Sequence[Point], by: Point) -> Line:
 
 
 def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
-    """Lowest and highest x and y of each handle from its rest place, float64[H, 2] each."""
+    """Lowest and highest location of each handle's bone along its x and y, float64[H, 2] each."""
     ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
     both = np.array(ends, np.float64).reshape(-1, 2, 2)
     return both[:, :, 0], both[:, :, 1]

@@ -35,7 +35,7 @@ Settings = dict[str, object]  # settings of one of Blender's exporters
 
 
 class ExportOperator(Protocol):
-    """The properties of the export operator that the settings depend on."""
+    """The properties of our export operator that decide the settings of Blender's exporter."""
 
     format: str
     step: float
