@@ -21,7 +21,7 @@ _SHORT = re.compile(
 
 
 def short_name(control: str) -> str:
-    """The part after the last prefix: `CTRL_expressions.jawOpen` gives `jawOpen`."""
+    """A control's name without its prefixes: `CTRL_expressions.jawOpen` gives `jawOpen`."""
     return re.split(r"[.:|]", control)[-1] or control
 
 

@@ -147,7 +147,7 @@ def _once_more() -> None:
 
 
 def register() -> None:
-    """Add the menu entries, the keys, and the handler that notices Blender's operator."""
+    """Add the menu entries, the shortcuts, and the handler that notices Blender's operator."""
     bpy.types.VIEW3D_MT_pose.append(_draw)
     bpy.app.handlers.depsgraph_update_post.append(_updated)
     config = current_context().window_manager.keyconfigs.addon
@@ -166,7 +166,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the menu entries, the keys and the handlers."""
+    """Remove the menu entries, the shortcuts and the handlers."""
     for keymap, item in _keys:
         keymap.keymap_items.remove(item)
     _keys.clear()
