@@ -239,7 +239,7 @@ def ways_of(
 ) -> list[Direction]:
     """The direction in which the handle of each GUI control moves when its value grows.
 
-    This direction is the direction in which the face moves.
+    The handle moves in the direction in which the face moves.
 
     Args:
         table: the GUI controls.
