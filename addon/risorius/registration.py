@@ -138,7 +138,8 @@ def _window_properties() -> dict[str, object]:
 def register() -> None:
     """Register classes, properties, menus and handlers.
 
-    If another copy is active, this one does nothing, because two would move each face twice.
+    If another copy of the add-on is active, this copy does nothing, because two active copies would
+    move each face twice.
     """
     words.follow_language()
     other = native.other_copy()

@@ -90,7 +90,7 @@ Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
               "LODs of the file were expected, found " + std::to_string(asked[found]));
 }
 
-// Drops the geometry of meshes that are not named.
+// Drops the geometry of meshes that the options do not name. If they name no mesh, keeps all.
 Status keep_meshes(const risorius_options& options, dna::Dna& dna) {
   if (options.mesh_count == 0) return ok();
   const std::vector<std::string>& names = dna.definition.mesh_names;
@@ -110,7 +110,7 @@ Status keep_meshes(const risorius_options& options, dna::Dna& dna) {
   return ok();
 }
 
-// Drops the layers that only compile needs.
+// Drops the layers of the DNA file that are needed only to compile the rig.
 void drop_behavior(dna::Dna& dna) {
   dna.behavior = {};
   dna.machine_learned_behavior = {};

@@ -34,8 +34,8 @@ struct risorius_instance {
   rig::Workspace work;
   rig::Pose pose;                       // settled
   std::optional<rig::Instance> latent;  // with a pose of its own
-  // The pose of the last evaluation: `pose`, or the pose of `latent`. Null before the first
-  // evaluation; then `pose` is read.
+  // Points to the pose of the most recent evaluation: `pose` (settled) or the pose inside `latent`.
+  // Null before the first evaluation: the values are then read from `pose`.
   const rig::Pose* evaluated = nullptr;
 };
 

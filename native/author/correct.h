@@ -79,8 +79,8 @@ class SkinChecker {
   };
   /// The nearest points of the neutral skin.
   /// In: points   in the skin's unit
-  ///     normals  of the points: only triangles that face the same way are taken, so that the upper
-  ///              lip is not mistaken for the lower one; empty: any triangle
+  ///     normals  of the points: only triangles with a similar normal are searched, so that the
+  ///              upper lip is not mistaken for the lower one; empty: all triangles are searched
   /// Fails: kInvalidValue (not finite), kInvalidLength (normals)
   core::Result<std::vector<Place>> nearest(const std::vector<Vector3>& points,
                                            const std::vector<Vector3>& normals = {}) const;
@@ -94,9 +94,9 @@ class SkinChecker {
   ///              entry does not count
   /// Fails: kInvalidLength (faults of another skin)
   core::Result<FaultSums> sum(const SkinFaults& faults, const SkinFaults& allowed) const;
-  /// A displacement after which the pose has no faults beyond `allowed`, or fewer. No sum becomes
-  /// worse. The deepest vertex becomes at most 0.1 mm deeper and the widest face at most 1 % wider,
-  /// allowed faults included.
+  /// A displacement of the vertices that removes all faults beyond `allowed`, or as many as
+  /// possible. No sum of faults becomes worse. The deepest vertex becomes at most 0.1 mm deeper and
+  /// the most stretched face at most 1 % wider, allowed faults included.
   ///
   /// Only vertices within kAround of a fault move. There the motion of single parts of the pose is
   /// taken back, beginning with the parts that move the vertices least. A least squares solve

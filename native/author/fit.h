@@ -53,8 +53,8 @@ struct FitOptions {
   /// A joint takes no part in an expression in which it moves every vertex by less than this, in
   /// the shapes' unit; the other joints take over. 0: all joints take part in all expressions.
   double least_effect = 0.0;
-  /// Of several rounds, the one with the smallest largest error is the result. false: of the last
-  /// four rounds; true: of the second half of the rounds.
+  /// The result is the round whose largest error is the smallest. false: only the last four rounds
+  /// are compared; true: the whole second half of the rounds is compared.
   bool bound = false;
   std::size_t rounds = 40;  // of weights and motions, after all joints are placed
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
@@ -81,7 +81,7 @@ using Progress = std::function<bool(double)>;
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
-/// Initial weights: rows as in Fit, with any sum above 0.
+/// Initial weights: rows as in Fit. The weights of a vertex may have any sum above 0.
 struct StartWeights {
   std::size_t influences = 0;
   std::vector<std::uint16_t> joints;  // [V][influences]
@@ -104,7 +104,8 @@ inline constexpr std::uint32_t kInTheMiddle = 0xffffffffu;
 /// Weights of another mesh, such as a coarser level of detail, on joints with given motions.
 /// In: joints   with their motions in each expression of the shapes
 ///     options  influences, smoothness, threads
-///     start    such as the weights of the finer mesh; empty: all on a joint that rests
+///     start    initial weights, such as the finer mesh's; empty: all weight is on a joint that
+///              does not move
 /// Out: a Fit with the given joints alone
 /// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (start)
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,

@@ -26,7 +26,8 @@ struct Packing {
   PackedFilter filter = PackedFilter::kNone;
 };
 
-/// Unpacks count * stride bytes. Corners may be any number; check that their vertices exist.
+/// Unpacks count * stride bytes. An unpacked corner may be any number: the caller must check that
+/// its vertex exists.
 /// Fails: kInvalidArgument (a stride, count or filter that the mode does not have),
 ///        kLimitExceeded (a count that the packed bytes cannot hold; found before memory is taken),
 ///        kInvalidValue (bytes of another mode, or damaged bytes)
@@ -47,7 +48,7 @@ core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
 ///             numbers for floats
 ///     bits    of a component: 1 to 16 for vectors (8 if the stride is 4), 4 to 16 for quaternions,
 ///             1 to 24 for floats
-/// Fails: kInvalidArgument (a packing without filter, a stride or bits it does not have),
+/// Fails: kInvalidArgument (a packing without filter; a stride or bits that the filter rejects),
 ///        kInvalidLength (values), kInvalidValue (a value that is not finite)
 core::Result<std::vector<std::uint8_t>> filtered(std::span<const float> values,
                                                  const Packing& packing, int bits);

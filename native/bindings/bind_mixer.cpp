@@ -15,7 +15,7 @@ struct PyLayerCurves {
 };
 // Arguments of a part of a reaction: controls, weights, delay, attack, hold, release.
 using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, double>;
-// Arguments of a yield: by, of, measure, amount.
+// Arguments of the mixer's rule Yield: by, of, measure, amount.
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
 // Returns the value, or raises the error as a ValueError: no file is involved that a more specific

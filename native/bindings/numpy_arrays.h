@@ -92,8 +92,8 @@ inline FloatArray vector_argument(const py::object& object, const char* name, st
   return array;
 }
 
-/// Converts numbers to a float32 array of that shape; NaN and infinity are accepted. Raises
-/// ValueError for other objects or another shape.
+/// Converts numbers to a float32 array; NaN and infinity are accepted. Raises ValueError for other
+/// objects, or if they do not have the shape `shape`.
 inline FloatArray shaped_argument(const py::object& object, const char* name,
                                   const std::vector<py::ssize_t>& shape) {
   FloatArray array = FloatArray::ensure(object);

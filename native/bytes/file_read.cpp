@@ -74,7 +74,7 @@ std::shared_ptr<const void> mapped(int file, std::size_t size) {
 }  // namespace
 
 core::Result<FileBytes> read_file(const path& name, ReadBy by) {
-  // O_NONBLOCK: opening a pipe without a writer would wait for a writer.
+  // O_NONBLOCK, because opening a pipe without this flag would wait for a writer.
   const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.number() < 0) return failure(core::ErrorCode::kIoOpen, "open", name, errno);
   struct stat about = {};

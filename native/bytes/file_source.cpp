@@ -11,7 +11,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// These follow windows.h.
+// Headers that must be included after windows.h.
 #include <fcntl.h>
 #include <io.h>
 #else

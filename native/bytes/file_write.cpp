@@ -17,7 +17,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// These follow windows.h.
+// Headers that must be included after windows.h.
 #include <fcntl.h>
 #include <io.h>
 #include <process.h>
@@ -143,8 +143,8 @@ std::string machine_name() {
          (length > 0 ? std::string(space, static_cast<std::size_t>(length)) : "");
 }
 
-// Gives a new file the group of the old one. If that is not allowed, the other group gets only the
-// rights that everybody has.
+// Gives a new file the group of the old one. If that is not allowed, the new file stays in another
+// group, and this group gets only the rights that everybody has.
 void keep_group(const fs::path& old, const fs::path& made, fs::perms& rights) {
   struct stat before = {}, now = {};
   if (::stat(old.c_str(), &before) != 0 || ::stat(made.c_str(), &now) != 0) return;

@@ -86,7 +86,7 @@ std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
                                          std::error_code& error);
 
 /// Removes files and folders, named as in NewFile::beside, that ended processes of this machine
-/// left in a folder. Skips without an error those that cannot be read or removed.
+/// left in a folder. Leftovers that cannot be read or removed are skipped without an error.
 void remove_leftovers(const std::filesystem::path& folder);
 
 /// The reason why a file could not be written, in the system's words or in clearer ones.

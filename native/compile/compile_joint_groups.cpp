@@ -28,8 +28,8 @@ bool side_by_side(const KeptColumn* four) {
   return all;
 }
 
-// Writes columns of a matrix that is stored by rows. It goes by tiles, four columns at a time, so
-// that both sides are read and written by whole cache lines.
+// Copies columns of a matrix that is stored by rows, each column to one run of memory. The values
+// are copied in tiles, four columns at a time, so that whole cache lines are read and written.
 // In: from  [rows, stride]
 void transpose(const float* from, std::size_t rows, std::size_t stride,
                std::span<const KeptColumn> columns, float* to) {
@@ -185,7 +185,7 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
   return by_control(entries, out.control_count);
 }
 
-// Lists the same columns sorted by group and then by control.
+// Lists the columns of `entries` sorted by group and then by control.
 void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
   std::vector<std::uint32_t> next;
   std::uint32_t begin = 0;

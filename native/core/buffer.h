@@ -38,7 +38,7 @@ class Buffer {
   void reserve(std::size_t n) {
     if (n > capacity_) allocate(n);
   }
-  /// Transfers ownership of the memory, reduced to the size.
+  /// Shrinks the memory to the array's size and transfers the ownership of it.
   std::shared_ptr<const T> release() {
     if (size_ < capacity_) allocate(size_);
     size_ = capacity_ = 0;

@@ -12,7 +12,7 @@ namespace risorius::core {
 template <class Signature>
 class FunctionRef;
 
-/// A reference to a function or lambda that must live longer. It has two pointers and allocates
+/// A reference to a function or lambda, which must outlive it. It has two pointers and allocates
 /// nothing. A function with a FunctionRef parameter is compiled once, whereas a template is
 /// compiled for each lambda.
 template <class Result, class... Args>

@@ -39,8 +39,8 @@ void drop_layer(std::string_view id, Dna& dna);
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-/// The same for any controls. The caller must then correct the numbers of raw, corrective, network
-/// and pose controls.
+/// As forget_unread_controls, for any controls. The caller must then correct the numbers of raw,
+/// corrective, network and pose controls.
 /// In: keep  [controls] whether each control remains; true for all raw controls
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes a removed control)
 core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);

@@ -189,7 +189,7 @@ struct MlJoints {
   bool operator==(const MlJoints&) const = default;
 };
 
-/// Layer mlbe.
+/// Layer mlbe: operations that run the networks of layer mlbh, and joints that networks move.
 struct MachineLearnedBehaviorExt {
   List<MlType> types;
   MlJoints joints;
@@ -217,7 +217,7 @@ struct RbfPose {
   bool operator==(const RbfPose&) const = default;
 };
 
-/// Layer rbfb.
+/// Layer rbfb: radial basis function solvers and their poses.
 struct RbfBehavior {
   LodMapping lod_solver_mapping;
   List<RbfSolver> solvers;
@@ -233,7 +233,7 @@ struct RbfPoseControls {
   bool operator==(const RbfPoseControls&) const = default;
 };
 
-/// Layer rbfe.
+/// Layer rbfe: the output controls of each pose of layer rbfb.
 struct RbfBehaviorExt {
   std::vector<std::string> pose_control_names;
   List<RbfPoseControls> poses;
@@ -261,7 +261,7 @@ struct TwistSwingSetup {
   bool operator==(const TwistSwingSetup&) const = default;
 };
 
-/// Layer twsw.
+/// Layer twsw: setups that distribute the twist or the swing of a rotation over joints.
 struct TwistSwingBehavior {
   List<TwistSwingSetup> twists, swings;
   bool operator==(const TwistSwingBehavior&) const = default;

@@ -18,7 +18,7 @@
 namespace risorius::dna::detail {
 
 /// The name of a field in Dna, for error messages, and its name in the format's JSON. Without a
-/// JSON name it is the first one in camelCase.
+/// JSON name, JSON uses the field's name in camelCase.
 struct Name {
   const char* dna;
   const char* json = nullptr;

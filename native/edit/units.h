@@ -73,7 +73,7 @@ class Effects {
 /// change.
 std::vector<bool> watched_correctives(const dna::Dna& dna);
 
-/// The region of each joint; kNoRegion for joints that no unit moves.
+/// The value in Regions::of_joint for a joint that no unit moves; other values are region numbers.
 constexpr std::uint32_t kNoRegion = UINT32_MAX;
 struct Regions {
   std::vector<std::uint32_t> of_joint;

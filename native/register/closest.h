@@ -49,9 +49,10 @@ class ClosestPoints {
   /// Fails: kInvalidLength (normals), kInvalidValue (a query that is not finite)
   core::Result<std::vector<Hit>> nearest(const std::vector<Vector3>& queries,
                                          const std::vector<Vector3>& normals, Limits limits) const;
-  /// The first point of the surface on each ray, from either side; distance is in the unit of the
-  /// points. Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
-  /// direction)
+  /// The first point at which each ray meets the surface, from outside or inside. `distance` is in
+  /// the unit of the points.
+  /// Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
+  ///        direction)
   core::Result<std::vector<Hit>> first_hit(const std::vector<Vector3>& origins,
                                            const std::vector<Vector3>& directions,
                                            Limits limits) const;

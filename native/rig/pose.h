@@ -23,7 +23,7 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
-/// Memory of the caller for a pose. The lengths are those of Pose's lists.
+/// Memory of the caller for a pose. Each array is as long as the Pose's list of the same name.
 struct PoseView {
   float* joints = nullptr;
   float* blend_shapes = nullptr;
@@ -43,9 +43,9 @@ enum class Traversal : std::uint8_t {
   kWhole     // all columns, in the order of group_columns, if all coefficients are finite
 };
 
-/// The active controls for which something in a workspace was computed. It can be used again while
-/// the same controls are active. In an animation of 60 frames per second, five frames of six have
-/// the active controls of the frame before.
+/// The active controls for which a list in a workspace was computed. The list can be used again
+/// while the same controls are active. In an animation of 60 frames per second, five of six frames
+/// have the same active controls as the frame before.
 struct KeptControls {
   std::vector<std::uint16_t> controls;  // [controls]: the first `count` entries are valid
   std::size_t count = 0;

@@ -12,7 +12,7 @@
 
 namespace risorius::simd {
 
-/// Four float32 in one register. Results of NaN are NaN.
+/// Four float32 in one register. If an operand is NaN, the result is NaN.
 #if defined(__x86_64__) || defined(_M_X64)
 struct Four {
   __m128 v;

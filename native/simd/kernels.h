@@ -8,9 +8,9 @@
 
 namespace risorius::simd {
 
-/// Floats in the widest vector. Kernels write results rounded up to it, and a matrix must have this
-/// many readable values after its last one: rows are not padded, so that a kernel also reads values
-/// of the next column, and its caller ignores the additional results.
+/// Floats in the widest vector. Kernels round the number of results up to a multiple of kWidest,
+/// and a matrix must have kWidest readable values after its last one: rows are not padded, so that
+/// a kernel also reads values of the next column, and its caller ignores the additional results.
 inline constexpr std::size_t kWidest = 16;
 template <class T>
 constexpr T rounded_up(T rows) {

@@ -22,8 +22,8 @@ namespace {
 // both. The number after each rotation is read and written with it.
 struct SixteenByFour {
   static_assert(kTurns == 16);
-  // Intrinsics with masks are used, because gcc 12 warns about reads of unset values in those
-  // without.
+  // Intrinsics with masks are used, because gcc 12 warns about reads of unset values in intrinsics
+  // without masks.
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kFour = 0xF;
   // Transposes the registers in each quarter: lane i of r[k] becomes lane k of r[i].
@@ -79,7 +79,7 @@ struct SixteenByFour {
 // Sums weighted matrices, with all columns of the matrix in one register. Each vertex has two sums:
 // an addition takes four cycles, so that four vertices with one sum each would allow only one
 // addition per cycle. Intrinsics with masks are used, because gcc 12 warns about reads of unset
-// values in those without.
+// values in intrinsics without masks.
 struct AllColumns {
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kThree = 7, kFour = 0xF, kEight = 0xFF;
@@ -152,8 +152,8 @@ struct V {
   RISORIUS_INLINE static Reg set(float v) { return _mm512_set1_ps(v); }
   RISORIUS_INLINE static Reg load(const float* p) { return _mm512_loadu_ps(p); }
   RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
-    // The intrinsic has a mask, because gcc 12 warns about a read of unset values in the one
-    // without.
+    // The intrinsic with a mask is used, because gcc 12 warns about a read of unset values in the
+    // intrinsic without a mask.
     return _mm512_maskz_cvtph_ps(0xFFFF, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm512_storeu_ps(p, v); }

@@ -50,8 +50,8 @@ RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cos
     cosines[l] = std::bit_cast<float>(((cb & ~swap) | (sb & swap)) ^ (((n + 1u) & 2u) << 30));
   }
 }
-// The same bits for angles that need no reduction, in half the time. Faces rarely rotate a joint by
-// 90 degrees.
+// As sine_and_cosine, for angles that need no reduction: the same bits in half the time. Faces
+// rarely rotate a joint so far that an angle needs a reduction.
 RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float z = x[l] * x[l];

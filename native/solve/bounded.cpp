@@ -87,7 +87,7 @@ struct Dual {
   }
 };
 
-/// A descent of a Quadratic. slope is g - h x.
+/// The state while a Quadratic is minimised. slope is g - h x.
 struct Descent {
   const Quadratic& q;
   double* x;

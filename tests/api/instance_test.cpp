@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The poses of the C API have the same bits as those of the C++ evaluator.
+// The poses of the C API have the same bits as the poses of the C++ evaluator.
 #include "rig/stages/instance.h"
 
 #include <cmath>

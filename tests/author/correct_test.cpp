@@ -261,7 +261,8 @@ TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
       std::ranges::all_of(repair->displacement, [](const Vector3& x) { return x == Vector3{}; }));
 }
 
-/// One skin of two sheets, 1 mm apart. In: apart  they face away from each other, like a thin plate
+/// One skin of two sheets, 1 mm apart. In: apart  true: the sheets face away from each other, like
+/// a thin plate; false: they face each other
 Scene sheets(bool apart) {
   Scene scene;
   const std::size_t count = scene.skin.neutral.size(), faces = scene.skin.corners.size();

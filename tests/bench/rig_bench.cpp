@@ -159,8 +159,8 @@ double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, co
   return bytes;
 }
 
-// Adds a benchmark that stores the poses of a clip with stores that bypass the caches; the time is
-// that of one pose.
+// Adds a benchmark that stores the poses of a clip with stores that bypass the caches. The result
+// is the time for one pose.
 void add_store(const std::string& name, std::shared_ptr<const rig::Rig> rig, std::size_t count) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
     const std::size_t pose = std::size_t{rig->joint_count} * rig->joint_stride +

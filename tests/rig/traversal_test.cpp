@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The orders in which columns of the joint groups are visited: only those of active controls,
-// listed or added one by one, or all of them.
+// The orders in which columns of the joint groups are visited: only the columns of active controls,
+// listed or added one by one, or all columns.
 #include <algorithm>
 #include <array>
 #include <cmath>

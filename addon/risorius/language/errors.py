@@ -6,9 +6,9 @@ has a row for each message, with {names} for the values in it. A message is comp
 and its values are put into the translation.
 
 A row with few words, such as "{range} was expected, found {found}", matches many messages. A
-message can begin with the place of the error: "take.csv, line 3: a number was expected". So each
-row is compared with the whole message and with its end after such places. The matching row that
-translates the most letters is used.
+message can begin with places of the error: "take.csv, line 3: a number was expected". So each row
+is compared with the whole message, and also with the rest of the message after one or more places.
+The matching row that translates the most letters is used.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def best(message: str, language: str, depth: int) -> _Found:
     Args:
         message: the English message.
         language: a language of `tables.languages`, not "".
-        depth: number of messages inside which this message was found as a value or place.
+        depth: number of messages that contain this message as a value or place.
     """
     found = _Found(message)
     if " " not in message or len(message) > _LONGEST or depth > _DEEPEST:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the tables of descriptions and translations in this file's folder.
 
-controls_<language>.toml describes each control; * in its name stands for L and R.
+controls_<language>.toml describes each control; * in a control's name stands for L and R.
 interface_<language>.toml translates the texts of panels, dialogs and reports from English.
 errors_<language>.toml translates the package's error messages from English. A new language needs
 these three files.
@@ -47,7 +47,7 @@ def languages() -> tuple[str, ...]:
 
 @cache
 def search_words() -> dict[str, str]:
-    """Name of a control -> its search words in all languages, joined with spaces."""
+    """Name of a control without its prefix -> its search words in all languages, in one text."""
     tables = [controls(language) for language in (ENGLISH, *languages())]
     return {name: " ".join(table.searched(name) for table in tables) for name in tables[0].rows}
 

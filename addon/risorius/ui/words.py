@@ -27,7 +27,12 @@ class Ruler:
     """Computes which labels fit completely into a share of the sidebar's width."""
 
     def __init__(self, context: Context, share: float) -> None:
-        """Args: context  context with the region, or a new sidebar is assumed; share  0 to 1."""
+        """Measure the sidebar; without one, the width of a newly opened sidebar is used.
+
+        Args:
+            context: context with the sidebar's region.
+            share: part of the width for the label, 0 to 1.
+        """
         preferences, region = context.preferences, context.region
         width: float = _SIDEBAR
         if region is not None and region.type == "UI" and region.width > 1:

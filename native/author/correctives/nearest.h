@@ -17,7 +17,7 @@ namespace risorius::author::detail {
 using Vec3 = Eigen::Vector3d;
 
 /// A search tree over the triangles of a surface. It refers to the triangles and positions that its
-/// constructor gets, which must live longer.
+/// constructor gets, so that these must outlive the tree.
 class Nearest {
  public:
   struct Hit {
@@ -31,7 +31,7 @@ class Nearest {
 
   /// Whether a ray meets a triangle. In: direction  of any length
   bool is_blocked(const Vec3& from, const Vec3& direction) const;
-  /// The first triangle on a ray, seen from either side, that is nearer than `reach`.
+  /// The first triangle that a ray meets, at its front or back, if it is nearer than `reach`.
   /// In: direction  of length 1
   std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, double reach) const;
   /// The nearest triangle that `takes` accepts and that is nearer than `reach`.

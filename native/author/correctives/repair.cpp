@@ -30,8 +30,8 @@ constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
 // ends well within the tolerance.
 constexpr double kBeyond = 0.5;
 // After a repair, vertices without a fault get back up to the share kKept of their motion. If this
-// causes a fault, the vertices near it get back the share kLess less, in each of at most kBacks
-// rounds.
+// causes a fault, the motion that vertices near this fault get back is reduced by the share kLess,
+// in each of at most kBacks rounds.
 constexpr double kKept = 0.91, kLess = 0.2;
 constexpr std::size_t kBacks = 12;
 // A repair may move the deepest vertex of the skin deeper by kDeeper mm, and multiply the largest
@@ -112,7 +112,7 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
   return out;
 }
 
-/// Lets the vertices near a fault move: those within SkinChecker::kAround.
+/// Lets the vertices move that are within SkinChecker::kAround of a fault.
 void mark(Work& work, const std::vector<std::uint32_t>& faults) {
   const auto& neutral = work.topology.neutral;
   work.place.assign(neutral.size(), Work::kStill);
@@ -150,8 +150,8 @@ void ask_contacts(Work& work, const Look& look) {
   for (const auto& [v, sum] : sums) work.asked.places[v] = work.x[v] + sum.first / sum.second;
 }
 
-/// Asks for shorter edges of faces that are stretched too far, or further than any face of the pose
-/// before the repair.
+/// Sets shorter edges as goals for two kinds of faces: faces stretched beyond the allowed stretch,
+/// and faces stretched more than every face was before the repair.
 void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t f = 0; f < topology.face_count(); ++f) {
@@ -247,8 +247,9 @@ void solve(Work& work, const std::vector<Vec3>& base) {
 }
 
 /// Whether a repair worsens neither a sum of faults nor, beyond small tolerances, the deepest
-/// vertex and the widest face of the skin. The sums do not count faults that a part of the pose has
-/// alone, because they are allowed; but undoing another part must not cause them.
+/// vertex and the most stretched face of the skin. The sums leave out the faults that a part of the
+/// pose has if it is applied alone, because these faults are allowed. But undoing another part must
+/// not cause them.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&
@@ -267,9 +268,10 @@ double share_left(const FaultSums& now, const FaultSums& before) {
   return out;
 }
 
-/// The share of a motion that is undone at a vertex: 1 up to kWhole from a fault, 0 from `reach`
-/// on.
-/// In: distance, reach  mm
+/// The share of a motion that is undone at a vertex: 1 for vertices up to kWhole from a fault, 0
+/// for vertices `reach` or more from it.
+/// In: distance  from the vertex to the fault, in mm
+///     reach     mm
 double fading(double distance, double reach) {
   const double t = std::clamp((distance - kWhole) / (reach - kWhole), 0.0, 1.0);
   return 1.0 - t * t * (3.0 - 2.0 * t);
@@ -306,7 +308,7 @@ struct Best {
   }
 };
 
-/// Undoes a part of the pose around its faults, more in each round, until no fault is left.
+/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
 /// In: undo   [V] the displacement in mm that undoes the part everywhere
 ///     reach  mm from a fault at which nothing is undone
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
@@ -445,7 +447,7 @@ bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best
   return true;
 }
 
-/// Limits each allowed depth and stretch to the largest one of the pose.
+/// Limits each allowed depth and stretch to the largest depth and stretch of the pose.
 void limit(Work& work, const SkinFaults& first) {
   work.deepest = std::ranges::max(first.depth);
   work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));

@@ -116,7 +116,7 @@ void find_shown(Topology& out) {
   }
 }
 
-/// Keeps the deepest contact of each vertex.
+/// Stores a contact, unless `best` already has a deeper contact of the same vertex.
 void keep_deeper(std::vector<Contact>& best, const Contact& found) {
   if (found.depth > best[found.vertex].depth) best[found.vertex] = found;
 }
@@ -150,8 +150,8 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// Finds contacts of the skin with itself: lips with lips, a lid with the other. A vertex that lies
-/// behind the other surface in the neutral pose does not touch it: the skin is thin there.
+/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A vertex that
+/// lies behind the other surface in the neutral pose does not touch it: the skin is thin there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);

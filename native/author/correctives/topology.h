@@ -61,8 +61,8 @@ struct Placed {
   std::vector<std::vector<Vec3>> solids;
 };
 
-/// The solids of a pose with a search tree each. They refer to topology and pose, which must live
-/// longer.
+/// The solids of a pose with a search tree each. The trees refer to topology and pose, so that both
+/// must outlive this object.
 class SolidSurfaces {
  public:
   SolidSurfaces(const Topology& topology, const Placed& pose);
@@ -70,9 +70,9 @@ class SolidSurfaces {
   std::vector<Nearest> trees;              // [solids]
 };
 
-/// All shown vertices and all triangles.
+/// The region of all vertices that can be seen, and all triangles.
 Region whole_region(const Topology& topology);
-/// Some vertices, and the triangles whose place in a pose is near them.
+/// The region of the given vertices and of all triangles near them in the pose.
 Region region_around(const Topology& topology, const Placed& pose,
                      const std::vector<std::uint32_t>& vertices);
 

@@ -193,7 +193,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
   detail::take_pivots(options.pivots, problem);
   State state = detail::start(problem, options.given, shapes.expressions);
   std::vector<float> left;
-  // Given joints get the vertices that they move before other joints are added.
+  // Before other joints are added, the given joints get the vertices that they move.
   if (!options.given.empty()) {
     for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
   }

@@ -30,8 +30,8 @@ std::vector<double> errors(const Problem& problem, const std::vector<float>& lef
   return out;
 }
 
-/// The mean distance between neighbouring joints, in sizes of the mesh, if all joints were spread
-/// evenly over the moving vertices.
+/// The mean distance between neighbouring joints, as a share of the mesh's size, if all joints were
+/// spread evenly over the moving vertices.
 double spacing(const Problem& problem, std::size_t joints) {
   double moving = 0.0;
   const double most = *std::max_element(problem.motion.begin(), problem.motion.end());

@@ -39,7 +39,8 @@ Mat3 cross_matrix(const Vec3& a) {
   return m;
 }
 
-/// Sums of s, s v, s v v^T over the vertices that two joints share.
+/// Sums of s, s v, s v v^T over the vertices v that two joints share. s is a vertex's importance
+/// times its weights of both joints.
 struct Moments {
   double zeroth = 0.0;
   Vec3 first = Vec3::Zero();

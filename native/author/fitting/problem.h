@@ -36,8 +36,8 @@ struct Problem {
   std::vector<Pivot> pivots;
   bool to_pivots = false;  // whether joints are placed at their pivots
   double smoothness = 0.0;
-  /// The share of the last change by which weights continue, because consecutive rounds mostly go
-  /// the same way.
+  /// The share of a weight's last change that is added to the weight again, because consecutive
+  /// rounds mostly change it in the same direction.
   double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] weight of a vertex's squared error, mean 1
@@ -88,7 +88,7 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
 /// `least`.
 void leave_expressions(const Problem& problem, State& state, double least);
 /// Computes the displacements that the joints do not reproduce.
-/// Out: left  [V][3][E] displacements minus the joints' part
+/// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Adds joints where the present ones leave the largest error, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,

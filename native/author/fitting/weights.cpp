@@ -157,7 +157,8 @@ class Simplex {
     }
   }
 
-  /// Removes the candidates whose loss adds the least error, until at most `count` are left.
+  /// Removes candidates one by one, always the candidate whose removal adds the least error, until
+  /// at most `count` are left.
   void limit(std::size_t count) {
     while (passive_.size() > count) {
       const auto n = static_cast<Eigen::Index>(passive_.size());
@@ -353,7 +354,7 @@ std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Infl
   return row;
 }
 
-/// Adds momentum to the solved weights (Nesterov 1983), on both sides alike.
+/// Adds momentum to the solved weights (Nesterov 1983), equally on both sides of the mesh.
 void go_on(const Problem& problem, State& state, std::vector<std::vector<Influence>> solved) {
   state.weights = solved;
   if (!state.solved.empty()) {

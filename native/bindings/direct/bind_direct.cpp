@@ -241,7 +241,7 @@ py::list deform_faces(const std::vector<FacePtr>& faces, const py::sequence& joi
                                   {static_cast<py::ssize_t>(rig.joint_count), py::ssize_t{9}});
     pose.blend_shapes =
         vector_argument(py::object(blend_shapes[f]), "blend_shapes", rig.blend_shape_count);
-    // Only read here.
+    // The evaluation only reads these arrays.
     request.frames[f].pose.joints = const_cast<float*>(pose.joints.data());
     request.frames[f].pose.blend_shapes = const_cast<float*>(pose.blend_shapes.data());
   }

@@ -54,7 +54,7 @@ class EncodedCurves {
   /// Fails: kInvalidValue. In: controls of this block
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
-  /// Whether a control has one value in the whole block. Out: value  this value, if it has
+  /// Whether a control has one value in the whole block. Out: value  this value; set only if true
   bool is_resting(std::size_t control, float& value) const {
     if (parts_[control].kind != Part::kConstant) return false;
     value = std::bit_cast<float>(parts_[control].bits);

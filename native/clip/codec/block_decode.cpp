@@ -38,7 +38,7 @@ constexpr std::size_t kSpare = 8;  // bytes that a load may read past a chunk
 class BitReader {
  public:
   BitReader(const std::uint8_t* bytes, std::size_t size) : bytes_(bytes), end_(8 * size) {}
-  // The next bits, the first one lowest: at least 57; bits behind the end are undefined.
+  // At least the next 57 bits, the first in the lowest bit; bits behind the end are undefined.
   std::uint64_t peek() const {
     std::uint64_t word;
     std::memcpy(&word, bytes_ + (at_ >> 3), sizeof word);
@@ -125,7 +125,7 @@ bool finish(Lane<kOrder>& lane) {
   return lane.is_whole();
 }
 
-// Decodes two curves in turns: while one waits for its table, the other continues.
+// Decodes two curves in turns: while one waits for a read of its table, the other continues.
 template <int kOrder>
 std::array<bool, 2> finish_both(Lane<kOrder> a, Lane<kOrder> b) {
   while (!a.is_done() && !b.is_done()) {
@@ -258,7 +258,7 @@ core::Status EncodedCurves::refuse(std::size_t control, const char* message) con
               parts_[control].offset);
 }
 
-// Fills a control that needs no decoding. Out: false if the control is coded
+// Writes all frames of a control to `out` if its curve is not coded. Out: false if it is coded
 core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
   const Part& part = parts_[control];
   if (part.kind == Part::kConstant) {

@@ -35,7 +35,7 @@ class History {
     last_ = bits;
     if constexpr (kOrder > 0) values_[0] = std::bit_cast<float>(bits);
   }
-  /// Equals n calls of add(bits).
+  /// Has the same effect as n calls of add(bits).
   void rest(std::uint32_t bits, std::size_t n) {
     for (std::size_t i = 0; i < n && i <= kOrder; ++i) add(bits);
   }

@@ -47,8 +47,8 @@ core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, H
   return writer;
 }
 
-// Opens PATH.part, or PATH.2.part and so on if it exists, because it may be the rest of an
-// interrupted recording.
+// Opens PATH.part. If this file exists, it may be the rest of an interrupted recording, so
+// PATH.2.part and so on is opened instead.
 std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   constexpr int kMostParts = 100;
   std::filesystem::path base = path_;

@@ -18,7 +18,8 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// Reads events. Memory is only taken for events that were read, because the count may be wrong.
+// Bytes at the start of a file: mark (4), version (4), and number of bytes of the head that
+// follows (4).
 inline constexpr std::size_t kHeadStart = 12;
 // Bytes of a block's head: mark (4), number of bytes after the head (4), frames (4), first frame
 // (8), and the hash (8) of these fields and of the bytes after the head.
@@ -44,7 +45,7 @@ inline void put_events(Bytes& out, const std::vector<Event>& events) {
   }
 }
 
-/// Reserves no memory for a count that the bytes cannot hold.
+/// Reads events. Allocates memory only for events that were read, because the count may be wrong.
 inline std::vector<Event> get_events(Cursor& in) {
   std::vector<Event> events;
   const std::uint64_t count = in.count();

@@ -98,7 +98,7 @@ core::Status Reader::read_head(const Limits& limits) {
   return read_names(View(*bytes).subspan(kHeadStart, size), limits);
 }
 
-// Reads rate, start, control names and metadata. In: body  bytes of the head after its size
+// Reads rate, start, control names and metadata. In: body  the bytes of the head
 core::Status Reader::read_names(View body, const Limits& limits) {
   Cursor in(body);
   const auto refuse = [&](ErrorCode code, std::string where, std::string message) {

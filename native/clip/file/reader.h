@@ -46,7 +46,8 @@ class Reader {
                         std::span<const std::uint32_t> controls) const;
 
   /// Writes the curves of controls to out [controls.size(), end - begin], and the times to
-  /// out_times [end - begin] unless it is null. The last block stays in memory for the next call.
+  /// out_times [end - begin] unless it is null. The last block that was read stays in
+  /// memory for the next call.
   /// In: begin <= end <= frame_count(), valid controls
   /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,

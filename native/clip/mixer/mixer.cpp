@@ -105,8 +105,8 @@ bool Mixer::moment(const Layer& layer, double time, Moment& out) noexcept {
     out.clip_time = layer.warp.at(t);
   } else {
     const double length = (layer.last - layer.first) * layer.scale;
-    // At the end the number of repeats is not computed from t: at large times rounding would make
-    // it too small.
+    // At the layer's end the number of repeats is not computed from t, because at large times
+    // rounding would make it too small.
     const double turns =
         t >= layer.end ? layer.repeat : std::min(snapped((t - layer.start) / length), layer.repeat);
     double part = turns - std::floor(turns);

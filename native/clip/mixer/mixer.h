@@ -51,7 +51,7 @@ struct Line {
 
 /// The curves of a layer, prepared for playing: values frame by frame, controls in the mixer's
 /// order, and constant curves separate. Curves that the mixer has no control for, or whose mask is
-/// 0, are left out. Immutable, so that layers and mixers can share it.
+/// 0, are left out. Immutable, so that several layers and mixers can share one object.
 class LayerCurves {
  public:
   /// In:    controls  the names of the mixer's controls

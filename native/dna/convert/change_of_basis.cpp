@@ -47,9 +47,9 @@ Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
   const double cosine = std::hypot(r[i][i], r[i][j]);
   Vec3 out{};
   out[j] = std::atan2(-parity * r[i][k], cosine);
-  // Below this cosine the outer angles have rounding errors of 1e-16 / 1e-9, as large as those of a
-  // float. Only the sum or difference of the outer angles is then known; it is stored in the first
-  // one.
+  // Below this cosine the outer angles have rounding errors of 1e-16 / 1e-9, as large as the
+  // rounding errors of a float. Then only the sum or the difference of the outer angles is known;
+  // it is stored in the first outer angle.
   if (cosine < 1e-9) {
     out[i] = std::atan2(-parity * r[k][j], r[j][j]);
   } else {

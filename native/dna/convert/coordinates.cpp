@@ -49,8 +49,8 @@ System system_of(const CoordinateTarget& target, System s) {
   return s;
 }
 
-// Checks a coordinate system. In: of_file  errors name a field of the file; false: an argument of
-// the conversion
+// Checks a coordinate system. In: of_file  true: errors name a field of the file; false: errors
+// name an argument of the conversion
 Status check_system(const System& s, bool of_file) {
   const ErrorCode code = of_file ? ErrorCode::kInvalidValue : ErrorCode::kInvalidArgument;
   const std::string d = of_file ? "descriptor." : "", e = of_file ? "descriptor_ext." : "";
@@ -174,7 +174,7 @@ std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size
 }
 
 // The number of leading rows that any LOD uses. Further rows are dropped: if they were converted
-// together with used rows of the same joint, they would be used.
+// together with used rows of the same joint, they would change the pose.
 std::size_t used_rows(const JointGroup& g) {
   return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
 }
@@ -411,8 +411,8 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// The numbers of the networks are not converted. Instead, keys 3 to 9 name the coordinate system to
-// which they refer.
+// The numbers of the networks are not converted. Instead, keys 3 to 9 of MlJoints name the
+// coordinate system to which the numbers refer.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;

@@ -36,8 +36,8 @@ class Writer {
 
   void object(FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void()> body);
-  // Writes an array. In: lines  each item is on a line of its own, for structs; false: all in one
-  // line, for numbers
+  // Writes an array. In: lines  true: each item is on a separate line, for structs; false: all
+  // items are on one line, for numbers
   template <class Items, class Each>
   void array(const Items& items, bool lines, Each each) {
     begin_array();

@@ -149,7 +149,7 @@ std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   return ids;
 }
 
-// Warns of each layer that the version does not know. In: kept  such layers are written
+// Warns of each layer that the version does not know. In: kept  true: such layers are written
 // nevertheless; false: they are left out
 void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
                     std::vector<Warning>& warnings) {
@@ -172,7 +172,7 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
 
 // The face without the layers and controls that this version cannot store, or nullopt if the whole
 // face can be stored.
-// In: kept  layers that the version does not know are written nevertheless
+// In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =

@@ -57,8 +57,8 @@ class Matcher {
   };
   std::vector<Closest> closest(const Points& points, const Points& normals, double farthest,
                                double least_cosine) const;
-  /// Whether a vertex in a cavity of the template is also within 2 mm of the target, with a cosine
-  /// between the normals above 0.8.
+  /// Whether a vertex in a cavity of the template has a counterpart on the target: `found` is
+  /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
   /// [V] matches with the closest points of the target. In: robust  mm, distance at which the
   /// weight of a match is a quarter

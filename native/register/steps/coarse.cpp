@@ -98,8 +98,8 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
       own[b](k, k) += bound;
       cross(k, k) -= bound;
     }
-    // Only entries below the diagonal are stored: the row is that of the node with the higher
-    // number.
+    // Only entries below the diagonal are stored: their rows belong to the node with the higher
+    // number, their columns to the other node.
     for (int i = 0; i < 4; ++i) {
       for (int j = 0; j < 4; ++j) {
         between.emplace_back(static_cast<int>(4 * b) + i, static_cast<int>(4 * a) + j, cross(j, i));

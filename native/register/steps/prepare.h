@@ -6,8 +6,8 @@
 
 namespace risorius::registering::steps {
 
-/// Converts positions between the target's unit and millimetres. The unit of millimetres is that of
-/// the template.
+/// Converts positions between the target's unit and millimetres. In millimetres, the target has the
+/// size of the template.
 struct Scale {
   Vec3 origin = Vec3::Zero();
   double mm = 1.0;  // mm per unit of the target

@@ -47,9 +47,9 @@ bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& act
 }
 
 // Number of active columns per group from which on they are listed if the frame before had the same
-// active controls, because the list will probably serve later frames too. In films of a real face,
-// with AVX2, an evaluation with 32 to 60 active controls then takes 0.75 of the time of adding;
-// with fewer columns it takes 1.1 to 1.2.
+// active controls, because the list will probably serve later frames too. In captures of a real
+// face, with AVX2, an evaluation with 32 to 60 active controls then takes 0.75 of the time of
+// adding; with fewer columns it takes 1.1 to 1.2.
 constexpr std::uint32_t kFewOfMany = 6;
 
 // Chooses how the columns are visited. Columns that are added in the order of memory need no list
@@ -59,7 +59,7 @@ constexpr std::uint32_t kFewOfMany = 6;
 // to 60 columns per group, 0.93 to 1.04 for 77 to 149 columns of 106 rows, and 0.8 to 1.0 for 138
 // to 295 columns of 80 rows. With float16, which halves the bytes of columns but not of sums,
 // listing is faster from 64 columns on. With AVX-512, which keeps the sums of a group in registers,
-// it is 0.86 for one or two columns per group, 1.0 for 5, and 1.1 to 1.3 for 13 to 50.
+// the quotient is 0.86 for one or two columns per group, 1.0 for 5, and 1.1 to 1.3 for 13 to 50.
 // In: seen  the frame before added the columns of the same controls
 Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool seen, const Workspace& work) noexcept {

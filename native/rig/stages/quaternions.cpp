@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joints turned by quaternions, and Euler angles as quaternions. From: dna-format 12.5
+// Joints rotated by quaternions, and Euler angles as quaternions. From: dna-format 12.5
 #include <algorithm>
 #include <bit>
 #include <cmath>

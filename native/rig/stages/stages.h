@@ -14,16 +14,17 @@ namespace risorius::rig::detail {
 /// Limits any LOD to the last LOD of the rig; 0 if it has none.
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
-/// Computes all other controls from the raw ones, and lists in work.active the controls that are
-/// not 0.
-/// In: controls  [controls]: the raw ones are set, networks and poses have their initial values
+/// Computes all other controls from the raw controls, and lists in work.active the controls that
+/// are not 0.
+/// In: controls  [controls]: the raw controls are set; the controls of networks and poses have
+///               their initial values
 ///     lod       below the number of LODs, as in all functions below
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// The same with the latency of the reference evaluator.
-/// In: controls  the raw ones are set, the others are from the frame before
+/// As settled_controls, but with the latency of the reference evaluator.
+/// In: controls  the raw controls are set, all others have the values of the frame before
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// Copies the raw controls, sets the others to their initial values and calls one of the two
-/// functions above.
+/// Copies the raw controls, sets all other controls to their initial values, and calls
+/// settled_controls or latent_controls.
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
 

@@ -24,8 +24,8 @@ void clamp(float* values, std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) values[i] = detail::clamp01(values[i]);
 }
 
-// Computes the animated maps. A run of rows whose input is 0 is skipped, unless it adds something
-// even then: it would add +0. The order of the sums is the order of the rows.
+// Computes the animated maps. A run of rows whose input is 0 is skipped if it would only add 0.
+// Values are added in the order of the rows.
 void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   float* out = pose.animated_maps;
   std::fill(out, out + rig.animated_map_count, 0.0f);

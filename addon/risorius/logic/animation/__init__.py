@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Computes times, keys, layers and NLA tracks of animation without importing Blender."""
+"""Computes times, keyframes, animation layers and NLA tracks; the code does not import bpy."""

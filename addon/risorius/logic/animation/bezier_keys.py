@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits Bezier curves with few keys to samples, within a tolerance of every sample."""
+"""Fits Bezier curves with few keyframes to samples, within a tolerance of every sample."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ _ASIDE = np.array([1.0, 0.0])  # offset (frames, value) of the unused handles of
 
 @dataclass
 class Bezier:
-    """Keys of a Bezier curve.
+    """Keyframes of a Bezier curve, called keys here.
 
     Attributes:
-        co: float64[keys, 2], frames and values.
-        left, right: float64[keys, 2], the ends of the handles. In frames, each is a third of the
-            way to the neighbouring key, so that the value is a cubic polynomial of the frame.
+        co: float64[keys, 2], frame and value of each key.
+        left, right: float64[keys, 2], frame and value of each handle's end. Its frame lies a third
+            of the way to the neighbouring key, so that the value is a cubic polynomial of the
+            frame.
     """
 
     co: Float
@@ -34,7 +35,7 @@ class Bezier:
 
 
 def straight(frames: Float, values: Float) -> Bezier:
-    """A key for each sample, with handles on the straight lines between them.
+    """A curve with a key for each sample, and handles on the straight lines between the keys.
 
     Args:
         frames: float64[n], ascending, n at least 1.
@@ -48,7 +49,7 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """Values of the cubic Bernstein polynomials; curves with the same frames share them.
+    """Values of the cubic Bernstein polynomials for the fit of one cubic.
 
     Each is float64[m]: values at the inner samples, then at the midpoints between samples.
     """
@@ -62,7 +63,10 @@ class _Basis(NamedTuple):
 
 
 class Fitter:
-    """Fits many curves; for each number of equally spaced samples, the matrix is computed once."""
+    """Fits Bezier curves to samples.
+
+    Cubics through the same number of equally spaced samples share one matrix of least squares.
+    """
 
     def __init__(self, tolerance: float) -> None:
         """Args: tolerance  largest distance of a curve from a sample, above 0."""
@@ -73,16 +77,17 @@ class Fitter:
     def keys(self, frames: Float, values: Float) -> Bezier:
         """Fits keys and handles to samples.
 
-        From each key, a cubic covers later samples as long as it differs from each sample by at
-        most the tolerance, and midway between samples from their mean by at most four times that.
+        From each key, a cubic covers as many later samples as it can. It may differ from a sample
+        by at most the tolerance. Midway between two samples, it may differ from their mean by at
+        most four times the tolerance.
 
         Args:
             frames: float64[n], ascending, n at least 1.
             values: float64[n], finite.
 
         Returns:
-            Bezier; each key has the value of its sample. Samples that stay within the tolerance of
-            the first have one key.
+            Bezier; each key has the value of its sample. If all samples are within the tolerance
+            of the first sample, the curve has one key.
         """
         known = frames.tobytes(), values.tobytes()  # left and right sides are mostly the same
         if known not in self._done:
@@ -120,7 +125,11 @@ class Fitter:
     def _reach(
         self, frames: Float, values: Float, first: int, even: bool
     ) -> tuple[int, tuple[float, float]]:
-        """The last sample that one cubic from `first` reaches, and the values of its handles."""
+        """Find how many samples one cubic covers.
+
+        Returns: index of the last sample that a cubic from sample `first` covers, and the values
+        of the two handles of this cubic.
+        """
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)
         for last in range(first + 2, min(first + _LONGEST, len(frames) - 1) + 1):

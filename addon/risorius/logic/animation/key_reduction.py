@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Removes keys of baked curves that straight lines between the other keys replace."""
+"""Removes a baked curve's keyframes if straight lines between the other keyframes replace them."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Row:
 
 @dataclass(frozen=True)
 class ControlWords:
-    """The rows of the table, by the names of controls without their prefix."""
+    """The table's rows: name of a control without its prefix -> description and search words."""
 
     rows: Mapping[str, Row]
 

@@ -15,7 +15,8 @@ def _itself(name: str) -> str:
 class FaceRegions:
     """The regions of a face, and functions that find the region and the partner of a control.
 
-    The caller takes them from the `risorius` package, which modules in `logic` do not import.
+    The caller takes the functions from the package `risorius`, which modules in `logic` do not
+    import.
 
     Attributes:
         titles: region -> heading, in the order of display; empty without the native module.

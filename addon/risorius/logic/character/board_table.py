@@ -58,7 +58,7 @@ class BoardTable:
         rows: in the file's order; of several rows with the same control and output, the first whose
             range contains the value is used.
         raw_count: R, number of raw controls of the face.
-        is_own: True: the table was made from names of raw controls; its lines pass through 0.
+        is_own: True: the table was made from names of raw controls, so `cut` is 0 in all rows.
     """
 
     names: tuple[str, ...]
@@ -93,7 +93,7 @@ class BoardTable:
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
-        """bool[R]: the raw controls that a GUI control drives; the others have only sliders."""
+        """bool[R]: True for raw controls that a GUI control drives; others have only sliders."""
         out = np.zeros(self.raw_count, bool)
         out[[row.raw for row in self.rows]] = True
         return out
@@ -127,7 +127,7 @@ class BoardTable:
             values: float[N], values of the GUI control.
 
         Returns:
-            float64[N, driven raw controls].
+            float64[N, n], a column for each of the n raw controls in `outputs_of(gui)`.
         """
         v = np.asarray(values, np.float64)
         out = np.zeros((len(v), len(self._pieces[gui])))
@@ -200,8 +200,8 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
     Args:
         labels: names of the raw controls.
-        lowest: lowest value of each raw control; controls below 0 are components of a rotation and
-            are left out.
+        lowest: lowest value of each raw control. A raw control with a lowest value below 0 is a
+            component of a rotation and is left out.
 
     Returns:
         BoardTable of GUI controls with names such as `CTRL_jawOpen.ty`, `CTRL_eyeLookL.tx`.
@@ -225,9 +225,9 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """The raw controls that raise and lower a GUI control, and its name with the axis.
+    """The raw controls above and below 0 of a GUI control, and the GUI control's name.
 
-    The second is "" if no raw control lowers it.
+    The second name is "" if no raw control is driven below 0.
     """
     for pair in _OPPOSITES:
         for one, other in (pair, pair[::-1]):

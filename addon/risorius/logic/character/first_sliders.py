@@ -118,7 +118,7 @@ def part(rows: Sequence[Row], region: str) -> Parted:
         region: name of the region.
 
     Returns:
-        All rows, each once. If none is among the most used, all are shown first.
+        All rows, each once. If the region has no most used row, all rows are in `first`.
     """
     ranks = {name: rank for rank, name in enumerate(table().get(region, ()))}
 

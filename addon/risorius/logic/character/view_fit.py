@@ -46,7 +46,8 @@ def on_screen(
         perspective: True: perspective view; False: orthographic view.
 
     Returns:
-        float64[N, 2], pixels right of and above the region's centre; NaN behind the viewer.
+        float64[N, 2], pixels right of and above the region's centre; NaN for points behind the
+        viewer.
     """
     places = np.asarray(points, np.float64)
     away = far - places[:, 2] if perspective else np.full(len(places), far)
@@ -100,7 +101,7 @@ def is_well_in_view(
     """Whether a view already shows a ball well, so that it need not move.
 
     Args:
-        middle, radius: centre and radius of the ball.
+        middle, radius: centre and radius of the ball, in Blender units.
         wanted: distance at which the view shows the whole ball, from `distance`.
         held: current pivot of the view.
         far: current distance of the viewer from the pivot.

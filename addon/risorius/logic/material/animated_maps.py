@@ -7,8 +7,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# Area of the face -> words in names of maps. The first match decides: cheekRaiseInner belongs to
-# the smile, cheekRaiseUpper to the eye.
+# Area of the face -> words in names of animated maps. The first match decides: cheekRaiseInner
+# belongs to the area "smile", cheekRaiseUpper to the area "eye".
 _AREA_WORDS = (
     ("forehead", ("browsraise", "browraise", "forehead")),
     ("glabella", ("brow", "frown", "glabella")),

@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: a file and its channel, 0 to 3."""
+    """A region's mask: an image file, and the colour channel, 0 (red) to 3 (alpha)."""
 
     path: Path
     channel: int
@@ -252,7 +252,7 @@ def find(
     meshes: Iterable[tuple[str, str]],
     folders: Sequence[Path],
 ) -> TexturePlan:
-    """Find textures: first those that the DNA file names, then files with known names.
+    """Find textures: first the files that the DNA file names, then files with known names.
 
     Args:
         wanted: (mesh base, role) -> file name, from from_metadata.
@@ -260,7 +260,7 @@ def find(
         folders: folders to search; a match in an earlier folder wins.
 
     Returns:
-        The plan. A name in the DNA file that contains a folder is ignored.
+        The plan. A name in the DNA file that contains a folder matches no file.
     """
     plan = TexturePlan()
     known = dict(meshes)

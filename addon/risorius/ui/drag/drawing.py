@@ -61,7 +61,7 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Start drawing for an operator. Args: user  name of the operator, also for `end`."""
+    """Start drawing for an operator. Args: user  name of the operator; `end` gets the same."""
     _users.add(user)
     if not _handles:
         view = bpy.types.SpaceView3D
@@ -104,7 +104,7 @@ def is_drawing() -> bool:
 
 
 def colours_of(far: Float) -> Float32:
-    """The colours of vertices, float32[V, 4]; the one that moves farthest is the most opaque.
+    """The colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
 
     Args: far  float64[V], distance that each vertex moves.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of points on the skin: pins, and handles that are selected, hidden and keyed."""
+"""Operators that pin points of the skin, and that select, hide and key handles on it."""
 
 import bpy
 
@@ -54,7 +54,8 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same click on a handle selects it, and Blender may try this operator first.
+        # The same kind of click selects a handle. If Blender tries this operator first, a handle is
+        # refused here, so that the select operator gets the click.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:

@@ -132,7 +132,8 @@ class Blends(Mixes):
             self.cancel(context)
             return {"CANCELLED"}
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
-            # If the blend began with a click, a press accepts it; if with a drag, the release does.
+            # Accept the blend: if it began with a click, at the next press of the button; if it
+            # began with a drag, at the release of the button.
             context.workspace.status_text_set(None)
             return self.execute(context)
         if event.type == "MOUSEMOVE":

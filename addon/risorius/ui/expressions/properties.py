@@ -18,7 +18,7 @@ _known: dict[str, list[Item]] = session.table("expressions.properties.known", ("
 
 
 def region_items(_self: object, _context: object) -> list[tuple[str, str, str, int]]:
-    """The regions of a face as items of an enum with several choices.
+    """The regions of a face as items of an enum property from which the user may choose several.
 
     Args:
         _self, _context: passed by Blender, not used.

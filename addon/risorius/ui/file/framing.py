@@ -84,9 +84,9 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
 def show_with_board(context: Context, rig: ArmatureObject) -> None:
     """Frame the head and its face board side by side in a 3D view, from the front.
 
-    The view is the one of the context, which leaves its camera, or else the largest one without a
-    camera. Head and board are not covered by sidebar, toolbar and headers. A view locked to an
-    object or the 3D cursor does not change.
+    If the context has a 3D view, this view is framed, and a camera view becomes a free view.
+    Otherwise the window's largest view that shows no camera is framed. Sidebar, toolbar and headers
+    do not cover head and board. A view locked to an object or the 3D cursor does not change.
 
     Args:
         context: context of Blender; without a window nothing happens.
@@ -114,7 +114,7 @@ def show_with_board(context: Context, rig: ArmatureObject) -> None:
 
 
 def _largest_or_own(context: Context) -> bpy.types.Area | None:
-    """The 3D view of the context, or the largest one of the window without a camera."""
+    """The 3D view of the context, or the window's largest 3D view that shows no camera."""
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
     if context.area in areas:
@@ -125,9 +125,10 @@ def _largest_or_own(context: Context) -> bpy.types.Area | None:
 
 
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
-    """The part of a region that no other region of its area covers, in pixels from its corner.
+    """The rectangle of a region that no other region of its area covers.
 
-    Sidebar, toolbar and headers cover a part if the preferences let regions overlap.
+    Sidebar, toolbar and headers cover a part if the preferences let regions overlap. The rectangle
+    is in pixels from the lower left corner of `region`.
     """
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:

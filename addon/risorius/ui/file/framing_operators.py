@@ -99,7 +99,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the key."""
+    """Remove the shortcut."""
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

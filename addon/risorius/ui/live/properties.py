@@ -95,7 +95,7 @@ def choices(context: Context) -> RISORIUS_PG_live:
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The settings in the form that scene/live/sessions.py needs."""
+    """The settings as the class with which scene/live/sessions.py starts a capture."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

@@ -52,7 +52,7 @@ class OfHead(OperatorBase):
     def poll(cls, context: Context) -> bool:
         """Whether the active object is a head whose keys can be assigned.
 
-        If not, the reason is set.
+        If not, set the poll message.
         """
         if not usable(cls):
             return False

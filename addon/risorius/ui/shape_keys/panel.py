@@ -146,7 +146,7 @@ def _draw_count(layout: UILayout, names: assigned.Names) -> None:
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
-    """Draw the active key's picture, the sample of its assignment, and buttons."""
+    """Draw the active shape key's picture, the sample man's picture of its control, and buttons."""
     box = layout.box()
     pair = box.split(factor=0.5)
     _draw_picture(pair.column(align=True), picture, row.key)
@@ -187,7 +187,7 @@ def _ask_once(mesh: int, sample: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; a timer calls this, because panels must not."""
+    """Start the operator that draws pictures; a timer calls this, as panels must not start it."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.shape_key_pictures.poll():
