@@ -211,7 +211,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Refuse options of poses with a clip, and options of clips without -o.
+    """Refuse options that print one pose if -o is given, and options for clips if it is not.
 
     Raises: CommandLineError.
     """
@@ -235,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
 def run_pose(args: argparse.Namespace) -> int:
     """Print the pose for the control values of the command line.
 
-    Raises: CommandLineError: the arguments do not fit the file.
+    Raises: CommandLineError: the face lacks the LOD or a control, or a value is no number.
     """
     dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)

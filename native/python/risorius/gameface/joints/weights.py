@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reduces skin weights to the number of joints per vertex that all glTF players support."""
+"""Reduces skin weights to the number of joints per vertex that all glTF viewers support."""
 
 from __future__ import annotations
 
