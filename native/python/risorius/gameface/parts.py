@@ -73,7 +73,7 @@ class Points:
 
         Args:
             dna: face with geometry.
-            rig: compiled from it.
+            rig: rig compiled from `dna`.
             lod: number of the LOD.
             skeleton: joints of the exported file.
             axes: from axes_of.

@@ -65,7 +65,7 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every player accepts and that differs from all others, even in lower case.
+    """A name that every glTF viewer accepts and that differs from all others, even in lower case.
 
     Unreal does not distinguish upper and lower case.
     """

@@ -312,7 +312,7 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Metres as float32, or as int16 steps if positions are quantized."""
+        """Positions in metres as float32, or as int16 multiples of `step` if they are quantized."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")

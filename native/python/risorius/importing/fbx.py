@@ -22,7 +22,7 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Ticks per second in key times; files of FBX 8000 and later use TICKS_8000.
+# Ticks per second in keyframe times; files of FBX 8000 and later use TICKS_8000.
 TICKS = 46186158000
 TICKS_8000 = 141120000
 # GlobalSettings.TimeMode -> frames per second.
@@ -225,7 +225,7 @@ class Scene:
     _keys: dict[int, Keys] = field(default_factory=dict)
 
     def keys(self, curve: int) -> Keys:
-        """The keys of a curve, unpacked at first use. Args: curve: id of the AnimationCurve."""
+        """A curve's keyframes, unpacked at first use. Args: curve: id of the AnimationCurve."""
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves whose keys have times of their own, and resampling of curves to common times."""
+"""Curves with keyframes at different times, and resampling of curves to common times."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VALUE_BYTES = 20
 
 @dataclass
 class Keys:
-    """The keys of one curve, with their interpolation.
+    """The keyframes (keys) of one curve, with their interpolation.
 
     Attributes:
         times: float64[keys], seconds, ascending.

@@ -43,7 +43,8 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
-# Kinds whose curves are Risorius' own controls, or keyed by an animator: any value is intended.
+# Kinds of files whose curves are Risorius' own controls or were keyframed by an animator. Every
+# value in them is intended, so that none is refused as implausible.
 _OWN_KINDS = ("clip", "rzc", "curves")
 
 
@@ -74,8 +75,8 @@ class Imported:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
             the start of the sound.
         kind: one of KINDS.
-        mapping: name of the built-in mapping of this kind of file, else the one that knows most
-            curves; "" if none knows any.
+        mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
+            the most curves; "" if none knows any.
         source: the file's name.
         notes: sentences for the user about dropped or assumed data.
     """

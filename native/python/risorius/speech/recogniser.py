@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Aligns a known text to a voice, or recognises speech, as timed phonemes.
 
-The decoders are PocketSphinx's, with the English model of its wheel. Frames have 10 ms.
+The decoders are PocketSphinx's, with the English model of its wheel. A frame lasts 10 ms.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def scene(facts: Facts, lod: int) -> Scene:
 
 
 def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]]:
-    """Names and meshes of a LOD without transparent films, unless it has nothing else."""
+    """Names and meshes of a LOD, without films and hair; all meshes if no others remain."""
     wanted = listed(dna.lod_mesh_mapping, lod).tolist()
     found = [(dna.mesh_names[i], dna.meshes[i]) for i in wanted if i < len(dna.meshes)]
     solid = [(name, mesh) for name, mesh in found if not name.lower().startswith(_FILMS)]
@@ -136,7 +136,7 @@ def _words(seen: Scene) -> str:
 
 
 def frame_of(seen: Scene) -> tuple[float, float, float, float]:
-    """(left, right, bottom, top) that contain the meshes, and the joints near them."""
+    """(left, right, bottom, top) of a frame around the meshes and the joints near the meshes."""
     used = seen.shape.points[np.unique(seen.shape.triangles)]
     joints = seen.joints[seen.shown]
     if len(used):
