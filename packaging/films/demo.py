@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key the tracks of acting.py on the bone `face`, and its rotations on other bones."""
+    """Key the tracks of acting.py on the bone `face`, and the rotations of BONES on other bones."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

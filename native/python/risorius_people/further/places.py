@@ -129,9 +129,10 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of each lip near a vertex of the other lip from which the opening jaw parts them.
+    """Vertices of one lip that touch the other lip.
 
-    Both vertices share no face.
+    Near such a vertex is a vertex of the other lip. The opening jaw parts both vertices, and no
+    face has both.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -170,7 +171,7 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
         # At the corners of the eye both lids are equally near, so only skin above the roots of the
-        # upper lashes or below those of the lower lashes counts.
+        # upper lashes or below the roots of the lower lashes counts.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

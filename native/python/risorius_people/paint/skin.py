@@ -131,7 +131,10 @@ class Texels:
 
 
 class Skin:
-    """The fields of a face at the texels, float32[n] each, and the colours made from them."""
+    """Values of a face at the texels, such as its blood and pores, and colours made from them.
+
+    field: name of a value -> float32[n].
+    """
 
     def __init__(self, person: Person, face: regions.Face, texels: Texels, eye: Floats) -> None:
         self.person, self.texels, self.eye = person, texels, eye
@@ -235,8 +238,8 @@ class Skin:
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        # Powers of both colours are multiplied, because light passes many hairs, and each absorbs a
-        # fraction of it.
+        # The colours of skin and hair are mixed by a product of their powers, because light passes
+        # many hairs, and each absorbs a fraction of it.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
         if person.beard_style != "none":  # roots between the beard's cards

@@ -350,7 +350,7 @@ def keyed_frames_of_active():
 
 
 def keyed_frames(controls=None):
-    """Frames at which a face's action has keys.
+    """Frames at which a face's action has keyframes.
 
     Args:
         controls: control armature; None takes the first face.
@@ -361,7 +361,7 @@ def keyed_frames(controls=None):
 
 
 def seen_keys(editor="DOPESHEET_EDITOR"):
-    """Frames of the keys that the timeline, or another editor in its place, shows."""
+    """Frames of the keyframes that the timeline, or another editor in its place, shows."""
     area = next(a for a in window().screen.areas if a.type == editor)
     region = next(r for r in area.regions if r.type == "WINDOW")
     with over(area, region):
@@ -370,7 +370,7 @@ def seen_keys(editor="DOPESHEET_EDITOR"):
 
 
 def curves_below():
-    """(data path, array index, [[frame, value], ...]) of each curve of the face's action."""
+    """(data path, array index, [[frame, value], ...]) of each F-curve of the face's action."""
     data = rig()["risorius_controls"].animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     keys = [(c.data_path, c.array_index, [list(p.co) for p in c.keyframe_points]) for c in curves]
@@ -378,7 +378,7 @@ def curves_below():
 
 
 def curves_of_empty():
-    """The curves of the Empty "Look Here", which the eyes follow."""
+    """The F-curves of the Empty "Look Here", which the eyes follow."""
     action = bpy.data.objects["Look Here"].animation_data.action
     return list(module("scene.base.compat").curves_of(action))
 
@@ -492,7 +492,7 @@ def leave():
 
 
 def answer():
-    """Answer all waiting questions. Returns the seconds until Blender's timer calls again."""
+    """Answer all requests of drive.py. Returns the seconds until Blender's timer calls again."""
     while True:
         path = TALK / f"ask-{_next[0]}.json"
         if not path.exists():
