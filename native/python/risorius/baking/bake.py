@@ -45,7 +45,7 @@ def bake(
         face, lod: the character, and the LOD from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
             Temporary files that killed processes left in the folders of these paths remain.
-        parts: parts of the poses to write, from PARTS.
+        parts: pose parts to write, some of PARTS.
         compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.

@@ -40,7 +40,7 @@ _CHUNK_BYTES = 8 << 20
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character, and unique names for all parts of its poses."""
+    """A compiled character, and unique names of its joints, channels, maps and controls."""
 
     name: str
     rig: risorius.Rig
@@ -112,7 +112,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index; repeated names get the index.
+    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
+    a name that an earlier element has, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()

@@ -29,7 +29,7 @@ _Value = TypeVar("_Value")
 
 
 class Kept(Generic[_Value]):
-    """A cache of the last few objects made from files; keys depend on the files' content.
+    """A cache of the last few objects made from files; cache keys depend on the files' content.
 
     Thread-safe, because a cluster's worker runs several jobs at the same time. An object that two
     jobs need at the same time is made once.

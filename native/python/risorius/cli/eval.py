@@ -111,7 +111,7 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """Convert GUI controls to raw controls, float32[raw controls].
+    """Convert values of GUI controls to values of raw controls, float32[raw controls].
 
     Raw controls that no GUI control drives keep their initial value.
 
@@ -132,7 +132,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
 
     Args:
         values: float32[n].
-        names: names of the values; values without a name are called "control" and their number.
+        names: names of the values; a value without a name is called "control" and its index.
         first: index of the control that has the first value.
     """
     return [

@@ -107,7 +107,7 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = self._joints(nodes) if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
+        # TalkingHead looks for meshes below the armature, other apps at the root of the scene.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))

@@ -601,7 +601,7 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """The keys of each curve of a channel's sampler, in the order of `names`."""
+    """The keyframes of each curve of an animation channel, in the order of `names`."""
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

@@ -97,7 +97,7 @@ def check_arguments(args: argparse.Namespace) -> None:
         args: arguments of `risorius author`.
 
     Raises:
-        CommandLineError: names the option.
+        CommandLineError: options exclude each other; the error names one of them.
     """
     if args.onto is None:
         given = [name for name in _OWN if getattr(args, name) is not None]

@@ -19,7 +19,7 @@ from .spaces import Space
 
 
 class Place:
-    """The place of differences: a layer, a field and a prefix of each text."""
+    """The place of differences: a layer, a field, and a prefix of each reported text."""
 
     def __init__(self, faces: Comparison, layer: str, field: str = "", what: str = ""):
         self.faces, self.layer, self.field, self.what = faces, layer, field, what
