@@ -105,7 +105,10 @@ def tasks(face: Skin) -> Iterator[Case]:
 
 
 def poses(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
-    """Drags of random vertices to their places in random poses of three sliders that move them."""
+    """Drags of random vertices to their places in random poses of three sliders.
+
+    Each slider moves the vertex.
+    """
     random, made = np.random.default_rng(seed), 0
     zero = np.zeros(len(face.names))
     while made < COUNT:

@@ -31,7 +31,7 @@ import numpy as np
 
 
 def median_ms(action, rounds, before=None):
-    """Median time of an action in ms; `before` runs before each, outside the measured time."""
+    """Median time of an action in ms; `before` runs before each action, outside its time."""
     times = []
     for _ in range(rounds):
         if before is not None:

@@ -206,7 +206,7 @@ class CsvWriter:
             yield f"{float(self._times[chunk.first + i])!r}{self._row % tuple(row)}"
 
     def finish(self) -> None:
-        """Detach the file after everything is written."""
+        """Detach the text writer from the binary file, which stays open."""
         self._text.detach()
 
 

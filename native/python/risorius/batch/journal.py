@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """A finished job: hash of its inputs, output files, and its line's offset and size in bytes."""
+    """A finished job: hash of inputs; output files; offset and length in bytes of its line."""
 
     stamp: str
     files: list[list[Any]]

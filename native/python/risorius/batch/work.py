@@ -41,7 +41,7 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; if the cache lacks it, it is made while other threads wait.
+        """The value of a key; a value that the cache lacks is made while other threads wait.
 
         Args:
             key: key of the value; hashable.

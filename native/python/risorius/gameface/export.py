@@ -329,9 +329,9 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group of targets for face capture: the first requested group, but vrm only if alone.
+    """The group of targets for face capture: the first requested group.
 
-    Without VRM export, the group vrm is treated as any other.
+    In a VRM export, the group vrm is passed over unless it is the only requested group.
     """
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 

@@ -103,7 +103,7 @@ class Points:
             raw: float32[R], values of the raw controls.
 
         Raises:
-            GameFaceError: a position is not finite or farther than 10 km.
+            GameFaceError: a position is not finite, or is more than 10 km from the origin.
         """
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():

@@ -133,7 +133,7 @@ class Refiner:
     def _choose(
         self, wanted: Sequence[Combination], poses: Doubles, most: int
     ) -> list[Combination]:
-        """Chooses greedily: next, always the combination that reduces the remaining error most."""
+        """Chooses greedily: each step adds the combination that most reduces the error left."""
         left = self._main_directions(poses)
         own = self._weights(wanted, poses)
         at_first, whole = float(np.square(left).sum()), np.linalg.norm(own, axis=0)

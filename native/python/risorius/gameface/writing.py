@@ -46,7 +46,7 @@ class Written:
 
     Attributes:
         data: bytes of the file.
-        groups: group -> (number of targets, number of vertices that they move, bytes).
+        groups: group of targets -> (number of targets, number of vertices that they move, bytes).
     """
 
     data: bytes

@@ -478,7 +478,8 @@ def _auto(
     Args:
         times, values: float64[keys], seconds and values of the keys.
         flags: int64[keys], KeyAttrFlags.
-        leave, arrive: float64[keys], slopes after and before each key, used for other tangents.
+        leave, arrive: float64[keys], slopes after and before each keyframe; they stay for other
+            tangents.
     """
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():

@@ -66,7 +66,7 @@ class Document:
 
         Args:
             kind: a list at the top of the JSON, e.g. "accessors".
-            index: position in it, as in the file; may be of any type.
+            index: position in that list, as in the file; may be of any type.
             place: place of the index, for errors.
 
         Raises:
@@ -89,7 +89,7 @@ class Document:
             default: the number if the key is missing.
 
         Raises:
-            AnimationFileError: another value.
+            AnimationFileError: not such a number.
         """
         value = table.get(key, default)
         try:
@@ -311,7 +311,7 @@ class Document:
             place: place of the uri, for errors.
 
         Raises:
-            AnimationFileError: not a uri, not base64, a file elsewhere, or one that is missing.
+            AnimationFileError: not a uri, not base64, or no file in this folder.
             BudgetError: more bytes than a file of this size may hold.
         """
         if not isinstance(uri, str):
@@ -343,7 +343,7 @@ class Document:
             place: the table's name in errors.
 
         Raises:
-            AnimationFileError: another value, or another length.
+            AnimationFileError: not a list of finite numbers, or a list of another length.
         """
         value = table.get(key, list(default))
         try:

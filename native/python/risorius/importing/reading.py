@@ -378,7 +378,7 @@ def import_curves(
 
     Args:
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
-            values), linear between keys.
+            values), linear between keyframes.
         source: name of the curves in the report.
         rig_names, mapping, rig, rotations: see `Imported.apply`.
 

@@ -267,7 +267,8 @@ def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, flo
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    # A sender of quaternions sends the same rotation here as angles without a defined order.
+    # If the sender also sends quaternions, these angles are the same rotation in an undefined
+    # order, and are ignored.
     if face.quaternion:
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}

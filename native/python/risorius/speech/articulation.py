@@ -55,7 +55,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
 
     Returns:
         float64[frames, 15] in the order of VISEMES. The visemes PP and FF have the weight of their
-        `gate`; the others share the rest to 1, so that each row sums to 1.
+        `gate`; the other visemes share the rest, so that each row sums to 1.
     """
     pull = np.zeros((len(times), len(VISEMES)))
     for begin, end, viseme in _targets(phonemes):

@@ -155,12 +155,12 @@ def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: F
 
 
 def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
-    """float64[V]: weight of a lid of both eyes; lashes get the weight of the skin below.
+    """float64[V]: weight of both upper or both lower lids; lashes get the weight of the skin below.
 
     Args:
         positions: float64[V, 3], in decimetres.
         groups: name of a group of the base mesh -> vertex indices.
-        number: number of its lash group: 1 for the lower lid, 2 for the upper one.
+        number: number of the lids' lash group: 1 for lower lids, 2 for upper lids.
     """
     out = np.zeros(len(positions))
     body = groups["body"]

@@ -53,7 +53,7 @@ def stressed(polygons: Polygons, places: Floats) -> Floats:
 
 
 def _neighbours(edges: Ints, values: Floats) -> Floats:
-    """float64[V, k]: the sum over the neighbours of each vertex."""
+    """float64[V, k]: for each vertex, the sum of `values` over its neighbours."""
     columns = [
         sum(np.bincount(a, column[b], len(column)) for a, b in (edges.T, edges.T[::-1]))
         for column in values.T

@@ -83,7 +83,7 @@ class Texels:
         self.side = max(64, self.size // 2)
 
     def mottling(self, width: float, seed: int, high: float | None = None) -> Floats:
-        """float32[n]: noise with deviation 1.
+        """float32[n]: noise with mean 0 and standard deviation 1.
 
         Args:
             width: width of its spots in texels at HEAD_SIZE.

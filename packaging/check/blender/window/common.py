@@ -16,7 +16,7 @@ Step = Callable[[Hand, Path], Iterator[Check]]
 
 
 class NotThereError(Exception):
-    """This Blender or the extension lacks a part, so a step cannot run."""
+    """This Blender or the extension lacks a feature that a step needs, so the step cannot run."""
 
 
 def slider(hand: Hand, name: str = JAW) -> float:

@@ -154,7 +154,7 @@ def state():
 
 
 def head():
-    """The visible mesh of the face with the most vertices."""
+    """The visible mesh that has the most vertices of all meshes of the face."""
     shown = [o for o in bpy.data.objects if o.get("risorius_rig") and o.type == "MESH"]
     shown = [o for o in shown if "dna_mesh" in o and o.visible_get()]
     return max(shown, key=lambda o: len(o.data.vertices))
@@ -384,7 +384,7 @@ def curves_of_empty():
 
 
 def tweaks():
-    """Whether a tweak is active."""
+    """Whether a tweak of the face's animation is active."""
     return module("scene.animation.tweaks").of(rig()["risorius_controls"]) is not None
 
 

@@ -66,7 +66,7 @@ _LONGEST = 1e8  # seconds; a larger start time is a date
 
 
 class TimeName(NamedTuple):
-    """The unit of time in a header."""
+    """The unit of time that the header of a column names."""
 
     unit: str
     """One of UNITS, FRAMES, or "" if the header names none."""

@@ -103,7 +103,7 @@ def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
     if not len(seen.joints) and not len(seen.shape.triangles):
         canvas.say("This file has neither meshes nor joints.")
         return
-    # The face looks to the left of the side view.
+    # In the side view, the face looks to the left.
     side = _turned(seen, np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], float))
     frames = [frame_of(seen), frame_of(side)]
     bottom, top = min(f[2] for f in frames), max(f[3] for f in frames)
