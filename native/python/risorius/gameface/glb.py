@@ -124,7 +124,7 @@ class Glb:
         """Adds an extension to the lists of the JSON.
 
         Args:
-            extension: its name.
+            extension: name of the extension.
             required: whether a program without it cannot read the file.
         """
         for key in ("extensionsUsed", "extensionsRequired")[: 1 + required]:

@@ -100,7 +100,8 @@ class Imported:
         """Converts to a clip of raw controls, and reports the use of each curve.
 
         Args:
-            mapping: name of a built-in one, path of a TOML file, or a Mapping; None: self.mapping.
+            mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None:
+                self.mapping.
             rig_names: raw controls of the rig, `Rig.raw_control_names`; other controls are dropped
                 and reported. None: all are kept.
             rig: needed for a mapping of GUI controls, because the rig has their table.

@@ -245,7 +245,7 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Converts a piece's phonemes to times of the whole sound; those without duration are dropped.
+    """Converts a piece's phonemes to times of the whole sound; phonemes of no length are dropped.
 
     Args:
         segments: phonemes of the piece.

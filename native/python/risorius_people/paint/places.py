@@ -66,7 +66,7 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
 def hairline_height(
     points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
 ) -> Floats:
-    """float64[n]: distance inside the hairline in decimetres, negative outside.
+    """float64[n]: distance from the hairline in decimetres, positive on the side with hair.
 
     Args:
         points: float64[n, 3], on the man's head.

@@ -141,7 +141,7 @@ def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
 
 
 def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Match sets of integers: equal sets first, then sets that share the most, then by index.
+    """Match sets of integers: first equal sets, then sets that share most integers, last by index.
 
     Args:
         a, b: int64[...] per set, the integers of the set.
