@@ -73,7 +73,7 @@ class Measure:
 
 
 def _ranges(names: list[str], curves: Floats) -> dict[str, tuple[float, float]]:
-    """Smallest and largest finite number of each curve; 0 and 0 for a curve without any."""
+    """Smallest and largest finite number of each curve; 0 and 0 if no number is finite."""
     finite = np.where(np.isfinite(curves), curves, np.float32(np.nan))
     low = np.nan_to_num(np.fmin.reduce(finite, axis=1))
     high = np.nan_to_num(np.fmax.reduce(finite, axis=1))

@@ -419,6 +419,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """The name of a control without prefix, or of the first four controls of a corrective."""
+    """A control's name without prefix; for a corrective, the names of its first four controls."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

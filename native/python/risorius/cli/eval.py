@@ -211,7 +211,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Refuse options that print one pose if -o is given, and options for clips if it is not.
+    """Refuse options for printing one pose if -o is given, and options for clips if -o is missing.
 
     Raises: CommandLineError.
     """

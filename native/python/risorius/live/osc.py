@@ -206,7 +206,7 @@ class _Face:
 
 
 def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
-    """The first `count` values as floats. Raises: LiveError: one is too large for a face."""
+    """The first `count` values as floats. Raises: LiveError: too few, or not values of a face."""
     if len(values) < count:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])

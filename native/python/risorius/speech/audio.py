@@ -179,7 +179,7 @@ def _one_channel(channels: Samples) -> Samples:
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
     """Converts a sound file with ffmpeg to the bytes of a WAV file."""
-    # Only files: a pipe has been read already, so ffmpeg would wait for its data for ever.
+    # ffmpeg gets only files: a pipe has been read already, and ffmpeg would wait for ever.
     if not os.path.isfile(path):
         raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")

@@ -97,7 +97,7 @@ class Lids:
     rest: Floats
 
     def grid(self, values: Floats) -> Floats:
-        """float64[13, COLUMNS, 3]: the values of the rings' vertices."""
+        """float64[13, COLUMNS, 3]: `values` at the vertices of the rings."""
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:

@@ -226,7 +226,7 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: places that no control moves further than `least`, and that no neck joint moves."""
+    """bool[n]: whether no control moves a place further than `least`, and no neck joint does."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

@@ -239,7 +239,7 @@ def two_handles():
 
 
 def kept(key):
-    """A list property of the control armature; empty if it is missing."""
+    """A list property of the control armature; empty if the property is missing."""
     return list(rig()["risorius_controls"].get(key, ()))
 
 

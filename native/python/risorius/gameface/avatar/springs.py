@@ -137,7 +137,10 @@ def table_0(all_: Springs) -> dict[str, Any]:
 
 
 def _balls(one: Collider) -> list[dict[str, Any]]:
-    """A collider as spheres, because VRM 0.x has no capsules, with z as in VRM 0.x (opposite)."""
+    """A collider as spheres, because VRM 0.x has no capsules.
+
+    The z axis of VRM 0.x is opposite to the z axis of glTF.
+    """
     ends = [one.offset]
     if one.tail:
         middle = [(a + b) / 2 for a, b in zip(one.offset, one.tail, strict=True)]
