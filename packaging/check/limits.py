@@ -91,7 +91,8 @@ class Watch:
             if now - self._since > 10 * self.cpu + self.still:
                 self._stop(f"after {now - self._since:.0f} s by the clock")
             return
-        # The total falls if a child ends and no process waits for it. `used` keeps its seconds.
+        # The total falls if a child ends and no process waits for it. `used` keeps the child's
+        # seconds.
         total = sum(map(_seconds, _family(self.process.pid).values()))
         self.used, self._total = self.used + max(0.0, total - self._total), total
         if self.used > self.cpu:

@@ -22,7 +22,7 @@ import scene as stage  # noqa: E402
 from progress import Progress  # noqa: E402
 
 # Width and height of the film in pixels, and frames of the acting per frame of the film. Chosen so
-# that demo.sh takes ten minutes on two cores, three of them for the compiler.
+# that demo.sh takes ten minutes on two cores; three minutes of them are compilation.
 FILM, STEP = 288, 2
 
 
@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key the tracks of acting.py on the bone `face`, and its rotations on other bones."""
+    """Key the tracks of acting.py on the bone `face`, and the rotations of BONES on other bones."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

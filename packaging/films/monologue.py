@@ -119,7 +119,7 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """The point between the eyes, and the head's height (four eye distances), in metres."""
+    """The point midway between the eyes, and the head's height (4 x distance of the eyes), in m."""
     rig = next(
         thing
         for thing in controls.users_collection[0].objects

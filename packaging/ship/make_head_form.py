@@ -187,7 +187,7 @@ def aligned(points: Doubles, like: Doubles, weight: Doubles) -> tuple[Doubles, D
 
     Args:
         points: points [V, 3] to move.
-        like: their targets [V, 3].
+        like: points [V, 3] to which they are fitted.
         weight: weight [V] of each point.
 
     Returns: the moved points, the rotation [3, 3] for row vectors, and the scale.

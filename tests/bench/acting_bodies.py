@@ -111,7 +111,7 @@ class Ball:
         return table
 
     def depth(self, places: Floats) -> Floats:
-        """Depth of places [n, 3] below the ball's surface, negative outside; the eye is neutral."""
+        """Depth of places [n, 3] below the surface of the ball at rest; negative outside."""
         rays = places - self.middle
         far = np.linalg.norm(rays, axis=1).clip(1e-9)
         up = np.arccos((rays[:, 1] / far).clip(-1.0, 1.0)) / np.pi * self.ROWS
@@ -159,8 +159,8 @@ class Arch:
 
         Args:
             places: [n, 3], transformed to the neutral position of the row.
-            may_be_behind: [n], whether a place may be behind this row, as the lip of the other jaw
-                may; there the depth is 0 behind the inner surface.
+            may_be_behind: [n], whether a place may be behind the whole row, as the lip of the other
+                jaw may. The depth of such a place is 0 behind the row's inner surface.
         """
         row, column, radius, there = self._cells(places)
         row, column = np.where(there, row, 0), np.where(there, column, 0)
@@ -180,8 +180,8 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 class Cards:
     """Vertices of hair, each assigned to the nearest skin triangle in the neutral pose."""
 
-    # Numbers of triangles near a hair in the neutral pose, among which the nearest triangle of
-    # another pose is searched: usually, and in deep folds.
+    # The nearest triangle in another pose is searched among the triangles that are near a hair in
+    # the neutral pose: among the NEAR nearest, and in deep folds among the AROUND nearest.
     NEAR, AROUND = 48, 400
 
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:

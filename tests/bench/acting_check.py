@@ -153,8 +153,8 @@ class Hair:
 
         The depth is first measured from the plane of one triangle. A plane continues beyond its
         triangle, which gives wrong depths if skin rolls in (lips). So doubtful vertices are
-        measured again from the nearest of Cards.NEAR triangles. Those still too deep are measured
-        from Cards.AROUND triangles, because folds bring distant triangles near.
+        measured again from the nearest of Cards.NEAR triangles. Vertices that are still too deep
+        are measured from Cards.AROUND triangles, because folds bring distant triangles near.
         """
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
@@ -223,7 +223,7 @@ class Face:
 
 
 def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
-    """Check -> float64[frames, 4]: largest depth of each frame in mm, and its place."""
+    """Check -> float64[frames, 4]: largest depth of each frame in mm, and x, y, z of the place."""
     checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
     for frame, raw in enumerate(acting.raw):
         now = face.points.at(raw)

@@ -52,8 +52,11 @@ def corners_of(mesh):
 
 
 def undone(search, on, mesh):
-    """Numbers of moving vertices without a fault: (all; held back: keeping less than KEPT of their
-    motion; held back and over REACH_MM from a fault; changed by over 0.01 mm).
+    """Four numbers of moving vertices without a fault, in a pair with its corrective.
+
+    They are: all such vertices; vertices whose motion the corrective reduces to less than the
+    fraction KEPT; of these, the ones more than REACH_MM away from any fault; and vertices that the
+    corrective moves by more than 0.01 mm.
 
     Args:
         search: the search, after it has repaired the pair.
@@ -95,7 +98,7 @@ def worse(search, on):
 
 
 def grew(a, b):
-    """Whether the greatest depth of b exceeds that in a by 0.1 mm, or its largest stretch by 1 %.
+    """Whether `b` exceeds `a` by 0.1 mm in greatest depth, or by 1 % in largest stretch.
 
     Args:
         a: faults of a skin without a corrective.

@@ -10,7 +10,7 @@ CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 class Bare:
-    """Replays poses that the add-on has computed: vertex positions, or bones and live keys."""
+    """Replays poses that the add-on has computed: vertices, or bones and live shape keys."""
 
     def __init__(self, rigs):
         # Names instead of objects, because an undo replaces all objects.
@@ -38,7 +38,7 @@ class Bare:
         self.poses.append(pose)
 
     def begin(self):
-        """Disable the modifiers of meshes with finished positions, as the add-on does."""
+        """Disable Armature modifiers of meshes with final vertex positions, as the add-on does."""
         self._switch(False)
 
     def end(self):

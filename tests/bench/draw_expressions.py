@@ -43,7 +43,8 @@ class Shot(NamedTuple):
 
 
 MODULE = "bl_ext.user_default.risorius"
-# (height of the picture's middle above the eyes, height of the picture), in eye distances.
+# (height of the picture's middle above the eyes, height of the picture), as multiples of the
+# distance between the eyes.
 LOOKS = {"face": (-0.42, 3.3), "mouth": (-1.05, 1.9), "eyes": (0.0, 1.9)}
 
 

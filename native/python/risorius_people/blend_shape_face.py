@@ -90,8 +90,10 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """The blend shape delta that, added before skinning, moves the vertices by the displacement of
-    the expression after its joints have moved.
+    """The blend shape delta of an expression whose joints move as well.
+
+    The delta is added before skinning. After the joints have moved, each vertex is displaced by
+    exactly the expression's displacement.
 
     Args:
         positions: float64[v, 3], positions at rest in decimetres.
@@ -116,7 +118,7 @@ def bind_displacement(
 
 
 def euler_xyz(rotation: Floats) -> Floats:
-    """Angles about x, y, z in degrees of a matrix Rz Ry Rx for column vectors."""
+    """float64[3]: the rotations about x, y and z, in degrees, whose matrix is Rz @ Ry @ Rx."""
     return np.degrees(
         [
             np.arctan2(rotation[2, 1], rotation[2, 2]),

@@ -159,8 +159,8 @@ def skin_weights(
 ) -> Floats:
     """Skin weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
-    The jaw's weight of a vertex is its jawOpen displacement along the rigid motion of the jaw
-    joint, as a fraction of this motion.
+    A vertex's weight of the jaw joint is the vertex's displacement by jawOpen along the rigid
+    motion of the jaw joint, as a fraction of this motion.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -272,7 +272,7 @@ class Body:
             self.weights = other.weights
 
     def carried(self, displacement: Floats) -> Floats:
-        """float64[V, 3]: a displacement of the data, adapted to this person's proportions.
+        """float64[V, 3]: a displacement from the CC0 data, adapted to this person's proportions.
 
         Args:
             displacement: float64[V, 3], in decimetres.

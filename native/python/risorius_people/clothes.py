@@ -110,7 +110,7 @@ def unrolled(positions: Floats) -> Floats:
 
 
 def spread(vertices: list[int], most: int) -> list[int]:
-    """About `most` of the vertices, evenly spaced; few vertices keep operators sparse.
+    """About `most` of the vertices, evenly spaced; few keep the matrix of an Operator sparse.
 
     Args:
         vertices: vertices in their order on the ring.
@@ -122,7 +122,8 @@ def spread(vertices: list[int], most: int) -> list[int]:
 def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
     """Widens the shirt, and adds collar and turned-in hems.
 
-    Returns the faces, and the operator that computes all vertices from those of the cut tights.
+    Returns the faces, and the operator that computes all vertices of the shirt from the vertices of
+    the cut tights.
 
     Args:
         polygons: the cut tights.
@@ -133,8 +134,9 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
     rows: list[tuple[int, int, float]] = []
     trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
-    # Each vertex moves away from the mean of the trunk's vertices, because this is linear. The
-    # middle at the vertex's height would need a division and looks much the same.
+    # Each vertex moves away from the mean of the trunk's vertices, because this motion is linear in
+    # the positions. The trunk's middle at the height of the vertex would need a division, which is
+    # not linear, and looks much the same.
     for i in range(count):
         rows.append((i, i, 1 + ROOM))
         rows += [(i, j, -ROOM * near) for j in trunk]

@@ -99,8 +99,8 @@ LIPS_MIDDLE = [
     ("CTRL_C_teeth{v}.tx", "teethLeft{v}", "teethRight{v}"),
     ("CTRL_C_teeth_fwdBack{v}.ty", "teethFwd{v}", "teethBack{v}"),
 ]
-# (GUI control, raw controls that rise one after the other while the GUI control goes from 0 to 1).
-# The raw controls of STICKY stay at 1; those of SWALLOW fall back to 0.
+# STICKY and SWALLOW: (GUI control, raw controls that rise one after the other while the GUI control
+# goes from 0 to 1). The raw controls of STICKY stay at 1; the ones of SWALLOW fall back to 0.
 STICKY = ("CTRL_{s}_mouth_lipSticky.ty", [f"mouthLipsSticky{{s}}Ph{n}" for n in (1, 2, 3)])
 SWALLOW = ("CTRL_C_neck_swallow.ty", [f"neckSwallowPh{n}" for n in (1, 2, 3, 4)])
 # (from, to, slope, cut): for an input from `from` to `to`, the output is slope * input + cut.

@@ -252,9 +252,9 @@ def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
 
     Returns ("jawOpen", one of LIPS_TOGETHER) -> float64[V, 3].
 
-    The data's shape assumes an open jaw. If the jaw is shut, it would lift the lower lip far over
-    the upper one. Therefore the controls alone move nothing, and their displacements become
-    correctives for the open jaw.
+    The data's shape assumes an open jaw. If the jaw is shut, the shape would lift the lower lip
+    far over the upper one. Therefore the controls alone move nothing, and their displacements
+    become correctives for the open jaw.
 
     Args:
         out: raw control -> expression; the displacements of LIPS_TOGETHER become 0.

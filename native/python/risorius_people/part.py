@@ -10,7 +10,7 @@ from .polygons import Floats, Operator, Polygons
 
 @dataclass
 class Part:
-    """One mesh at one LOD; `carry` converts values of the base mesh's vertices to its vertices."""
+    """A mesh at one LOD; `carry` converts values of base mesh vertices to vertices of this mesh."""
 
     name: str
     polygons: Polygons

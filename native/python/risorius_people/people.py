@@ -38,7 +38,7 @@ _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 @dataclass(frozen=True)
 class Person:
-    """The definition of a sample person. Colours are sRGB in [0, 1]; see cast.toml for the keys."""
+    """The definition of a sample person; cast.toml explains it. Colours are sRGB in [0, 1]."""
 
     name: str
     gender: str

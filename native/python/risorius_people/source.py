@@ -210,7 +210,8 @@ class Source:
         """float64[V, 3]: displacement of a shape of the body, in decimetres.
 
         Args:
-            name: folder and name; if the name has no l- or r-, both sides are added.
+            name: folder and name of the shape. If only shapes with the prefixes l- and r- have this
+                name, both are added.
             vertex_count: number of vertices V.
 
         Raises:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Evaluates a clip on a character and writes the result."""
+"""Evaluates a clip on a character and writes the poses to files."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def bake(
         clip: clip that is already resampled and cut, see `prepared`.
         face, lod: the character, and the LOD from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
-            Temporary files of killed processes in these folders are not deleted.
-        parts: parts of the poses to write, from PARTS.
-        compress: True: the .npz is smaller, and takes several times longer.
+            Temporary files that killed processes left in the folders of these paths remain.
+        parts: pose parts to write, some of PARTS.
+        compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.
 

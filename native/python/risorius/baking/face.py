@@ -40,7 +40,7 @@ _CHUNK_BYTES = 8 << 20
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character, and unique names for all parts of its poses."""
+    """A compiled character, and unique names of its joints, channels, maps and controls."""
 
     name: str
     rig: risorius.Rig
@@ -62,7 +62,10 @@ class Face:
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """The rest values of a part: float32[joints, columns], for other parts float32[count]."""
+        """The rest values of a part of the pose, one of PARTS.
+
+        The part "joints" has float32[joints, columns]; the other parts have float32[count].
+        """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
             return np.tile(joint, (self.rig.joint_count, 1))
@@ -109,7 +112,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index; repeated names get the index.
+    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
+    a name that an earlier element has, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()
@@ -158,9 +162,9 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES. The joints of the neck or the head
-    get no curves if the clip has no angles of the neck or the head. A joint gets none either if
-    the clip already has a curve of one of its raw controls.
+    The rotations are computed from the clip's curves of ANGLES. Neck joints get no curves
+    if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
+    gets no curves if the clip already has a curve of one of its raw controls.
 
     Args:
         clip: a clip with or without curves of ANGLES.
@@ -193,7 +197,7 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of the clip's curves without effect, because the face has no such raw control."""
+    """The names of curves of `clip` that have no effect, because `face` has no such raw control."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))

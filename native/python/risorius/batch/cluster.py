@@ -22,13 +22,14 @@ class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
     Every worker must find the files under the same paths and have this version of Risorius. If a
-    worker dies, its job goes to another one; Dask gives it up after more than
-    `distributed.scheduler.allowed-failures` (3) deaths. Dask may blame other jobs of a dead worker
-    as well. So a job that was given up is tried once more alone.
+    worker dies, another worker runs its job; Dask gives the job up after more than
+    `distributed.scheduler.allowed-failures` (3) dead workers. Dask also counts the death against
+    other jobs of that worker. So each job that Dask gave up is tried once more, alone.
 
     Args:
         address: e.g. tcp://10.0.0.5:8786.
-        work: function that runs a job; workers must be able to import it, or a partial of one.
+        work: function that runs a job: one that the workers can import, or a functools.partial of
+            such a function.
 
     Raises:
         PoolError: the package `distributed` is missing, or no scheduler answers.

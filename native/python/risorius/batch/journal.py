@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """A finished job: hash of its inputs, output files, and its line's offset and size in bytes."""
+    """A finished job: hash of inputs; output files; offset and length in bytes of its line."""
 
     stamp: str
     files: list[list[Any]]
@@ -138,7 +138,10 @@ def _line(record: dict[str, Any]) -> bytes:
 
 
 def _files(job: Job) -> list[list[Any]]:
-    """Kind, size and modification time of each output. Raises: OSError: an output is missing."""
+    """Kind ("npz", "csv" or "rzc"), size and modification time of each output file of a job.
+
+    Raises: OSError: an output file is missing.
+    """
     out: list[list[Any]] = []
     for kind, path in job.outputs:
         about = path.stat()

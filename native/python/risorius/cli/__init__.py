@@ -86,7 +86,7 @@ def _drop_output() -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that raises CommandLineError for invalid option values, for `main`."""
+    """A parser that raises CommandLineError for invalid option values; `main` prints the error."""
 
     def error(self, message: str) -> NoReturn:
         if message.startswith("argument "):

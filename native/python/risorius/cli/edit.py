@@ -151,9 +151,10 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """Parse --threshold: effects of a coefficient that count as small, for all or for each kind.
+    """Parse --threshold: the largest effect of a joint matrix coefficient that counts as small.
 
-    Kinds are translation in mm, rotation in degrees, and scale in per cent.
+    One number holds for all kinds of joint attributes. Three numbers hold for translation in mm,
+    rotation in degrees and scale in per cent.
 
     Raises:
         CommandLineError: not one or three numbers from 0.
@@ -184,7 +185,7 @@ def read_regions(name: str) -> edit.Regions:
     """Read the joint names or indices of each region from JSON or TOML.
 
     The file contains {"eye": ["FACIAL_L_Eye", ...], ...}, or this table as the value of a key
-    "regions", or lists of joints without names of regions: [["FACIAL_L_Eye", ...], ...].
+    "regions", or a list of regions without names: [["FACIAL_L_Eye", ...], ...].
 
     Raises:
         InputError: not JSON or TOML, or a different structure.
@@ -418,6 +419,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """The name of a control without prefix, or of the first four controls of a corrective."""
+    """A control's name without prefix; for a corrective, the names of its first four controls."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

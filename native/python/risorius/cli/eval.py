@@ -111,7 +111,7 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """Convert GUI controls to raw controls, float32[raw controls].
+    """Convert values of GUI controls to values of raw controls, float32[raw controls].
 
     Raw controls that no GUI control drives keep their initial value.
 
@@ -132,7 +132,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
 
     Args:
         values: float32[n].
-        names: names of the values; values without a name are called "control" and their number.
+        names: names of the values; a value without a name is called "control" and its index.
         first: index of the control that has the first value.
     """
     return [
@@ -211,7 +211,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Refuse options of poses with a clip, and options of clips without -o.
+    """Refuse options for printing one pose if -o is given, and options for clips if -o is missing.
 
     Raises: CommandLineError.
     """
@@ -235,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
 def run_pose(args: argparse.Namespace) -> int:
     """Print the pose for the control values of the command line.
 
-    Raises: CommandLineError: the arguments do not fit the file.
+    Raises: CommandLineError: the face lacks the LOD or a control, or a value is no number.
     """
     dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)

@@ -52,8 +52,8 @@ _SYSTEM = {
 def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[Difference]:
     """All differences of two faces; an empty list means that both are equal.
 
-    If axes or units differ, B is converted to A's, up to rounding. If B cannot be converted, this
-    is reported and the numbers are compared unconverted.
+    If axes or units differ, B is converted to the axes and units of A, with rounding errors. If B
+    cannot be converted, this is reported and the numbers are compared unconverted.
 
     Args:
         a: the face before.

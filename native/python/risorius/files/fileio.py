@@ -103,7 +103,7 @@ def write_text(path: _Path, text: str) -> None:
 
 
 def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
-    """Write several files that belong together; all are complete before one gets its name.
+    """Write several files that belong together; none gets its name before all are complete.
 
     Args:
         files: path -> bytes; the first file receives its name last. Missing folders are made, and

@@ -134,7 +134,10 @@ def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
 
 
 def _tokens(blocks: Ints, order: Ints, colour: int) -> tuple[Ints, ...]:
-    """For each token: key that sorts it into the scan, table, symbol, extra bits, their number.
+    """The tokens of a scan: Huffman-coded symbols that are each followed by extra bits.
+
+    Returns, per token: number that sorts it into the scan, number of its Huffman table, symbol,
+    extra bits, number of extra bits.
 
     Args:
         blocks: int64[n, 64], quantised DCT coefficients in zigzag order.
@@ -178,7 +181,7 @@ def _extra(values: Ints, sizes: Ints) -> Ints:
 
 
 def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
-    """Huffman lengths and codes by symbol, and the table as the file stores it."""
+    """Code lengths and Huffman codes by symbol, and the table as the file stores it."""
     # The standard forbids a code of only ones, so the unused symbol 256 takes it.
     heap = [(int(n), i, [i]) for i, n in enumerate(counts) if n] + [(0, 256, [256])]
     long = np.zeros(257, np.int64)

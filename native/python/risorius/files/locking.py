@@ -30,7 +30,7 @@ class LockedError(RisoriusError):
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of an existing folder during the context.
 
-    The lock belongs to the operating system and ends with the process in any case. A file
+    The lock belongs to the operating system, which ends it even if the process is killed. A file
     `.risorius.lock` contains the name of the holder.
 
     Raises:
@@ -106,7 +106,8 @@ else:
         except OSError as error:
             if error.errno not in _UNKNOWN:
                 raise
-            # This file system has no locks, so the lock counts as held while its holder may run.
+            # This file system has no locks. The lock counts as held if the process named in the
+            # file may still run.
             holder = _holder(handle)
             if _may_live(holder):
                 raise LockedError(_refusal(folder, holder)) from None
@@ -131,7 +132,7 @@ def _about_this_process() -> bytes:
 
 
 def _holder(handle: int) -> dict[str, object]:
-    """The holder's data in the file; empty if the file is empty or unreadable."""
+    """The lock file's data about the process that holds the lock; empty if unreadable."""
     os.lseek(handle, 0, os.SEEK_SET)
     try:
         found = json.loads(os.read(handle, 4096))

@@ -67,7 +67,8 @@ class Sums:
     """Compares linear sums of morph targets with the rig.
 
     Attributes:
-        tried: group -> (number of pairs compared, number of pairs in the group).
+        tried: group of targets -> (number of pairs of targets that were compared, number of pairs
+            in the group).
     """
 
     def __init__(self, points: Points, rig: Rig, targets: Sequence[Target]) -> None:
@@ -96,7 +97,7 @@ class Sums:
         return found.astype(np.float32)
 
     def errors(self, group: str) -> list[Combination]:
-        """Combinations for the pairs of a group and its single targets, largest deviation first.
+        """Combinations for pairs of targets and for single targets, largest deviation first.
 
         Args:
             group: name of the group of targets.
@@ -118,10 +119,10 @@ class Sums:
         return sorted(out, key=lambda one: -one.error_mm)
 
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
-        """The largest deviation of a linear sum from the rig, in mm.
+        """The largest deviation of a linear sum of targets from the rig, in mm.
 
         Args:
-            of: names of its targets.
+            of: names of the targets.
             kind: formula of the weight, such as PRODUCT."""
         missing = self._missing(kind, of)
         return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))

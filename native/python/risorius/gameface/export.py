@@ -60,7 +60,7 @@ def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
 
     Args:
         dna: the whole face, with geometry.
-        rig: compiled from it, with rotations as Euler angles.
+        rig: rig compiled from `dna`, with rotations as Euler angles.
         file: path of the face: textures are in its folder, and errors name it.
         out: file name of the .glb; the names of the other files derive from it.
         wishes: export options.
@@ -134,7 +134,7 @@ def _within(
             f"{_megabytes(written)}: ask for fewer shapes{more}"
         )
     size = wishes.textures
-    # The textures were reduced before the LOD. The coarser LOD may leave room for larger ones.
+    # The textures were reduced before the LOD. The coarser LOD may leave room for larger textures.
     while wish.lod != wishes.lod and size > wish.textures:
         larger = replace(wish, textures=size)
         again = maker.make(larger)
@@ -247,7 +247,7 @@ class _Maker:
             self._refine(wishes, room - len(self.made))
 
     def _refine(self, wishes: Wishes, room: int) -> None:
-        """Adds combinations for deviations that remain at typical poses after those of pairs."""
+        """Adds combinations for deviations that the pairs' combinations leave at typical poses."""
         mine = [t for t in self._targets if t.group == "arkit"]
         names = [t.name for t in mine]
         poses = faces.typical(names, POSES)
@@ -329,9 +329,9 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group of targets for face capture: the first requested group, but vrm only if alone.
+    """The group of targets for face capture: the first requested group.
 
-    Without VRM export, the group vrm is treated as any other.
+    In a VRM export, the group vrm is passed over unless it is the only requested group.
     """
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 

@@ -12,7 +12,8 @@ Doubles = npt.NDArray[np.float64]
 
 _STEEP = 1.3  # exponent of the random weights: low weights are more frequent
 _ONE_SIDED = 0.25  # share of the poses with one side weaker than the other
-# Unit without its side -> share of the poses in which it is on. At most one unit of a row is on.
+# Unit without its side -> share of the poses in which it is on. A pose has at most
+# one active unit of each row.
 _PAIRS = (
     {"eyeBlink": 0.75},
     {"eyeLookDown": 0.55, "eyeLookUp": 0.2},

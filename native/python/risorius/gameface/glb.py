@@ -27,7 +27,7 @@ class Glb:
     Attributes:
         table: the JSON; callers append nodes and meshes to its lists.
         packs: whether vertices and triangles are packed with meshoptimizer.
-        sparse: whether an accessor of mostly zero rows stores only its other rows.
+        sparse: whether an accessor whose rows are mostly zero stores only the nonzero rows.
         pictures: name of a picture file of the face -> number of the texture made from it.
     """
 
@@ -124,7 +124,7 @@ class Glb:
         """Adds an extension to the lists of the JSON.
 
         Args:
-            extension: its name.
+            extension: name of the extension.
             required: whether a program without it cannot read the file.
         """
         for key in ("extensionsUsed", "extensionsRequired")[: 1 + required]:

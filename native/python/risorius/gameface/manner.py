@@ -47,7 +47,12 @@ def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manne
 
 
 def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
-    """Mean rotation of the eyeballs in degrees; 0 for a face without eyes."""
+    """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
+
+    Args:
+        points: vertices of the LOD, at rest.
+        delta: float32[P, 3], the displacement of the vertices by the target, in metres.
+    """
     found = list[float]()
     for part in points.parts:
         rows = np.unique(part.rows)

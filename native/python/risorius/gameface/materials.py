@@ -20,7 +20,7 @@ from .naming import safe
 Pixels = npt.NDArray[np.uint8]
 
 LARGEST = 8192
-# media types that are stored unchanged if the pixels cannot be read
+# media types of pictures that are stored unchanged if their pixels cannot be read
 _AS_THEY_ARE = ("image/png", "image/jpeg")
 _QUALITY = {"color": 85, "normal": 88, "roughness": 75}
 # Colour and roughness of materials without a texture.

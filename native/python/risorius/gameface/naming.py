@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of meshes and targets that every client and game engine accepts."""
+"""Names of meshes and targets that every glTF viewer and game engine accepts."""
 
 from __future__ import annotations
 

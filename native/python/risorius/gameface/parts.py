@@ -73,7 +73,7 @@ class Points:
 
         Args:
             dna: face with geometry.
-            rig: compiled from it.
+            rig: rig compiled from `dna`.
             lod: number of the LOD.
             skeleton: joints of the exported file.
             axes: from axes_of.
@@ -103,7 +103,7 @@ class Points:
             raw: float32[R], values of the raw controls.
 
         Raises:
-            GameFaceError: a position is not finite or farther than 10 km.
+            GameFaceError: a position is not finite, or is more than 10 km from the origin.
         """
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The morph targets that clients expect by name, and the rig's pose for each of them."""
+"""The morph targets that apps for glTF faces expect by name, and the rig's pose for each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Target:
     """A morph target, and the pose of the rig that it shows.
 
     Attributes:
-        name: spelled as the client expects.
+        name: name of the target, spelled as the app for glTF faces expects.
         group: one of GROUPS.
         raw: float32[R], raw controls of the pose.
         base: float32[R], raw controls of the pose from which displacements are measured.
@@ -65,7 +65,7 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every player accepts and that differs from all others, even in lower case.
+    """A name that every glTF viewer accepts and that differs from all others, even in lower case.
 
     Unreal does not distinguish upper and lower case.
     """

@@ -25,9 +25,9 @@ class Wishes:
         normals: whether targets change normals too.
         textures: largest number of pixels of a picture's longer side.
         mb: size limit of the file in MB, None for no limit.
-        most: largest number of targets that the client takes, None for no limit.
-        within: allowed deviation of sums of two targets in mm; combinations correct larger ones.
-            None: no combinations.
+        most: largest number of targets that the app showing the file accepts, None for no limit.
+        within: allowed deviation of sums of two targets from the rig, in mm; larger deviations are
+            corrected by combinations. None: no combinations.
         frames: typical captured frames, ARKit unit -> weight: combinations are fitted to them too.
         humanoid: one of avatar.humanoid.KINDS, which adds missing bones; "": none.
         vrm: version "1.0" or "0.x"; "": plain glTF.

@@ -46,7 +46,7 @@ class Written:
 
     Attributes:
         data: bytes of the file.
-        groups: group -> (number of targets, number of vertices that they move, bytes).
+        groups: group of targets -> (number of targets, number of vertices that they move, bytes).
     """
 
     data: bytes
@@ -107,7 +107,7 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = self._joints(nodes) if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
+        # TalkingHead looks for meshes below the armature, other apps at the root of the scene.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
@@ -312,7 +312,7 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Metres as float32, or as int16 steps if positions are quantized."""
+        """Positions in metres as float32, or as int16 multiples of `step` if they are quantized."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")

@@ -66,7 +66,7 @@ class Document:
 
         Args:
             kind: a list at the top of the JSON, e.g. "accessors".
-            index: position in it, as in the file; may be of any type.
+            index: position in that list, as in the file; may be of any type.
             place: place of the index, for errors.
 
         Raises:
@@ -89,7 +89,7 @@ class Document:
             default: the number if the key is missing.
 
         Raises:
-            AnimationFileError: another value.
+            AnimationFileError: not such a number.
         """
         value = table.get(key, default)
         try:
@@ -302,14 +302,16 @@ class Document:
         return self.linked(uri, place)
 
     def linked(self, uri: object, place: str) -> bytes:
-        """The bytes that a uri contains in base64, or of the file in the glTF's folder it names.
+        """The bytes that a uri contains in base64, or the bytes of the file that it names.
+
+        The file must be in the folder of the glTF.
 
         Args:
             uri: uri of a buffer or a picture, as in the file; may be of any type.
             place: place of the uri, for errors.
 
         Raises:
-            AnimationFileError: not a uri, not base64, a file elsewhere, or one that is missing.
+            AnimationFileError: not a uri, not base64, or no file in this folder.
             BudgetError: more bytes than a file of this size may hold.
         """
         if not isinstance(uri, str):
@@ -341,7 +343,7 @@ class Document:
             place: the table's name in errors.
 
         Raises:
-            AnimationFileError: another value, or another length.
+            AnimationFileError: not a list of finite numbers, or a list of another length.
         """
         value = table.get(key, list(default))
         try:
@@ -397,7 +399,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: not a GLB of version 2, or cut short; with the byte.
+        AnimationFileError: not a GLB of version 2, or a truncated file.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)
@@ -475,7 +477,8 @@ def read(document: Document, take: str | None = None) -> Take:
 
     Args:
         document: from `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first that animates any of these.
+        take: name or number of an animation; None: the first one that animates morph targets
+            or such properties.
 
     Raises:
         AnimationFileError: no such animation, or missing parts of it.
@@ -551,7 +554,7 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """Names of the curves of a channel; empty for location, rotation or scale of a node."""
+    """Names of the curves of an animation channel; empty for a node's location, rotation, scale."""
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)
@@ -598,7 +601,7 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """The keys of each curve of a channel's sampler, in the order of `names`."""
+    """The keyframes of each curve of an animation channel, in the order of `names`."""
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

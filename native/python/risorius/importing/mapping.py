@@ -33,8 +33,8 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Angles in radians of the head and neck, and in ANGLES also of the eyes. These curves rotate
-# bones and are not controls of the rig.
+# Curves with angles of the head and neck in radians; ANGLES also has the eyes' angles. These curves
+# rotate bones and are not controls of the rig.
 HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
 ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
@@ -45,8 +45,9 @@ VOWELS = "AIUEO"
 _WITH_UNITS = (ARKIT, "vrm")
 _OLD_BASES = {"arkit units": "vocabulary arkit", "vrm expressions": "vocabulary vrm"}
 _PATTERN_STEPS = 50  # budget steps per comparison of a pattern with a name
-# Median seconds between frames above which a clip is keyed; step of the frames added between its
-# keys, in seconds; largest number of frames added per gap.
+# A clip is taken as keyframed, not captured, if the median time between its frames is above _KEYED
+# seconds. Then frames are added between its keyframes, every _STEP seconds, at most _MOST_STEPS per
+# gap.
 _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 
 
@@ -83,9 +84,9 @@ class Mapping:
         description: a sentence.
         rows: curve of the source -> {control: weight}. * in a name matches any text; * in its
             controls is replaced by that text. An empty row ignores the curve.
-        shares: control -> the control of which it takes back a share: the value that the rows give
-            it is divided by the other control's value (controls.shares.share_of). It is left
-            unchanged if no curve moves the other one.
+        shares: control A -> control B of which A takes back a share: the value that the rows give A
+            is divided by the value of B (controls.shares.share_of). A is left unchanged if no curve
+            moves B.
         controls: pattern of control names -> adjustment; the last match counts.
         strip: prefixes of curve names that are ignored.
         vocabulary: name in controls.vocabulary; its other spellings are accepted too.
@@ -159,7 +160,7 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """A mapped clip, the controls that each source curve moves, and the names without use."""
+    """A mapped clip, the controls that each source curve moves, and the curves not used."""
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -228,7 +229,7 @@ def _divided(
 ) -> tuple[Clip, dict[str, Doubles]]:
     """Divides each control of `mapping.shares` by the control of which it takes back a share.
 
-    The clip gets more frames if its keys are far apart, see `_between`.
+    The clip gets more frames if its keyframes are far apart, see `_between`.
     """
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
@@ -244,10 +245,10 @@ def _divided(
 
 
 def _between(times: Doubles) -> Doubles | None:
-    """Times of keys that are far apart, and more times between them.
+    """The times of a clip with keyframes that are far apart, and additional times between them.
 
-    A quotient of linear curves is not linear between keys. Without more frames, lips that are shut
-    at two keys would part between them.
+    A quotient of linear curves is not linear between keyframes. Without more frames, lips that are
+    shut at two keyframes would part between them.
 
     Args:
         times: float64[frames], seconds.
@@ -572,11 +573,11 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows most of these curves; None if no mapping knows any.
+    """The built-in mapping that knows the most curves in `names`; None if no mapping knows any.
 
-    Ties go to the mapping that knows more of all columns, then to the one with fewer rows, which is
-    more specific. Single letters are no evidence, because several vocabularies use them as mouth
-    shapes; but the vowels A, I, U, E, O together mean VRM.
+    Ties go to the mapping that knows more names in `columns`, then to the one with fewer rows,
+    which is more specific. Single letters are no evidence, because several vocabularies use them as
+    mouth shapes; but the vowels A, I, U, E, O together mean VRM.
 
     Args:
         names: curves that are not constantly 0.

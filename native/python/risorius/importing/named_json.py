@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads JSON of named curves in the layouts of various software: by frame, by curve, or as keys."""
+"""Reads JSON of named curves in the layouts of various software: by frame, curve or keyframe."""
 
 from __future__ import annotations
 
@@ -332,7 +332,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 
 
 def keyed_curves(reader: Reader, document: object) -> Take | None:
-    """Reads curves with keys {Time, Value}, anywhere in the document.
+    """Reads curves with keyframes {Time, Value}, anywhere in the document.
 
     An Unreal animation's FloatCurves have this layout: [{CurveName, FloatCurve: {Keys: [...]}}].
     Returns None if there are no such curves.
@@ -342,7 +342,7 @@ def keyed_curves(reader: Reader, document: object) -> Take | None:
         document: parsed JSON; times are seconds.
 
     Raises:
-        AnimationFileError: a key without a time or a value.
+        AnimationFileError: a keyframe without a time or a value.
     """
     found: dict[str, Keys] = {}
     is_cubic = False
@@ -372,7 +372,7 @@ def _key_number(reader: Reader, row: Mapping[str, object], key: str, place: str)
 
 
 def _find_curves(value: object, depth: int) -> list[tuple[str, list[Any]]]:
-    """(name, keys) of all curves at any depth of a value, up to `depth`."""
+    """(name, keyframes) of all curves that are nested in a JSON value, `depth` levels at most."""
     if depth == 0:
         return []
     if isinstance(value, list):

@@ -43,7 +43,8 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
-# Kinds whose curves are Risorius' own controls, or keyed by an animator: any value is intended.
+# Kinds of files whose curves are Risorius' own controls or were keyframed by an animator. Every
+# value in them is intended, so that none is refused as implausible.
 _OWN_KINDS = ("clip", "rzc", "curves")
 
 
@@ -74,8 +75,8 @@ class Imported:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
             the start of the sound.
         kind: one of KINDS.
-        mapping: name of the built-in mapping of this kind of file, else the one that knows most
-            curves; "" if none knows any.
+        mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
+            the most curves; "" if none knows any.
         source: the file's name.
         notes: sentences for the user about dropped or assumed data.
     """
@@ -99,7 +100,8 @@ class Imported:
         """Converts to a clip of raw controls, and reports the use of each curve.
 
         Args:
-            mapping: name of a built-in one, path of a TOML file, or a Mapping; None: self.mapping.
+            mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None:
+                self.mapping.
             rig_names: raw controls of the rig, `Rig.raw_control_names`; other controls are dropped
                 and reported. None: all are kept.
             rig: needed for a mapping of GUI controls, because the rig has their table.
@@ -377,7 +379,7 @@ def import_curves(
 
     Args:
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
-            values), linear between keys.
+            values), linear between keyframes.
         source: name of the curves in the report.
         rig_names, mapping, rig, rotations: see `Imported.apply`.
 

@@ -22,7 +22,7 @@ class Report:
         ignored: curves of the source that the mapping ignores on purpose.
         not_in_rig: controls of the mapping that the rig lacks and that are therefore dropped.
         always_zero: curves of the source that are 0 in every frame.
-        bones: curves of the clip that rotate bones of head and eyes instead of rig controls.
+        bones: curves of the clip that rotate the bones of head and eyes and are no rig controls.
         absent: rows of the mapping without a curve in the source.
         notes: sentences about reading and processing.
     """

@@ -237,7 +237,7 @@ def _is_missing(cell: str) -> bool:
 
 
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
-    """Drops rows without a time, unless rows are counted instead of times.
+    """Drops rows without a time, unless the times come from the row numbers.
 
     Raises:
         AnimationFileError: more than MOST_LOST of the rows have no time.
@@ -295,7 +295,10 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
-    """Seconds of the timecodes in a column; of row numbers if the caller counts rows."""
+    """Seconds of the timecodes in a column.
+
+    If the option `counts_rows` is set, the times come from the row numbers instead.
+    """
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
     codes = [

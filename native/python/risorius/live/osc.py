@@ -206,7 +206,7 @@ class _Face:
 
 
 def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
-    """The first `count` values as floats, if all are plausible for a face."""
+    """The first `count` values as floats. Raises: LiveError: too few, or not values of a face."""
     if len(values) < count:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
@@ -267,7 +267,8 @@ def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, flo
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    # A sender of quaternions sends the same rotation here as angles without a defined order.
+    # If the sender also sends quaternions, these angles are the same rotation in an undefined
+    # order, and are ignored.
     if face.quaternion:
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}

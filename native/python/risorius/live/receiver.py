@@ -102,7 +102,9 @@ class _Subject:
         return self.latest
 
     def _own_time(self, sent: float | None, arrival: float) -> float | None:
-        """The time of a frame, from the sender's time without its jumps, or else the arrival.
+        """The time of a frame: the sender's time with jumps of its clock removed.
+
+        If the packet has no sender's time, the time is the time of arrival.
 
         Returns:
             Seconds; None if the packet came late.
@@ -208,7 +210,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the first one received and not displaced."""
+        """The latest frame of a subject; for "", of the subject with the oldest place."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -231,7 +233,7 @@ class Receiver:
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Records a subject until `finish`; for "", the subject heard first.
+        """Records a subject until `finish`; for "", the subject whose packets arrive first.
 
         Args:
             limit: largest number of frames; the default is half an hour at 60 per second.
@@ -296,8 +298,9 @@ class Receiver:
             self._take_in(data, sender[0], now)
             seen, spent = seen + 1, spent + perf_counter() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
-                # The thread sleeps until the window ends, so that a flood of packets does not slow
-                # the viewport. Meanwhile the system drops packets when its buffer is full.
+                # The thread sleeps until the present time window of _WINDOW seconds ends, so that a
+                # flood of packets does not slow the viewport. Meanwhile the system drops packets
+                # when its buffer is full.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - perf_counter()))
         self._keep(self._decoder.flush(), perf_counter())

@@ -194,7 +194,7 @@ class Shaper:
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
-        """Uses a frame as the face at rest; None removes it."""
+        """Uses a frame as the face at rest, whose values are subtracted; None: no subtraction."""
         self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))

@@ -152,8 +152,8 @@ def mouth(
 
     Args:
         phonemes: in order, without gaps; the mouth is at rest before and after them.
-        opened: float[n], opening of vowels: from prosody.openness, or the integers in a correctable
-            clip's metadata / 1000.
+        opened: float[n], factor on the jaw of vowels every OPENNESS_STEP seconds: the result of
+            prosody.openness, or the integers "openness" in a correctable clip's metadata / 1000.
         times: float64[frames], seconds, ascending in equal steps.
         intensity, library: see speak.
 

@@ -2,7 +2,7 @@
 """Runs speech recognition in a separate process.
 
 A program that embeds Python, such as Blender, may have loaded another libpocketsphinx through its
-ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. A
+ffmpeg. The linker then makes the recogniser use that library, and it fails or crashes. A
 separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
     this process                                 separate process
@@ -248,7 +248,8 @@ def serve(task: dict[str, Any]) -> None:
 def _end_with_parent() -> None:
     """Ends the process when the pipe closes, for example because the parent died.
 
-    It reads with os.read, because locks of Python's buffers would block the end of the process.
+    The pipe is read with os.read, because locks of Python's buffers would block the end of the
+    process.
     """
     while os.read(0, 4096):
         pass

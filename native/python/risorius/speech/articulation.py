@@ -55,7 +55,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
 
     Returns:
         float64[frames, 15] in the order of VISEMES. The visemes PP and FF have the weight of their
-        `gate`; the others share the rest to 1, so that each row sums to 1.
+        `gate`; the other visemes share the rest, so that each row sums to 1.
     """
     pull = np.zeros((len(times), len(VISEMES)))
     for begin, end, viseme in _targets(phonemes):
@@ -145,8 +145,8 @@ def controls(
         weights: float64[frames, 15] from viseme_weights.
         openness: float64[frames], factor on the jaw of vowels; 1 at the voice's usual loudness.
         intensity: factor on all shapes except closures.
-        library: a face's own visemes by name, which replace the built-in ones; their vowels are
-            scaled by openness as a whole.
+        library: a face's own visemes by name, which replace the built-in ones; in a vowel of the
+            library, openness scales all controls, not only the jaw.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].

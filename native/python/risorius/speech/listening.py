@@ -27,12 +27,12 @@ _LONGEST_PIECE = 30.0  # seconds; limits the memory of the decoder
 _PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
 _SHORTEST_PHONEME = 0.03  # seconds: shortest length of a phoneme
-# A transcript is doubtful if its mean confidence is lower. In tests wrong transcripts reached at
-# most 0.35, right ones 0.41 to 0.77.
+# A transcript is doubtful if its mean confidence is below this number. In tests wrong transcripts
+# reached at most 0.35, right ones 0.41 to 0.77.
 _DOUBTFUL = 0.37
 _UNSAID = 0.2  # fraction of the speech that may be missing in the transcript
-# Smallest fraction of a transcript's words that must be heard. If the transcript is wrong, the
-# aligner still hears up to half of its words.
+# Smallest fraction of a transcript's words that the aligner must find in the voice. If the
+# transcript is wrong, the aligner still finds up to half of its words.
 _LEAST_FOUND = 0.6
 _SILENT = -80.0  # decibels relative to full scale; quieter sound is not speech
 _GAP = 0.05  # seconds between words beyond which they are not adjacent

@@ -35,8 +35,8 @@ class Accent(NamedTuple):
 def pitch(samples: Samples) -> Curve:
     """Pitch in semitones above 100 Hz every STEP seconds; NaN for unvoiced sound.
 
-    It is the lag with the largest autocorrelation in windows of 40 ms. The autocorrelation is
-    divided by the autocorrelation of the window function (Boersma 1993).
+    The period is the lag with the largest autocorrelation in windows of 40 ms. The autocorrelation
+    is divided by the autocorrelation of the window function (Boersma 1993).
     """
     low = resample(samples, RATE, _PITCH_RATE)
     width, hop = int(0.04 * _PITCH_RATE), int(STEP * _PITCH_RATE)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Aligns a known text to a voice, or recognises speech, as timed phonemes.
 
-The decoders are PocketSphinx's, with the English model of its wheel. Frames have 10 ms.
+The decoders are PocketSphinx's, with the English model of its wheel. A frame lasts 10 ms.
 """
 
 from __future__ import annotations
@@ -245,7 +245,7 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Converts a piece's phonemes to times of the whole sound; those without duration are dropped.
+    """Converts a piece's phonemes to times of the whole sound; phonemes of no length are dropped.
 
     Args:
         segments: phonemes of the piece.

@@ -2,7 +2,7 @@
 """Packs meshes, weights and shapes in few bytes, for native/web/geometry.js.
 
 Numbers are integer steps, stored as differences to an earlier number, with low and high bytes
-apart, because gzip compresses them best in this form."""
+in separate runs, because gzip compresses them best in this form."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class _Streams:
 
         Args:
             values: whole numbers of any shape.
-            stride: numbers are stored as the difference to the number `stride` before; 0:
-                unchanged.
+            stride: numbers are stored as the difference to the number `stride` before; 0: numbers
+                are stored unchanged.
         """
         whole = np.asarray(values, np.int64).ravel()
         if stride:
@@ -139,7 +139,8 @@ def _skin(mesh: Mesh, streams: _Streams) -> tuple[list[int], list[int], list[int
     begins = mesh.skin_offsets.astype(np.int64)
     counts = np.diff(begins) if len(begins) else np.zeros(0, np.int64)
     vertex = np.repeat(np.arange(len(counts)), counts)
-    # Neighbours share joints: sorted by joint, their rows look alike and compress better.
+    # Neighbouring vertices share joints. If each vertex lists its joints in ascending order, the
+    # rows of neighbours look alike and compress better.
     order = np.lexsort((mesh.skin_joint_indices, vertex))
     joints = mesh.skin_joint_indices.astype(np.int64)[order]
     weights = np.rint(np.asarray(mesh.skin_weights, np.float64)[order] / _WEIGHT)

@@ -23,13 +23,15 @@ IRIS = 0.395
 CORNEA = 4 / 3  # radius of the cornea divided by the radius of the iris: 7.8 mm / 5.85 mm
 PUPIL = 0.33  # radius of the pupil in room light, in radii of the iris
 CONVERGENCE = 1.2  # degrees by which each eye turns inwards, to look at a point 1.5 m away
-# Angle in radians between gaze and limbus, the iris' outer edge, at the middle of the ball.
+# Angle in radians between the gaze and the limbus (the iris' outer edge), seen from the ball's
+# middle.
 _LIMBUS = float(np.arcsin(IRIS))
 _EDGE = _LIMBUS + 0.22  # angle in radians at which the cornea's shell sinks into the ball
 _SOFT = 0.012  # width of the blend between cornea and ball, in radii of the ball
 _CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the ball
-# Positions of the iris' rings, from the rim of the pupil (0) to the root of the iris (1). The next
-# line: depths of root, middle and pupil's rim behind the limbus, in radii of the iris.
+# Positions of the iris' rings, from the rim of the pupil (0) to the root of the iris (1). _ROOT,
+# _MIDDLE and _RIM: depths of the iris' root, of the iris' middle and of the pupil's rim behind the
+# limbus, in radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
 _HOLE = 0.28  # depth of the pupil behind the iris, in radii of the iris

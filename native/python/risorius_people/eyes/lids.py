@@ -20,8 +20,8 @@ _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 # Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
-# mm by which a full look lifts the lids off the ball. At half the look they have moved straight
-# instead of round the ball, and would be inside it otherwise.
+# mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
+# round the ball, so without this height they would be inside the ball at half of the look.
 _LIFT = 0.38
 # Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
 # eyes turn by a third of this, and their lower lids stay still.
@@ -97,11 +97,11 @@ class Lids:
     rest: Floats
 
     def grid(self, values: Floats) -> Floats:
-        """float64[13, COLUMNS, 3]: the values of the rings' vertices."""
+        """float64[13, COLUMNS, 3]: `values` at the vertices of the rings."""
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """float64[13, COLUMNS, 3]: a grid with its rim laid on the eye; the skin around it follows.
+        """float64[13, COLUMNS, 3]: a grid whose rim touches the eye; skin around the rim follows.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
@@ -194,8 +194,8 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
 
 
 def _lower_lid(grid: Floats) -> Floats:
-    """float64[13, COLUMNS, 1]: the lower lid's weight, 1 at the rim's middle, 0 at the corners
-    and the cheek."""
+    """float64[13, COLUMNS, 1]: how much a grid point belongs to the lower lid: 1 at the middle of
+    the lid's rim, 0 at the eye's corners and on the cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)

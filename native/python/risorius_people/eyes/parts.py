@@ -16,8 +16,8 @@ _BALLS = {
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Cross sections of the caruncle: (columns from the inner corner, position across the rim as in
-# _rim, height above the line between both rims in lid thicknesses).
+# Cross sections of the caruncle: (number of grid columns from the eye's inner corner, position `at`
+# across the rim as in _rim, height above the line between both rims in lid thicknesses).
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),

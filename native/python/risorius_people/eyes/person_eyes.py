@@ -73,7 +73,7 @@ class Eyes:
 
         Args:
             eye: lids of the eye.
-            way: float64[V, 3], displacement; that of the lashes is changed.
+            way: float64[V, 3], displacement; its rows of the lashes are changed.
             before: float64[V, 3], the part of the skin's displacement that the lashes have already.
         """
         roots = eye.rings[_LASH_RINGS].ravel()
@@ -125,7 +125,7 @@ class Eyes:
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:
-        """Rotates the eyeballs of looks about their middle; lids follow more than in the data."""
+        """Makes a look rotate the eyeball about its middle; lids follow more than in the data."""
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
         for way in lids.LOOKS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Computes displacements of lids, lashes, pupils, neck, teeth and tongue without shapes of data.
+"""Computes displacements of lids, lashes, pupils, neck, teeth and tongue that the data lack.
 
 Each function in MOTIONS gets the places of a face and the value `by` of its row in further.toml; it
 returns float64[V, 3].

@@ -129,9 +129,10 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of each lip near a vertex of the other lip from which the opening jaw parts them.
+    """Vertices of one lip that touch the other lip.
 
-    Both vertices share no face.
+    Near such a vertex is a vertex of the other lip. The opening jaw parts both vertices, and no
+    face has both.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -154,12 +155,12 @@ def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: F
 
 
 def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
-    """float64[V]: weight of a lid of both eyes; lashes get the weight of the skin below.
+    """float64[V]: weight of both upper or both lower lids; lashes get the weight of the skin below.
 
     Args:
         positions: float64[V, 3], in decimetres.
         groups: name of a group of the base mesh -> vertex indices.
-        number: number of its lash group: 1 for the lower lid, 2 for the upper one.
+        number: number of the lids' lash group: 1 for lower lids, 2 for upper lids.
     """
     out = np.zeros(len(positions))
     body = groups["body"]
@@ -170,7 +171,7 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
         # At the corners of the eye both lids are equally near, so only skin above the roots of the
-        # upper lashes or below those of the lower lashes counts.
+        # upper lashes or below the roots of the lower lashes counts.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

@@ -22,7 +22,7 @@ _OF_DATA = {"data", "units", "size", "with"}
 
 
 def names_of(row: str) -> list[str]:
-    """The raw controls of a row: its name, or one name for each side if it contains {s}."""
+    """The raw controls of a row: the row's name, or one name per side if the name contains {s}."""
     return [row.replace(_SIDE, side) for side in "LR"] if _SIDE in row else [row]
 
 

@@ -81,8 +81,8 @@ def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Fl
         head: the head mesh of the LOD.
         strips: the hair of the LOD.
         unit: length of the strips' unit in the unit of the mesh.
-        own: float64[n, 12], `whereabouts` at the roots on the head of LOD 0, which are searched on
-            this head; None: this head is LOD 0.
+        own: float64[n, 12], `whereabouts` of the roots on the head of LOD 0; the nearest places on
+            this head are used. None: this head is LOD 0.
         there: float64[V, 12], `whereabouts` of the head's vertices.
     """
     positions = np.asarray(head.positions, np.float64) / unit
@@ -160,7 +160,7 @@ def turned(off: Floats, was: Floats, now: Floats) -> Floats:
     """float64[..., 3]: displacement of the ends of hairs if the skin's normal rotates.
 
     Args:
-        off: float64[..., 3], vector from the foot of the normal to each end.
+        off: float64[..., 3], vector from the point on the skin to the hair's end.
         was, now: float64[..., 3], unit normals before and after the rotation.
     """
     axis = np.cross(was, now)
@@ -186,7 +186,8 @@ def bind(
         mesh: the cards; changed.
         head: the mesh of the skin.
         places: place on the skin for each vertex of the cards.
-        least: length in the unit of the mesh; a shape that moves no vertex further is left out.
+        least: length in the unit of the mesh; a shape whose largest displacement is smaller is left
+            out.
         rigid: whether places that move less than `least` follow the head joint alone.
         turns_itself: whether to leave out the rotation by shapes, because the caller adds its own.
     """
@@ -225,7 +226,7 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: places that no control moves further than `least`, and that no neck joint moves."""
+    """bool[n]: whether no control moves a place further than `least`, and no neck joint does."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

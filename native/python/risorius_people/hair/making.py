@@ -37,12 +37,12 @@ _BROWS = (1.0, 0.75, 0.3, 0.1)
 _MOST_VERTICES = 12_000  # limit for all cards at LOD 0 together
 _OWN = ("hair", "beard")  # meshes that not all people have
 _ROWS = (99, 4, 3, 3)  # largest number of rows of a card at each LOD
-# Millimetres: shapes that move a mesh by less are left out.
+# Millimetres: shapes that move no vertex of a mesh farther than this are left out.
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # millimetres in a centimetre
 _OVERDONE = np.float32(1.4)  # factor on the controls of an expression; each control stays at most 1
-# Expression added to all others in the test of the beard, and its weight. Its folds of skin reach
-# most of the beard.
+# Expression that is added to all others when the beard is tested, and its weight. The expression
+# folds the skin under most of the beard.
 _WIDEST, _OVER = "smile_open", np.float32(0.5)
 _COIL = 1.6  # mm: radius of the coils of an afro 4 cm long
 _PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1

@@ -54,7 +54,7 @@ def _roots(
     even: bool = True,
     fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
-    """Roots inside an uneven hairline, and float64[n], their distances inside it in decimetres.
+    """Roots behind an uneven hairline, and float64[n], their distances from it in decimetres.
 
     Short hair (`even` False) is denser where it lies flat, and sparser where it stands up. Long
     hair is denser at the hairline and, with `fine` 1, at a parting.
@@ -62,7 +62,8 @@ def _roots(
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
-    # Wide waves round the corners at the temples, and leave single hairs in front of the line.
+    # Wide waves in the hairline make its corners at the temples round, and leave single hairs in
+    # front of the line.
     if even:
         inside = inside + 0.016 * wavy(man, random, 1.6)
     density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)

@@ -99,7 +99,8 @@ def make_strips(
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
-    # If a hair crosses the outward direction, its left side flips, and the card would fold.
+    # If a hair's direction passes through the outward direction, its left side changes its sign,
+    # and the card would fold.
     along = np.sign((side[:, 1:] * side[:, :-1]).sum(axis=2, keepdims=True))
     side[:, 1:] *= np.cumprod(np.where(along < 0, -1, 1), axis=1)
     if turns is not None:

@@ -51,7 +51,7 @@ class Surface:
     Attributes:
         positions: float64[V, 3] of the person, in decimetres.
         normals: float64[V, 3], unit normals of the person.
-        man: float64[V, 3], the man's positions, on which all maps of hair are defined. y and z are
+        man: float64[V, 3], the man's positions, by which the areas of hair are defined. y and z are
             relative to the middle of his left eye, x to the middle of the face.
         scale: size of the person's head relative to the man's.
     """

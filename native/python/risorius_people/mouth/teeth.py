@@ -108,8 +108,8 @@ class Arch:
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Frames of the arch: points, directions along it to the character's left, directions to
-        the lips.
+        """Points of the arch, its directions there to the character's left, and the directions
+        towards the lips.
 
         Args:
             way: float64[n], decimetres along the arch from the middle, positive on the left.
@@ -202,7 +202,8 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         p = base.positions[used]
         half = p[p[:, 0] > -1e-6]
-        # The edge is the outermost row on the biting side, found by an inclined plane through it.
+        # The edge is the outermost row of points on the biting side. The row is not level, so the
+        # points are compared with an inclined line that is fitted to the row in each round.
         edge = half
         for _ in range(6):
             slope = np.polyfit(edge[:, 2], edge[:, 1], 1)[0]

@@ -34,7 +34,8 @@ def over_lip(
     """
     at = positions[tongue] + units[OUT][tongue]
     lip = positions[rim]
-    # The tongue rises fully at the lip and in front of it, and not at all from _BEHIND behind it.
+    # The tongue rises fully at the lip and in front of it, and not at all at _BEHIND or more behind
+    # the lip.
     share = smooth_step((at[:, 2] - lip[:, 2].max()) / _BEHIND + 1.0)
     near = np.exp(-(((at[:, :1] - lip[None, :, 0]) / _EVEN) ** 2)) + 1e-12
     near /= near.sum(axis=1, keepdims=True)

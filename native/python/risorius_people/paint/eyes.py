@@ -32,7 +32,8 @@ def paint_eye(person: Person) -> Floats:
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    # darker beside dark skin, next to which the same white would seem to glow
+    # The sclera is darker if the skin is dark, because a white one would seem to glow beside dark
+    # skin.
     colour *= 1 - 0.23 * depth_of(person)
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)

@@ -66,7 +66,7 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
 def hairline_height(
     points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
 ) -> Floats:
-    """float64[n]: distance inside the hairline in decimetres, negative outside.
+    """float64[n]: distance from the hairline in decimetres, positive on the side with hair.
 
     Args:
         points: float64[n, 3], on the man's head.
@@ -106,7 +106,7 @@ def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
 
     Args:
         points: float64[n, 3], on the man's head.
-        eye: distance of his eye's middle from the middle of the face.
+        eye: decimetres from the middle of the face to the middle of his eye.
     """
     along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
     return along, points[:, 1] - brow_ridge(along)
@@ -139,7 +139,7 @@ def brow_density(points: Floats, eye: float) -> Floats:
 
     Args:
         points: float64[n, 3], on the man's head.
-        eye: distance of his eye's middle from the middle of the face.
+        eye: decimetres from the middle of the face to the middle of his eye.
     """
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))

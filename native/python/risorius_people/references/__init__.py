@@ -26,7 +26,7 @@ def shipped() -> Reference:
 
 
 def _path(options: RigOptions) -> Path:
-    """Path of a cached reference, named by a hash of the data and code, and one of the options."""
+    """Path of a cached reference; its name has a hash of data and code, and a hash of `options`."""
     known = hashlib.sha256(SHA256.encode() + fingerprint())
     for entry in sorted(Path(__file__).parent.rglob("*")):
         if entry.suffix in (".py", ".toml"):

@@ -176,7 +176,7 @@ class Hand:
             pattern: regular expression of the command or of the value's path.
             of_field: search for a value instead of a command.
             columns: horizontal places to search, as fractions of the width.
-            area: left, top, width, height of another area than the sidebar.
+            area: left, top, width, height of the area to search; None: the sidebar.
             step: vertical distance of the places, pixels.
 
         Raises:

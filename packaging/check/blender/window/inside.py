@@ -154,7 +154,7 @@ def state():
 
 
 def head():
-    """The visible mesh of the face with the most vertices."""
+    """The visible mesh that has the most vertices of all meshes of the face."""
     shown = [o for o in bpy.data.objects if o.get("risorius_rig") and o.type == "MESH"]
     shown = [o for o in shown if "dna_mesh" in o and o.visible_get()]
     return max(shown, key=lambda o: len(o.data.vertices))
@@ -239,7 +239,7 @@ def two_handles():
 
 
 def kept(key):
-    """A list property of the control armature; empty if it is missing."""
+    """A list property of the control armature; empty if the property is missing."""
     return list(rig()["risorius_controls"].get(key, ()))
 
 
@@ -350,7 +350,7 @@ def keyed_frames_of_active():
 
 
 def keyed_frames(controls=None):
-    """Frames at which a face's action has keys.
+    """Frames at which a face's action has keyframes.
 
     Args:
         controls: control armature; None takes the first face.
@@ -361,7 +361,7 @@ def keyed_frames(controls=None):
 
 
 def seen_keys(editor="DOPESHEET_EDITOR"):
-    """Frames of the keys that the timeline, or another editor in its place, shows."""
+    """Frames of the keyframes that the timeline, or another editor in its place, shows."""
     area = next(a for a in window().screen.areas if a.type == editor)
     region = next(r for r in area.regions if r.type == "WINDOW")
     with over(area, region):
@@ -370,7 +370,7 @@ def seen_keys(editor="DOPESHEET_EDITOR"):
 
 
 def curves_below():
-    """(data path, array index, [[frame, value], ...]) of each curve of the face's action."""
+    """(data path, array index, [[frame, value], ...]) of each F-curve of the face's action."""
     data = rig()["risorius_controls"].animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     keys = [(c.data_path, c.array_index, [list(p.co) for p in c.keyframe_points]) for c in curves]
@@ -378,13 +378,13 @@ def curves_below():
 
 
 def curves_of_empty():
-    """The curves of the Empty "Look Here", which the eyes follow."""
+    """The F-curves of the Empty "Look Here", which the eyes follow."""
     action = bpy.data.objects["Look Here"].animation_data.action
     return list(module("scene.base.compat").curves_of(action))
 
 
 def tweaks():
-    """Whether a tweak is active."""
+    """Whether a tweak of the face's animation is active."""
     return module("scene.animation.tweaks").of(rig()["risorius_controls"]) is not None
 
 
@@ -492,7 +492,7 @@ def leave():
 
 
 def answer():
-    """Answer all waiting questions. Returns the seconds until Blender's timer calls again."""
+    """Answer all requests of drive.py. Returns the seconds until Blender's timer calls again."""
     while True:
         path = TALK / f"ask-{_next[0]}.json"
         if not path.exists():

@@ -114,7 +114,7 @@ def save_as(hand: Hand, path: Path) -> None:
 
 
 def _write(hand: Hand, region: str, column: float, text: str) -> None:
-    """Type text into the field of a region of the file browser, then move over the file list.
+    """Type text into a field of the file browser, then move the pointer over the file list.
 
     Args:
         hand: the pointer.

@@ -96,7 +96,7 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Key rest, a blink, surprise and rest. Check the keys in all editors, and move a few."""
+    """Key rest, a blink, surprise and rest. Check the keyframes in all editors, and move a few."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -118,7 +118,7 @@ def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
-    """Check the keys in the dope sheet and in the graph editor, each filling the window."""
+    """Check the keyframes in the dope sheet and in the graph editor; each fills the window."""
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
     hand.ask("run", code=KEEP_EDITOR)

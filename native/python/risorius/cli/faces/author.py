@@ -195,7 +195,10 @@ def _spec(args: argparse.Namespace) -> Spec:
 
 
 def as_names(became: Assignment) -> list[str]:
-    """Lines of the TOML table [controls] with the assigned names; a comment counts known names."""
+    """Lines of the TOML table [controls]: a row for each expression, with its assigned controls.
+
+    The last line is a comment with the number of expression names that the program knew.
+    """
     lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
         expression = became.expressions.get(name)
@@ -245,13 +248,13 @@ def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
 
 
 def _tolerance(text: str) -> tuple[float, str]:
-    """(number, "mm" or "%") of an argument. Raises: ArgumentTypeError: it is neither."""
+    """(number, unit "mm" or "%") of an argument. Raises: ArgumentTypeError: not in this form."""
     unit = "%" if text.endswith("%") else "mm"
     return number(0.0, 100.0 if unit == "%" else 1e6)(text.removesuffix(unit).strip()), unit
 
 
 class _Clock:
-    """Prints the current step, and its progress at every tenth."""
+    """Prints the name of each step, and its progress whenever another 10 % are done."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._begin, self._last = quiet, time.monotonic(), -1.0
@@ -275,8 +278,8 @@ def opposites() -> tuple[tuple[str, str], ...]:
 
 
 def as_found(found: Found) -> list[str]:
-    """Lines of text: penetration, tears and folds of pairs of expressions without and with
-    correctives.
+    """Lines of text: the volume in which surfaces penetrate each other, and the numbers of torn and
+    folded faces, over all pairs of expressions, first without and then with the correctives.
     """
     a, b = found.before, found.after
     return [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --onto: transfers the expressions of a template to a head without any."""
+"""risorius author --onto: transfers a template's expressions to a head without expressions."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def check_arguments(args: argparse.Namespace) -> None:
         args: arguments of `risorius author`.
 
     Raises:
-        CommandLineError: names the option.
+        CommandLineError: options exclude each other; the error names one of them.
     """
     if args.onto is None:
         given = [name for name in _OWN if getattr(args, name) is not None]
@@ -118,7 +118,7 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def spec_of(args: argparse.Namespace) -> Spec:
-    """A spec of the head with the rig options of --rig.
+    """A spec of the head, with the rig options that the file of --rig contains.
 
     Args:
         args: checked arguments of `risorius author`.

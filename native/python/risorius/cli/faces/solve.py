@@ -128,7 +128,7 @@ def _counts(
 def _mesh(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace, take: Performance
 ) -> int:
-    """Index of the mesh with as many vertices as the take. Raises: InputError: there is none."""
+    """Index of the mesh with the take's number of vertices. Raises: InputError: none has it."""
     counts = _counts(dna, surface, args)
     found = take.frames.shape[1]
     for mesh, count in counts.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Differences of layer defn: names, the skeleton, the lists of each LOD."""
+"""Differences of layer defn: names, the skeleton, the elements that each LOD lists."""
 
 from __future__ import annotations
 

@@ -31,7 +31,8 @@ def correctives(
         raw, ml, pose_controls: the other parts of the control vector.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Labels are made before correctives are matched, so none of A's and B's share a number.
+    # Labels are made before correctives are matched. So no corrective of A has a number that a
+    # corrective of B also has.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)
@@ -51,7 +52,9 @@ def correctives(
 
 
 def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
-    """Labels of correctives, with the factors of a corrective that is a factor in brackets.
+    """Labels of correctives, e.g. "jaw * (brow * smile)".
+
+    A factor that is itself a corrective is written as its own factors in brackets.
 
     Args:
         factors: for each corrective, (control's index from the first corrective, label) per factor.
@@ -70,8 +73,8 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
     """Match the joints of faces a and b.
 
-    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then those
-    with the same index and neutral pose, count as renamed.
+    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then
+    unmatched joints with the same index and neutral pose, count as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)

@@ -67,7 +67,7 @@ def chain(noun: str, parts: Sequence[Space]) -> Space:
 
     Args:
         noun: noun for an element of the joined space.
-        parts: the spaces, in their order.
+        parts: the spaces, in the order in which they are joined.
     """
     first_a = np.cumsum([0] + [len(part.a) for part in parts])
     first_b = np.cumsum([0] + [len(part.b) for part in parts])

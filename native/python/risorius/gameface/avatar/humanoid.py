@@ -178,7 +178,7 @@ def place_of(name: str, head: Doubles, trunk: Doubles) -> Doubles:
     Args:
         name: name of the bone.
         head: float64[3], the head's joint, y up. If its height is not plausible above a ground at
-            0, as for a head near the origin, the ground is assumed 1.5 m below it.
+            y = 0, as for a head near the origin, the ground is assumed 1.5 m below it.
         trunk: float64[3], the lowest trunk joint of the face; added bones of the body have their x
             and z relative to it.
     """

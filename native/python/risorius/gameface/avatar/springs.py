@@ -137,7 +137,10 @@ def table_0(all_: Springs) -> dict[str, Any]:
 
 
 def _balls(one: Collider) -> list[dict[str, Any]]:
-    """A collider as spheres, because VRM 0.x has no capsules. Its z axis is opposite to glTF's."""
+    """A collider as spheres, because VRM 0.x has no capsules.
+
+    The z axis of VRM 0.x is opposite to the z axis of glTF.
+    """
     ends = [one.offset]
     if one.tail:
         middle = [(a + b) / 2 for a, b in zip(one.offset, one.tail, strict=True)]
@@ -146,5 +149,5 @@ def _balls(one: Collider) -> list[dict[str, Any]]:
 
 
 def _groups(all_: Springs) -> list[tuple[int, ...]]:
-    """Each different set of collider indices of the chains, once."""
+    """The sets of collider indices that chains use; each set is listed once."""
     return list(dict.fromkeys(tuple(s.colliders) for s in all_.springs if s.colliders))

@@ -43,7 +43,8 @@ class Manner:
     Attributes:
         look: preset lookLeft, lookRight, lookUp or lookDown -> rotation of the eyes in degrees;
             presets that do not turn the eyes are absent.
-        held: preset -> kinds of KINDS that a player fades out while the preset is on.
+        held: preset -> keys of KINDS; a VRM viewer fades out presets of these kinds while the
+            preset is on.
     """
 
     look: Mapping[str, float] = field(default_factory=dict)
@@ -78,7 +79,7 @@ class Avatar:
         said: the licence fields, from `licence.checked`.
         manner: the measured values of expressions.
         plain: number of a material -> its row of VRM 0.x's materialProperties, for materials that
-            have one in the file of the body.
+            have such a row in the body's file.
         springs: chains that swing, with their colliders.
     """
 
@@ -143,7 +144,7 @@ def _expression(avatar: Avatar, name: str) -> dict[str, Any]:
 
 
 def _ranges(manner: Manner) -> Iterator[tuple[str, float]]:
-    """Keys of the look-at ranges, and the rotation in degrees at which the expression is at 1."""
+    """Name of each VRM look-at range, and the eye rotation in degrees that gives weight 1."""
     sideways = [manner.look[n] for n in ("lookLeft", "lookRight") if n in manner.look]
     if sideways:
         mean = sum(sideways) / len(sideways)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Reads the meshes of a body with vertices in the scene's coordinates, posed by the skin at rest.
+"""Reads the meshes of a body, with vertices in the scene's coordinates.
 
-So the exported nodes of the meshes need neither scale nor rotation.
+A mesh with a skin is read in the rest pose of its joints. So the exported nodes of the meshes need
+neither scale nor rotation.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Piece:
         indices: int64[n], the vertex of each corner; None: each vertex is used once, in order.
         mode: glTF's code of the primitive's kind, e.g. 4 for triangles.
         material: number of its material in the body's file; -1 for none.
-        targets: per morph target, name of an attribute -> float32[V, 3], its change.
+        targets: for each morph target, name of an attribute -> float32[V, 3], change at weight 1.
     """
 
     values: dict[str, npt.NDArray[Any]]

@@ -71,7 +71,9 @@ class Body:
     notes: list[str] = field(default_factory=list)
 
     def above(self, name: str) -> int:
-        """The node of the nearest bone above a bone, or of the head's parent.
+        """Index of the node to which a bone of the face is attached.
+
+        It is the nearest ancestor bone that the body has; if there is none, the head's parent.
 
         Args:
             name: VRM 1.0 name of the bone.
@@ -93,7 +95,7 @@ def read_body(
         needs_all: True: all bones that VRM requires must exist; False: only the head.
 
     Raises:
-        GameFaceError: no skeleton, bones are missing, or no mesh has a name in `without`.
+        GameFaceError: no skeleton, bones are missing, or a name in `without` is unknown.
         AnimationFileError: the file is damaged; the error names the place in the file.
         BudgetError: the content is too large in proportion to the file.
     """
@@ -145,9 +147,9 @@ def _opened(path: Path) -> Document:
 def _kept(
     document: Document, holders: list[int], without: Sequence[str], faces: Set[str]
 ) -> tuple[list[int], list[str]]:
-    """The nodes whose meshes are exported, and the names in `without` of meshes of the face.
+    """The nodes whose meshes are exported, and the names in `without` that are face meshes.
 
-    Raises: GameFaceError: no mesh has a name in `without`.
+    Raises: GameFaceError: a name in `without` is no mesh of the body or the face.
     """
     rows, names = document.json["nodes"], dict[int, tuple[str, str]]()
     for number in holders:
@@ -186,7 +188,7 @@ def _facing(at: Mapping[str, Doubles], name: str) -> float:
 
 
 class _Nodes:
-    """The nodes to export: all except nodes with a mesh or a camera that are no joint.
+    """The nodes to export: bones, joints, and all nodes without a mesh or a camera.
 
     Parents of exported nodes and of meshes without a skin are exported too.
     """
@@ -261,5 +263,5 @@ def _quoted(name: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A target's name in lower case, without a prefix such as "Face." up to its last dot."""
+    """A target's name in lower case, without the text up to the last dot, such as "Face."."""
     return name.rpartition(".")[2].lower()

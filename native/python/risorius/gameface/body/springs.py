@@ -73,7 +73,7 @@ class _Reader:
         return Springs(out, colliders)
 
     def old(self, table: Mapping[str, Any]) -> Springs:
-        """Read VRM 0.x's table secondaryAnimation: each listed bone swings with all nodes below."""
+        """Read VRM 0.x's table secondaryAnimation: listed bones swing with all nodes below them."""
         at, colliders, groups = "VRM.secondaryAnimation", list[Collider](), list[list[int]]()
         for i, row in enumerate(_rows(table, "colliderGroups")):
             place, group = f"{at}.colliderGroups[{i}]", list[int]()

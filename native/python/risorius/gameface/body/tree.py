@@ -103,8 +103,8 @@ def bones_of(document: Document, tree: Tree, joints: set[int]) -> dict[str, int]
     Args:
         document: the file of the body, whose VRM extension lists the bones.
         tree: the nodes of the file.
-        joints: nodes that are joints of a skin. If the file has no VRM extension, bones are
-            recognised by the names of nodes, of these first.
+        joints: nodes that are joints of a skin. If the file has no VRM extension, the names of
+            nodes decide; `joints` and their ancestors are preferred to other nodes.
     """
     found = {name: node for name, node in _said(document) if node in tree.above}
     if found:

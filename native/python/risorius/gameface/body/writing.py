@@ -109,7 +109,7 @@ class _Writer:
         self._targets = dict[int, list[dict[str, int]]]()
 
     def skin(self, joints: list[int]) -> int:
-        """The number of the exported skin with these joints. Args: joints: nodes of the file."""
+        """The number of the exported skin with these joints. Args: joints: nodes of the body."""
         own = tuple(self._body.of_node[joint] for joint in joints)
         skins = self._glb.table.setdefault("skins", [])
         if own not in self._skins:

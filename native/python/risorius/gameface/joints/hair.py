@@ -74,7 +74,7 @@ class Cards:
 
     Attributes:
         of_vertex: int64[V], the card of each vertex.
-        root, tip: float64[cards], heights of the highest and the lowest vertex in metres.
+        root, tip: float64[cards], heights of each card's highest and lowest vertex in metres.
         middle: float64[cards, 3], mean of each card's vertices in metres.
         roots: float64[cards, 3], the highest vertex of each card in metres.
         hangs: bool[cards], whether the card is long and narrow enough to swing.
@@ -186,7 +186,7 @@ def _bundle(away: Doubles) -> Ints:
 
 
 def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
-    """Centre and radius in metres of a sphere fitted to the roots of hair, as a head's shape."""
+    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots."""
     guess = head + np.array([0.0, 0.07, 0.0])
     if len(roots) < _FEWEST:
         return guess, 0.08
@@ -202,7 +202,10 @@ def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
 def _line(
     hairs: Sequence[Hair], cards: Sequence[Cards], members: Sequence[npt.NDArray[np.bool_]]
 ) -> Doubles:
-    """float64[n, 3], joints of a bundle at evenly spaced heights, each at the mean of near hair."""
+    """float64[n, 3], joints of a bundle at evenly spaced heights.
+
+    Each joint is at the mean position of the bundle's hair near its height.
+    """
     picked = list(zip(hairs, cards, members, strict=True))
     top = float(np.mean(np.concatenate([one.root[member] for _, one, member in picked])))
     low = float(np.percentile(np.concatenate([one.tip[member] for _, one, member in picked]), 25))

@@ -22,10 +22,10 @@ _DEEP = 0.03  # metres
 def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     """Move the joints of a face onto a body; also returns float64[3], the face's motion in metres.
 
-    The midpoint of the eyes is moved to the midpoint of the body's eye bones. If either has no
-    eyes, the head joint is moved to the head bone. The head joints also decide the depth if the
-    body's eye bones are more than 3 cm deeper or less deep in the head. The face's root is replaced
-    by the node above the body's neck.
+    The midpoint of the face's eyes is moved to the midpoint of the body's eye bones. If the face or
+    the body has no eye bones, the head joint is moved to the head bone. The head joints also decide
+    the depth if the body's eye bones are more than 3 cm deeper or less deep in the head. The face's
+    root is replaced by the node above the body's neck.
 
     Args:
         skeleton: joints of the face alone.
@@ -55,6 +55,6 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
 
 
 def _apart(skeleton: Skeleton, body: Body, names: Sequence[str]) -> Doubles:
-    """float64[3], from the mean of the face's joints `names` to the mean of the body's bones."""
+    """float64[3], from the mean of the face's joints `names` to the mean of these body bones."""
     here = skeleton.places[[skeleton.bones[n] for n in names]].mean(axis=0)
     return np.asarray(body.places[[body.bones[n] for n in names]].mean(axis=0) - here)

@@ -39,7 +39,8 @@ class Skeleton:
         names: names of the n joints, the root first, parents before children.
         parents: index of each parent, -1 for the root.
         places: float64[n, 3], positions in metres in glTF's axes.
-        of_joint: int64[joints of the DNA file], the exported joint that moves each file's joint.
+        of_joint: int64[joints of the DNA file], index of the exported joint with which each of
+            them moves.
         head: index of the head's joint, which also moves vertices without a joint.
         turns: float64[n, 3, 3], rotation from each joint's axes to glTF's.
         bones: VRM name of a bone -> index of its joint.

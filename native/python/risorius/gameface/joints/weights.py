@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reduces skin weights to the number of joints per vertex that all glTF players support."""
+"""Reduces skin weights to the number of joints per vertex that all glTF viewers support."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def strongest(dense: Doubles) -> tuple[Ints, Doubles]:
     Weights are multiples of 1 / 255 and add up to 1.
 
     Args:
-        dense: float64[V, joints], all weights, for at least INFLUENCES joints; each vertex has one
-            above 0.
+        dense: float64[V, joints], all weights, for at least INFLUENCES joints; each vertex has a
+            weight above 0.
     """
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(dense, joints, axis=1)

@@ -38,7 +38,7 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
         column: from 1, or its header, for errors.
 
     Raises:
-        AnimationFileError: another form, 60 minutes or seconds.
+        AnimationFileError: not of this form; more than 23 hours, 59 minutes or 59 seconds.
     """
     match = _FORM.fullmatch(text.strip())
     if match is None:
@@ -62,8 +62,9 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 def infer_base(codes: Sequence[Timecode]) -> int | None:
     """Frames per second that the timecodes count, or None if it cannot be inferred.
 
-    A rate measured from the timecodes wins. If they never reach the next second, or lost too many
-    rows around it, the largest frame number decides, provided that only one usual rate fits it.
+    A rate measured from the timecodes wins. It cannot be measured if the timecodes never reach the
+    next second, or if too many rows are lost around each new second. Then the largest frame number
+    decides, provided that only one usual rate fits it.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
@@ -108,7 +109,7 @@ def _measured(
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
-    """Seconds of each timecode since midnight before the first; later midnights are counted.
+    """Seconds from the midnight before the first timecode to each timecode, also over midnights.
 
     Args:
         codes: from `parse`, in the order of the frames.

@@ -74,7 +74,7 @@ class _Bytes:
         return count
 
     def skip_list(self, depth: int) -> None:
-        """Skips a list of u16 if depth is 1, else a list of lists one level less deep."""
+        """Skips lists of u16. Args: depth: 1 for a list of u16, 2 for a list of such lists."""
         count = self.u32()
         if depth == 1:
             self.skip(2 * count)

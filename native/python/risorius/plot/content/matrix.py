@@ -40,7 +40,7 @@ class Block:
 
 
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
-    """The region of each joint group: the region of most joints that it moves.
+    """The region of each joint group: the region to which most joints of the group belong.
 
     Args:
         dna: the face.

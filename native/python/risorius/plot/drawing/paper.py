@@ -83,7 +83,7 @@ class Canvas:
         """Adds axes that show only their lower and left line.
 
         Args:
-            left, bottom: lower left corner of the axes, in inches from that of the canvas.
+            left, bottom: lower left corner of the axes, in inches from the canvas's corner.
             width, height: size of the axes in inches.
         """
         part = (left / self.width, bottom / self.height, width / self.width, height / self.height)

@@ -160,7 +160,7 @@ def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tupl
 
 
 def _slopes(corners: Floats) -> Floats:
-    """float64[F, 3, 3]: a, b, c of each corner's weight a x + b y + c; NaN for slivers."""
+    """float64[F, 3, 3]: a, b, c of a corner's barycentric weight a x + b y + c; NaN for slivers."""
     ahead, behind = np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
     along = ahead[:, :, 1] - behind[:, :, 1]
     across = behind[:, :, 0] - ahead[:, :, 0]
