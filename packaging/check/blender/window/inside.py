@@ -481,7 +481,7 @@ def redraw():
 
 def run(code):
     """Run Python code that prepares the scene."""
-    exec(code, globals())
+    exec(code, dict(globals()))  # names of one run must not replace functions of this file
     return True
 
 
