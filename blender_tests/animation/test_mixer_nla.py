@@ -207,7 +207,7 @@ STACKS = {
         ),
     ],
 }
-# Strip number -> channels that it lacks, which is the mask of its layer.
+# Strip number -> channels that the strip's action lacks. The mask of its layer excludes them too.
 LACKS = {2: ("b",), 3: ("a", "d")}
 
 

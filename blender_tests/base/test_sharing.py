@@ -329,7 +329,7 @@ def test_appended_beside_an_equal_face(textured, tmp_path):
 
 
 def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
-    """A .blend of an older version has a Text and images for each face, and unmarked images."""
+    """In a .blend of an older version, each face has its own Text and images without hashes."""
     first, second = scene.load(textured), scene.load(textured)
     second["risorius_dna"] = first["risorius_dna"].copy()
     for node in scene.meshes(second)[0].data.materials[0].node_tree.nodes:

@@ -69,7 +69,7 @@ def made_face():
 
 
 def shape(item, name):
-    """Vertices with a single key active, without the object's location."""
+    """Vertices of one shape key, with the object's rotation and scale but not its location."""
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)

@@ -255,7 +255,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """Rotations are keyed by I or auto-key, or not before the frame changes; a bake has them."""
+    """Rotations go into the tweak with and without keyframes, and a bake contains them."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)

@@ -339,7 +339,7 @@ def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Several processes write the same file, fill the same cache, or run the same batch."""
+    """Processes that run at once and write the same files must all succeed, with equal results."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
