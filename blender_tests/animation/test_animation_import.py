@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions, strips or layers of the controls at any rate, and are exported again."""
+"""Tests that clips are imported as actions, strips or layers, and exported again, at any rate."""
 
 import hashlib
 import importlib.util

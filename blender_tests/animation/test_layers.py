@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of animation on a face: it shows the values of risorius.Mixer and of Blender's NLA."""
+"""Tests that a face with layers of animation shows the values of risorius.Mixer and of the NLA."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a voice: the fewest that its curves need, or one on every frame if chosen."""
+"""Tests keyframes made from speech: the fewest that its curves need, or one on every frame."""
 
 import bpy
 import numpy as np

@@ -358,7 +358,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
 
 @pytest.fixture
 def kept(rig):
-    """The folder of pictures, emptied before and after the test."""
+    """The folder with cached pictures of expressions, emptied before and after the test."""
     folder = scene.submodule("scene.expressions.library").own_folder("thumbnails")
     for path in folder.iterdir():
         path.unlink()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad files give one sentence and leave no data behind; a missing wheel gives a sentence."""
+"""Tests that bad files and a missing wheel give an error sentence, and leave no data behind."""
 
 import builtins
 import io

@@ -114,7 +114,7 @@ def _far(before, now):
 
 
 def _try(rigs, hats, steps):
-    """Do steps on the first face; after each, all faces and hats must be as before."""
+    """Do steps on the first face; after each, all faces and attached empties must be as before."""
     first = rigs[0]
     wanted, whole = {}, {}
     for jaw in (0.2, 0.7):
