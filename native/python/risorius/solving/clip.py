@@ -3,9 +3,9 @@
 
 First each frame is solved alone, starting from the solution of the frame before: few controls
 within their limits that bring the face nearest to the mesh. A control's value has a price, so that
-noise alone does not set controls. Then the selected controls are solved without this price, all
-frames together, with a price on sudden changes of speed. The noise is measured, so that curves of a
-clean mesh are exact, and curves of a noisy mesh are smooth.
+noise alone does not set controls. Then the selected controls are solved with a far smaller price,
+all frames together, with a price on sudden changes of speed. The noise is measured, so that curves
+of a clean mesh are exact, and curves of a noisy mesh are smooth.
 """
 
 from __future__ import annotations
@@ -273,7 +273,8 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
     sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that the frames solved alone use may change, and their values have no price here.
+    controls that the frames solved alone use may change; the price of their values is only
+    `sparse` per unit.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
