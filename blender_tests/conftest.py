@@ -33,7 +33,7 @@ def installed():
 def kept_wheels():
     """Keep the files of wheels, which Blender deletes when an extension is disabled.
 
-    Unpacking them again takes longer than most tests; test_extension.py tests it in other
+    Unpacking them again takes longer than most tests; test_extension.py tests the deletion in other
     processes.
     """
     import addon_utils

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that look at a target, with lids; blinks; rotations of a body."""
+"""Tests eyes that look at a target, lids that follow them, blinks, and rotations of a body."""
 
 import math
 

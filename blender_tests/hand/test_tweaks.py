@@ -385,7 +385,7 @@ def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):
-    """After an import all keys of a take are selected, so such a selection is ignored."""
+    """A selection of all keys is not proposed as range, because an import selects all keys."""
     proposed = scene.submodule("ui.hand.operators").proposed_range
     points = scene.curves(scene.controls(rig))[0].keyframe_points
     for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):

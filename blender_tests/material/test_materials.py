@@ -586,7 +586,7 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """Drivers for the maps of a duplicate are sums without Python expressions.
+    """Drivers of the animated maps of a duplicated face are sums without Python expressions.
 
     scene/upkeep/duplicates.py makes them.
     """

@@ -430,7 +430,7 @@ def _noted(function, read):
 
 
 def test_a_deleted_live_key(pair):
-    """Without its live key, a Live face has no channels on the mesh, but joints still move it."""
+    """If the live key is deleted, joints still move the mesh in Live mode, but shapes do not."""
     pair.edit(live_deleted)
     pair.check()
 

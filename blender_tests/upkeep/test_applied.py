@@ -180,7 +180,7 @@ def test_the_main_steps_on_a_face_on_a_body_with_keys_of_its_own(small_file, tmp
 
 
 def _on_a_body(path):
-    """(armature, controls) of a face with real shape keys on the only bone of a rotated body."""
+    """(armature, controls) of a face in the mode KEYS on the only bone of a rotated body."""
     rig = scene.load(path, "KEYS")
     controls = scene.controls(rig)
     controls.scale = (1.5, 1.5, 1.5)
