@@ -102,9 +102,9 @@ def _repository(installed):
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or posed bones with real keys.
+    """The mode of the face: Direct mode, or posed bones with a shape key for each channel.
 
-    Test files about frames replace this fixture and add the mode with one live key.
+    Test files about frames replace this fixture and add the mode with one live shape key.
     """
     return request.param
 

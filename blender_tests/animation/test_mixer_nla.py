@@ -29,7 +29,7 @@ def new_curve(action, path, index=0):
 
 
 def keys(curve, frames, values):
-    """Replace all keys of a curve by linear keys."""
+    """Replace all keyframes of an F-curve by linear keyframes."""
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     pairs = np.column_stack([frames, values]).ravel()

@@ -290,7 +290,7 @@ def overridden_live(dna, folder):
 
 
 def overridden_keys(dna, folder):
-    """The face is an override of a linked face with real shape keys, with layers and keys."""
+    """The face is an override of a linked face in the mode KEYS, with layers and keyframes."""
     _overridden(dna, folder, "KEYS")
 
 
