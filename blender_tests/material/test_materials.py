@@ -25,7 +25,7 @@ def _materials(rig):
 
 
 def _shown(material):
-    """The input socket for the colour of a surface, or for the roughness of a film."""
+    """The socket for the colour of a material, or for the roughness of a clear film."""
     shader = looks.principled(material)
     if shader is not None:
         return shader.inputs["Base Color"]
