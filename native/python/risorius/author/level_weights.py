@@ -23,8 +23,8 @@ from .work import (
     resting,
 )
 
-# Expressions that move vertices along an arc are also fitted at the value 0.5: the weight of their
-# displacements there. Displacements at the value 1 have the weight 1.
+# Weight of the displacements at the control value 0.5, at which expressions that move vertices on
+# arcs are also fitted. Displacements at the value 1 have the weight 1.
 _HALVES = 1.5
 
 

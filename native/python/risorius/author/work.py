@@ -257,8 +257,8 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But vertices must keep following the same one,
-    because an animator may rotate the neck.
+    The fit cannot distinguish resting joints. But each vertex must keep following its
+    resting joint, because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])

@@ -102,7 +102,7 @@ def mouth_of(jaw: JawChange, turn: Doubles) -> Similar:
 def joint_shifts(
     dna: Dna, joint: int, jaw: JawChange, turn: Doubles, places: tuple[Doubles, Doubles]
 ) -> Doubles:
-    """float64[columns, 3]: the motion of the jaw joint on the target head by input, in world axes.
+    """float64[columns, 3]: shift of the jaw joint by each input on the target head, in world axes.
 
     The jaw rotates by the same angle on both heads. The motion of the teeth is scaled with the
     teeth, and the joint's translation is chosen so that the teeth make this motion.

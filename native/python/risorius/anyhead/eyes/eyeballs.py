@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Measures the distance of an eye's surface, with cornea, from its centre in any direction."""
+"""Measures the distance of an eye's surface, with cornea, from its centre in any direction.
+
+The target is the head to which expressions are transferred.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 
 A lid turns about an axis through the eye's centre, parallel to the line between both eye corners.
 The transferred motion is scaled so that the edges meet, and vertices inside the eye are lifted out.
+The target is the head to which expressions are transferred.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ class Eyelids:
         return self._gap(self.rest + displacement[self.vertices], turn)
 
     def cut(self, displacement: Doubles, turn: Doubles | None = None) -> float:
-        """The largest depth of the outside of the lids inside the eye, in the target's unit.
+        """The largest depth in the eye that the outer side of a lid reaches, in the target's unit.
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
@@ -346,8 +347,8 @@ class Eyelids:
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
-        """float64[n]: height by which the triangles of each vertex must rise to be `above` over
-        the eye. Only triangles outside the eye at rest count."""
+        """float64[n]: height by which the triangles of each vertex must rise to be `above` higher
+        than the eye's surface. Only triangles that are outside the eye at rest count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -385,7 +386,7 @@ class Eyelids:
         return np.asarray(points + lift[:, None] * ray)
 
     def _spread(self, need: Doubles) -> Doubles:
-        """The lifts with a smooth fall-off to neighbouring vertices, nowhere less than `need`."""
+        """float64[n]: heights by which vertices are lifted; `need` with a smooth fall-off."""
         lift = need.copy()
         a, b = self._edges.T
         count = np.bincount(a, minlength=len(lift)) + np.bincount(b, minlength=len(lift))

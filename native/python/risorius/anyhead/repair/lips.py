@@ -2,7 +2,8 @@
 """Closes the lips in poses that close the mouth, so that they meet and do not cut each other.
 
 At a point of contact, positions do not distinguish the upper from the lower lip, but the motion by
-jawOpen does. So the lips of a mesh of any topology are found by its expressions.
+jawOpen does. So the lips of a mesh of any topology are found by its expressions. The target is the
+head to which expressions were transferred.
 """
 
 from __future__ import annotations
@@ -171,7 +172,7 @@ class Lips:
         return float(np.nan_to_num(self.meeting(points).gap).max(initial=0.0))
 
     def deepest(self, points: Doubles) -> float:
-        """The largest depth of one lip inside the other beyond rest, in the target's unit.
+        """How much deeper one lip is inside the other than at rest, at most, in the target's unit.
 
         Args:
             points: float64[V, 3], vertex positions of the posed target.

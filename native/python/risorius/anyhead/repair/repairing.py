@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Repairs the expressions of a target one by one, and reports faults before and after."""
+"""Repairs expressions transferred to a head (the target), and reports faults before and after."""
 
 from __future__ import annotations
 

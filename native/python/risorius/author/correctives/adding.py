@@ -119,8 +119,8 @@ def _add_targets(
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
     for m in sorted(meshes):
         mesh = copy.copy(made[m])
-        # Skin and lashes get targets even if they have none yet because joints do all of their
-        # motion.
+        # Skin and lashes get targets even if they have no target yet, which is the case if joints
+        # do all of their motion.
         shaped = mesh.blend_shape_targets or m in skins or "lash" in dna.mesh_names[m].lower()
         if m in solids or not shaped:
             continue

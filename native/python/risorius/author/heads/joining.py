@@ -143,12 +143,12 @@ class _Joining:
         return assign([name for name in names if "+" not in name], self.edited)
 
     def turn_and_size(self) -> None:
-        """Turn all meshes of the head upright, and scale them to the size of a face."""
+        """Turn all meshes of the head upright, and scale them to the unit of the result."""
         self._turn()
         self._size()
 
     def take_standing(self) -> None:
-        """Keep the meshes unchanged, because they are upright and have the right size."""
+        """Keep the meshes unchanged, because they are upright and in the unit of the result."""
         self.left = 1
         points, shapes = self.face.mesh.positions, self.face.shapes
         self.height = face_height(points, shapes, self.became.controls)

@@ -64,7 +64,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
     """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
-    such node to it. Skinned or unused meshes give one entry with the identity."""
+    of these nodes to this node. Skinned or unused meshes give one entry with the identity."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
