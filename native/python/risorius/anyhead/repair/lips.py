@@ -161,7 +161,8 @@ class Lips:
         corners = lips[self.skin.triangles]
         both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
         middles = self.skin.points[self.skin.triangles[both]].mean(axis=1)
-        return len(np.unique(self._column(middles))) - 1 if len(middles) else 0
+        columns = self._column(middles)
+        return len(np.unique(columns[columns >= 0]))
 
     def widest(self, points: Doubles) -> float:
         """The widest gap between the lips, in the target's unit.
