@@ -56,7 +56,9 @@ def describe(rig: ArmatureObject) -> list[str]:
         )
         lines.append(line)
         if still:
-            lines.append("    " + words.say("Move nothing: {names}", names=", ".join(still)))
+            lines.append(
+                "    " + words.say("These channels move nothing: {names}", names=", ".join(still))
+            )
     return lines
 
 

@@ -55,7 +55,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         soft_max=4.0,
     )
     use_colour: bpy.props.BoolProperty(
-        name="Show What Is Left",
+        name="Show Remaining Distance",
         description="Paint what the controls cannot repeat onto the face, as the color attribute "
         "risorius_residual",
     )
@@ -130,9 +130,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
                 raise task.error or FaceError("nothing was solved")
             rig = parts.active_rig(context)
             if rig is None or rig.session_uid != self._face:
-                text = (
-                    "The solved face is no longer the active face: make it active and solve again."
-                )
+                text = "The solved face is no longer active: make this face active and solve again."
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
             self.start = float(self.first)
@@ -150,7 +148,10 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         worst = int(np.argmax(frames))
         return [
             words.say(
-                "Left over: {mean} mm, at most {most} mm; most of all in frame {frame}.",
+                (
+                    "Left over: {mean} mm (root mean square), at most {most} mm; the "
+                    "worst frame is {frame}."
+                ),
                 mean=f"{np.sqrt((frames**2).mean()):.3f}",
                 most=f"{solved.largest * mm:.3f}",
                 frame=self.first + worst,

@@ -63,7 +63,7 @@ ANGLES = (
     (
         "AUTO",
         "As the File Says",
-        ("Radians; angles that no head can turn are refused with a question"),
+        "Radians; angles that no head can turn stop the import with a message",
     ),
     ("RADIANS", "Radians", ""),
     ("DEGREES", "Degrees", ""),
@@ -127,7 +127,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     file_rate: bpy.props.FloatProperty(
         name="File Rate",
-        description="Frames per second of a file that does not state its rate; 0: as found",
+        description="Frames per second of a file that does not state its rate; 0: detect the rate",
         min=0.0,
         soft_max=240.0,
     )
@@ -138,7 +138,10 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     timecode_rate: bpy.props.FloatProperty(
         name="Timecode Rate",
-        description="Frames a second of the timecode, if the file does not show it; 0: as found",
+        description=(
+            "Frames per second of the timecode, if the file does not show "
+            "this rate; 0: detect the rate"
+        ),
         min=0.0,
         soft_max=240.0,
     )
@@ -150,9 +153,9 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     full_value: bpy.props.FloatProperty(
         name="Full Value",
         description=(
-            "Value of a full movement in the file: 100 for per cent, 255 for "
-            "bytes; 1 keeps all values. 0: like 1, but values far above 1 are"
-            " refused with a question"
+            "Value of a full movement in the file: 100 for per cent, 255 for bytes; "
+            "1 keeps all values. 0: like 1, but values far above 1 stop the import "
+            "with a message"
         ),
         min=0.0,
         soft_max=255.0,
@@ -165,7 +168,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     gains: bpy.props.StringProperty(
         name="Single Gains",
-        description="Factors of single controls or patterns of their names, as "
+        description="Factors of single controls or patterns of their names, such as "
         "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
     )
     smoothing: bpy.props.FloatProperty(

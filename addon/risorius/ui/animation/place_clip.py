@@ -20,7 +20,7 @@ from ..common import FaceOperator, face_controls, face_rig
 from ..words import say
 
 TARGETS = (
-    ("ACTION", "Action", "As the face's active action; the one before is kept"),
+    ("ACTION", "Action", "As the active action of the face; the earlier action is kept"),
     ("STRIP", "NLA Strip", "On a new NLA track"),
     ("LAYER", "Layer", "As a layer above the existing animation"),
 )
@@ -44,7 +44,8 @@ class PlacesClip(FaceOperator):
     start: bpy.props.FloatProperty(
         name="Start Frame",
         description=(
-            "Frame of time 0 of the animation: its first frame, or the start of its sound"
+            "Frame of the scene for time 0 of the animation, which is its first "
+            "frame or the start of its sound"
         ),
         default=1.0,
     )

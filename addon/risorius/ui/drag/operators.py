@@ -218,7 +218,7 @@ class RISORIUS_OT_drag(Operator):
             for name, change in self._held.moved(1 if self.single else 3)
         ]
         if self.single and not lines:
-            lines.append(say("No single slider moves this point nearer."))
+            lines.append(say("No single slider moves this point nearer to the target."))
         return lines
 
 

@@ -44,8 +44,8 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     megabytes: bpy.props.FloatProperty(
         name="Megabytes",
         description=(
-            "Largest size of the file in megabytes; textures, vertices and "
-            "levels are reduced until it fits. 0: no limit"
+            "Largest size of the file in megabytes; textures, vertices and levels "
+            "are reduced until the file fits. 0: no limit"
         ),
         min=0.0,
         max=1000.0,
@@ -57,30 +57,40 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
         name="Body",
         description="Bones to add for a body, without meshes",
         items=(
-            ("NONE", "None", "The joints that the face has"),
+            ("NONE", "None", "No bones for a body: only the joints of the face"),
             ("minimal", "Minimal", "The bones that a VRM needs"),
-            ("mixamo", "Mixamo", "All bones by Mixamo's names, as TalkingHead wants them"),
+            (
+                "mixamo",
+                "Mixamo",
+                (
+                    "All bones of a body with Mixamo's names, as the program "
+                    "TalkingHead requires them"
+                ),
+            ),
         ),
     )
     body_file: bpy.props.StringProperty(
         name="Body File",
         description=(
-            "A character in glTF or VRM with a skeleton, which the face is hung on; empty: none"
+            "File (glTF or VRM) of a character with a skeleton, to which the face is "
+            "attached; empty: none"
         ),
         subtype="FILE_PATH",
     )
     without: bpy.props.StringProperty(
         name="Leave Out",
-        description="Meshes of the body, such as its head, separated by commas",
+        description="Meshes of the body to leave out, such as its head, separated by commas",
     )
     use_springs: bpy.props.BoolProperty(
-        name="Springs", description="Long hair of a VRM swings", default=True
+        name="Springs", description="Let the long hair of a VRM swing", default=True
     )
     use_quantize: bpy.props.BoolProperty(
-        name="Quantize", description="Store vertices with 16 bits; most programs read this"
+        name="Quantize",
+        description="Store vertices with 16 bits; most programs can read such a file",
     )
     use_meshopt: bpy.props.BoolProperty(
-        name="Compress", description="Compress with meshoptimizer; not every program reads this"
+        name="Compress",
+        description="Compress with meshoptimizer; not every program can read such a file",
     )
     use_combinations: bpy.props.BoolProperty(
         name="Combinations",

@@ -153,7 +153,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
 
     def execute(self, context: Context) -> Result:
         if not Path(self.filepath).name:
-            self.report({"ERROR"}, words.say("Say into which file: there is no name."))
+            self.report({"ERROR"}, words.say("Enter a file name: no name was given."))
             return {"CANCELLED"}
         trouble = missing(self.format)
         if trouble:

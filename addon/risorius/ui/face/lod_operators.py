@@ -73,8 +73,8 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
             self.report(
                 {"WARNING"},
                 say(
-                    "The scene has no camera yet: the level of detail does not change until it "
-                    "has one."
+                    "The scene has no camera: the level of detail does not change "
+                    "until you add a camera."
                 ),
             )
         lods.follow_camera(rig, self.enable, _size(rig))

@@ -52,7 +52,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if not super().poll(context):
             return False
         if _posed_controls(context) is None:
-            cls.poll_message_set(say("Enter pose mode on the controls of a face first."))
+            cls.poll_message_set(say("Select the controls of a face and enter pose mode first."))
             return False
         return True
 

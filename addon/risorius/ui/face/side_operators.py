@@ -70,7 +70,7 @@ class RISORIUS_OT_copy_side(HandOperator, Operator):
 
 
 class RISORIUS_OT_link_sides(FaceOperator, Operator):
-    """Let one slider move both sides of the face with drivers; press again to free them"""
+    """Let one slider move both sides of the face with drivers; press again to unlink the sides"""
 
     bl_idname = "risorius.link_sides"
     bl_label = "Link Left and Right"

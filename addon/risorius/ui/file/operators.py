@@ -84,7 +84,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
-    """Read the file of the face again; asks for the file if it has moved"""
+    """Read the DNA file of the face again; opens a file browser if the file is missing"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"

@@ -64,7 +64,7 @@ class RISORIUS_OT_gaze_target(FaceOperator, Operator):
         rig, controls = face_rig(context), face_controls(context)
         if "eyes" not in controls.pose.bones:
             self.report(
-                {"ERROR"}, say("The controls have no bone for the target of the eyes any more.")
+                {"ERROR"}, say("The bone for the target of the eyes is missing from the controls.")
             )
             return {"CANCELLED"}
         if self.mode == "HEAD":

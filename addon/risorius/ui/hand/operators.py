@@ -277,7 +277,7 @@ class RISORIUS_OT_colour_curves(FaceOperator, Operator):
         actions = [a for a in compat.played_actions(controls) if a.library is None]
         count = sum(curve_colours.colour_action(controls, action) for action in actions)
         if not count:
-            self.report({"WARNING"}, say("This face has no curves of sliders."))
+            self.report({"WARNING"}, say("The sliders of this face have no F-curves."))
             return {"CANCELLED"}
         self.report({"INFO"}, say("{count} curves have the colours of their regions", count=count))
         return {"FINISHED"}

@@ -82,7 +82,7 @@ def _session(context: Context) -> sessions.Session:
 
 
 class RISORIUS_OT_live_stop(_Running, Operator):
-    """Stop live capture; a recording is finished or waits, the sliders return to their values"""
+    """Stop live capture, and finish a recording; the sliders return to their earlier values"""
 
     bl_idname = "risorius.live_stop"
     bl_label = "Stop"
@@ -97,7 +97,7 @@ class RISORIUS_OT_live_stop(_Running, Operator):
 
 
 class RISORIUS_OT_live_record(_Running, Operator):
-    """Begin a recording at the current frame, or end it as an action of the face"""
+    """Begin a recording at the current frame, or end it and make it an action of the face"""
 
     bl_idname = "risorius.live_record"
     bl_label = "Record"
@@ -243,7 +243,10 @@ def _finish(
         why = names.printable(str(error)).rstrip(".")
         operator.report(
             {"ERROR"},
-            say("{reason}. The recording waits: finish it in the panel.", reason=why),
+            say(
+                "{reason}. The recording waits in the panel Live Capture: finish it there.",
+                reason=why,
+            ),
         )
         return False
     if report is None:

@@ -307,7 +307,9 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
             self._redrawn = done
             redraw(current_context())
         return words.say(
-            "Pictures of shape keys: {done} of {count}. Esc ends it.", done=done, count=self._count
+            "Pictures of shape keys: {done} of {count} are drawn. Esc stops the drawing.",
+            done=done,
+            count=self._count,
         )
 
     def cancelled_text(self) -> str:

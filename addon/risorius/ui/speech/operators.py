@@ -145,8 +145,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
                 raise task.error or FaceError("nothing was heard")
             if not type(self).poll(context) or face_rig(context).session_uid != self._face:
                 text = (
-                    "Nothing was spoken, as the face is no longer active: select it, then "
-                    "use Speak from Audio again."
+                    "No speech was added, because the face is no longer active: "
+                    "select the face, then use Speak from Audio again."
                 )
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
