@@ -113,8 +113,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         bpy.props.StringProperty,
         name="Controls",
         description=(
-            "Controls that the layer moves, as names or patterns such as "
-            "jawOpen mouth*; -name excludes one"
+            "Controls that the layer moves, as names or patterns such as jawOpen "
+            "mouth*; -name excludes a control"
         ),
     )
     start: _still(bpy.props.FloatProperty, name="Start", default=1.0, description="Frame")
@@ -177,8 +177,8 @@ def register() -> None:
         name="Exclude Opposites",
         translation_context=tables.CONTEXT,
         description=(
-            "On a face with layers, keep opposite controls apart: closed lips"
-            " hold the jaw, a blink holds wide lids"
+            "On a face with layers, prevent that opposite controls act together: "
+            "closed lips hold the jaw, a blink lowers wide lids"
         ),
         default=True,
     )

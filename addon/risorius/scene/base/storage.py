@@ -142,8 +142,8 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if int(said) > _most(packed):
         raise ContentError(
             told(
-                "its file is said to have {said:,} bytes, {most:,} can be in the {packed:,} "
-                "that are there",
+                "its stored length is {said:,} bytes, but its {packed:,} packed "
+                "bytes can contain at most {most:,}",
                 said=int(said),
                 most=_most(packed),
                 packed=len(packed),

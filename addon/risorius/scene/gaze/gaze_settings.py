@@ -42,16 +42,16 @@ def _all() -> dict[str, object]:
         ),
         "risorius_body_turn": bpy.props.FloatProperty(
             name="Body's Turn",
-            description="Share of the turn of the body's neck and head that the face follows",
+            description="Share of the rotation of the body's neck and head that the face follows",
             default=1.0,
             **shared,
         ),
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
             description=(
-                "Fill the raw controls of head and neck rotations from their "
-                "joints, so that poses of the file repair neck and jaw. Off: "
-                "the sliders of these controls lead"
+                "Set the raw controls of head and neck rotation from the joints, so "
+                "that the corrective poses of the DNA file correct neck and jaw. "
+                "Off: their sliders set these raw controls"
             ),
             default=True,
             override=_OVERRIDE,

@@ -19,7 +19,7 @@ from .place_clip import PlacesClip
 
 
 class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
-    """Find control curves that repeat a moving mesh with the topology of the face"""
+    """Find curves of the controls that repeat the motion of a mesh with the topology of the face"""
 
     bl_idname = "risorius.curves_from_mesh"
     bl_label = "Control Curves from Mesh"
@@ -28,7 +28,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     source: bpy.props.StringProperty(
         name="Object",
         description=(
-            "Mesh with the vertices of the face; empty: the selected mesh, or the only one"
+            "Mesh with the same number of vertices as the face; empty: the selected "
+            "mesh, or the only such mesh"
         ),
         options={"SKIP_SAVE"},
     )
@@ -37,7 +38,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     use_relative: bpy.props.BoolProperty(
         name="Movement Only",
         description=(
-            "Use the motion of the mesh and not its form: for another face of the same topology"
+            "Use the motion of the mesh and ignore its form: for another face of the same topology"
         ),
     )
     sparse: bpy.props.FloatProperty(
@@ -56,8 +57,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     )
     use_colour: bpy.props.BoolProperty(
         name="Show Remaining Distance",
-        description="Paint what the controls cannot repeat onto the face, as the color attribute "
-        "risorius_residual",
+        description="Colour the face by the distance to the mesh that the controls "
+        "cannot remove, as the color attribute risorius_residual",
     )
 
     @classmethod

@@ -393,7 +393,10 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
     )
     source: bpy.props.StringProperty(
         name="Object",
-        description="A mesh whose shape keys move; empty: the selected one, else the only one",
+        description=(
+            "A mesh whose shape keys move; empty: the selected mesh, or the "
+            "only mesh with animated shape keys"
+        ),
         options={"SKIP_SAVE"},
     )
 

@@ -37,7 +37,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         name="Parts",
         description="Parts to bake; other parts keep their current state",
         items=(
-            ("BONES", "Bones", "Bones and location of the deforming armature"),
+            (
+                "BONES",
+                "Bones",
+                "Bones of the deforming armature, and the transform of the armature",
+            ),
             ("SHAPES", "Shapes", "Shape keys of the meshes"),
             ("MAPS", "Maps", "Values of the animated maps, which materials read"),
         ),

@@ -68,7 +68,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     influences: bpy.props.IntProperty(
         name="Influences",
         description=(
-            "Most joints of a vertex. Engines take 4 or 8; 0 writes all, as Blender shows them"
+            "Largest number of joints per vertex. Engines take 4 or 8; 0 writes all, "
+            "as Blender shows them"
         ),
         default=0,
         min=0,
@@ -84,8 +85,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     lod_groups: bpy.props.BoolProperty(
         name="LOD Groups",
-        description="Write also the coarser levels that were built, in groups between which an "
-        "engine changes by distance",
+        description="Also write the coarser levels that were built, in groups; an "
+        "engine chooses a group by distance",
     )
     bake_materials: bpy.props.BoolProperty(
         name="Bake Materials",

@@ -23,7 +23,9 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
 
     lod: bpy.props.IntProperty(
         name="Level",
-        description="0 is the finest; for renders -1 follows the viewport",
+        description=(
+            "0 is the finest level; -1, for renders only: the same level as in the viewport"
+        ),
         min=-1,
         max=31,
         options={"SKIP_SAVE"},
@@ -31,7 +33,7 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
     target: bpy.props.EnumProperty(
         name="Where",
         items=(
-            ("BOTH", "Everywhere", "In the viewport, and renders follow it"),
+            ("BOTH", "Everywhere", "In the viewport and in renders"),
             ("VIEWPORT", "Viewport", "In the viewport; renders keep their own level"),
             ("RENDER", "Render", "In renders only"),
         ),

@@ -38,7 +38,7 @@ def _posed_controls(context: Context) -> ArmatureObject | None:
 
 
 class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
-    """Paste the copied pose with left and right swapped, with the sliders of the face"""
+    """Paste the copied pose with left and right swapped, including the sliders of the face"""
 
     bl_idname = "risorius.paste_pose_flipped"
     bl_label = "Paste Pose Flipped, with Sliders"

@@ -24,7 +24,7 @@ _copied: dict[str, float] = session.table("side_operators.copied", ("unregister"
 def _only_region() -> object:
     return bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 

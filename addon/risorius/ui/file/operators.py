@@ -118,8 +118,8 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     bl_idname = "risorius.export_dna"
     bl_label = "Export DNA"
     bl_description = (
-        "Write this face's DNA file: byte for byte as imported, with your edits of shape keys, "
-        "neutral vertices, joints and weights"
+        "Write this face's DNA file: unchanged since the import, except for your "
+        "edits of shape keys, neutral vertices, joints and weights"
     )
     bl_options = {"PRESET"}
 

@@ -54,7 +54,7 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -85,7 +85,7 @@ def _of_region(context: Context, region: str) -> list[str]:
 
 
 class RISORIUS_OT_breakdown(HandOperator, Operator):
-    """Set a pose between the poses before and after; move the mouse, click to keep it"""
+    """Set a pose between the poses before and after; move the mouse, click to keep the pose"""
 
     bl_idname = "risorius.breakdown"
     bl_label = "Breakdowner"
@@ -121,7 +121,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -225,7 +225,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
 
 class RISORIUS_OT_tweak(FaceOperator, Operator):
-    """Tweak a range of frames in a layer of its own; keys stay; press again to end the tweak"""
+    """Tweak a range of frames in a separate layer; keys stay; press again to end the tweak"""
 
     bl_idname = "risorius.tweak"
     bl_label = "Tweak over a Range"
@@ -266,7 +266,7 @@ class RISORIUS_OT_tweak(FaceOperator, Operator):
 
 
 class RISORIUS_OT_colour_curves(FaceOperator, Operator):
-    """Sort the F-curves of the face into groups by region, each with its colour"""
+    """Sort the F-curves of the face into groups by region; each group gets a colour"""
 
     bl_idname = "risorius.colour_curves"
     bl_label = "Colour Curves by Region"

@@ -209,7 +209,7 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
 
 
 class RISORIUS_OT_live_subject(_Running, Operator):
-    """Follow this subject"""
+    """Let the face follow this person"""
 
     bl_idname = "risorius.live_subject"
     bl_label = "Follow"

@@ -26,8 +26,8 @@ class _Learns(FaceOperator):
     most_gain: bpy.props.FloatProperty(
         name="Most Gain",
         description=(
-            "Largest factor of a control; a control that needs more stays as "
-            "captured. Lids may have 2"
+            "Largest factor of a control; a control that needs a larger factor stays "
+            "as captured. The limit for lids is at least 2"
         ),
         default=1.6,
         min=1.0,
@@ -59,7 +59,7 @@ class _Learns(FaceOperator):
 
 
 class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
-    """Learn the range of each control of this person, so that blinks close the eyes"""
+    """Learn the range of each control from a capture of a person, so that blinks close the eyes"""
 
     bl_idname = "risorius.learn_range"
     bl_label = "Learn Range"
@@ -181,7 +181,7 @@ class RISORIUS_OT_save_range(_HasRange, Operator, ExportHelper):
 
 
 class RISORIUS_OT_forget_range(_HasRange, Operator):
-    """Remove the range of this face; captures stay as captured"""
+    """Remove the range of this face; captures are then not stretched"""
 
     bl_idname = "risorius.forget_range"
     bl_label = "Forget Range"

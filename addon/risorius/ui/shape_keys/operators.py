@@ -115,7 +115,7 @@ class RISORIUS_OT_assign_shape_key(Says, Operator):
     way: bpy.props.EnumProperty(name="Becomes", items=WAYS)
     becomes: bpy.props.StringProperty(
         name="Control or Expression",
-        description="A control, as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
+        description="A control, such as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
     )
 
     def execute(self, context: Context) -> Result:
@@ -191,7 +191,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -226,7 +226,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Load assignments of shape keys from a file of this list or of risorius author"""
+    """Load assignments of shape keys from a file that this list or risorius author wrote"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
@@ -267,7 +267,10 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
     )
     use_choices: bpy.props.BoolProperty(
         name="What Can Be Chosen",
-        description="Include controls without a key in the list of Choose",
+        description=(
+            "Also draw pictures of the controls that the button Choose "
+            "lists, including controls without a shape key"
+        ),
         options={"SKIP_SAVE"},
     )
 

@@ -138,7 +138,7 @@ class RISORIUS_OT_sound_set(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_sound_insert(_CorrectsSound, Operator):
-    """Insert a sound in the second half of the chosen one; the keys of the mouth follow"""
+    """Insert a sound in the second half of the chosen sound; the keys of the mouth follow"""
 
     bl_idname = "risorius.sound_insert"
     bl_label = "Insert Sound"

@@ -31,7 +31,7 @@ _FADE = 0.1  # seconds for fading in and fading out a voice's layer
 
 
 class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
-    """Let the active face speak a sound file; typed words make it better"""
+    """Let the active face speak a sound file; typed words improve the mouth movement"""
 
     bl_idname = "risorius.speak"
     bl_label = "Speak from Audio"
@@ -49,7 +49,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     intensity: bpy.props.FloatProperty(
         name="Intensity", description="Strength of mouth and brows", default=1.0, min=0.0, max=4.0
     )
-    seed: bpy.props.IntProperty(name="Seed", description="Seed of the blinks")
+    seed: bpy.props.IntProperty(name="Seed", description="Seed of the random times of the blinks")
     use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
     use_accents: bpy.props.BoolProperty(
         name="Accents", description="Move brows and head with stressed words", default=True
