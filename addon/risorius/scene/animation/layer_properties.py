@@ -55,10 +55,12 @@ class RISORIUS_PG_warp(bpy.types.PropertyGroup):
     frame: _still(
         bpy.props.FloatProperty,
         name="Frame",
-        description="Frame of the scene at which the layer shows the other frame",
+        description="Frame of the scene that is pinned to a frame of the layer",
     )
     source: _still(
-        bpy.props.FloatProperty, name="Shows", description="Frame of the layer's own animation"
+        bpy.props.FloatProperty,
+        name="Shows",
+        description=("Frame of the layer's animation that is pinned to a frame of the scene"),
     )
 
 
@@ -105,7 +107,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     regions: _still(
         bpy.props.EnumProperty,
         name="Regions",
-        description="Regions that the layer moves; none: all",
+        description="Regions that the layer moves; no region: all regions",
         items=REGIONS,
         options={"ENUM_FLAG"},
     )

@@ -253,7 +253,7 @@ class RISORIUS_OT_clear_landmarks(_OfLandmarks, Operator):
 
 
 class RISORIUS_OT_landmark_names(_OfLandmarks, Operator):
-    """Show the names of landmarks beside them in the 3D view, or hide them"""
+    """Show the names of the landmarks in the 3D view, or hide the names"""
 
     bl_idname = "risorius.landmark_names"
     bl_label = "Names of Landmarks"

@@ -30,7 +30,11 @@ from .landmark_operators import OfHead, head_there, hide_lines
 
 TEMPLATES = [
     ("SAMPLE", "Sample Man", "The sample man that is included in Risorius"),
-    ("FACE", "Face of the Scene", "The face that is selected beside the head, or the only one"),
+    (
+        "FACE",
+        "Face of the Scene",
+        ("The face that is selected together with the head, or the only face of the scene"),
+    ),
     ("FILE", "DNA File", "Any face with expressions"),
 ]
 _STAGES = {
@@ -46,7 +50,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
 
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_family: bpy.props.BoolProperty(
-        name="Take Others Along",
+        name="Include Related Meshes",
         description="Include other meshes of the same armature or parent object: eyes, teeth, hair",
         default=True,
     )

@@ -29,7 +29,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     kind: bpy.props.EnumProperty(
         name="Bake",
         items=(
-            (bake_face.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
+            (
+                bake_face.RESULT,
+                "Bones, Shapes, Maps",
+                "The face itself: the actions play without the add-on",
+            ),
             (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
         ),
     )

@@ -48,7 +48,7 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
             ),
             (
                 "SCALE",
-                "On the Head, to Size",
+                "On the Head, Scaled",
                 (
                     "Move the face to the head bone of the body, and scale the face to the "
                     "length of the body's neck"

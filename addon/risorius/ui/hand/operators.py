@@ -94,7 +94,11 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
     kind: bpy.props.EnumProperty(
         name="Towards",
         items=(
-            ("BREAKDOWN", "Breakdown", "Between the pose before (0) and the pose after (1)"),
+            (
+                "BREAKDOWN",
+                "Breakdown",
+                ("Place of the new pose: 0 is the pose before, 1 is the pose after"),
+            ),
             (
                 "NEIGHBOURS",
                 "Relax",

@@ -189,7 +189,7 @@ class RISORIUS_OT_live_discard(_Waiting, Operator):
 
 
 class RISORIUS_OT_live_neutral(_Running, Operator):
-    """Use the current face as the neutral face; it is subtracted from received faces"""
+    """Use the current face as the neutral face, which is subtracted from received faces"""
 
     bl_idname = "risorius.live_neutral"
     bl_label = "Neutral Now"

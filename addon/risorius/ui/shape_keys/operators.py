@@ -266,7 +266,7 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
     )
     use_choices: bpy.props.BoolProperty(
-        name="What Can Be Chosen",
+        name="Pictures of Controls",
         description=(
             "Also draw pictures of the controls that the button Choose "
             "lists, including controls without a shape key"

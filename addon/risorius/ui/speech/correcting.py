@@ -127,7 +127,7 @@ class RISORIUS_OT_sound_set(_CorrectsSound, Operator):
 
     sound: bpy.props.StringProperty(
         name="Phoneme",
-        description="A mouth such as M B P, or a phoneme such as AA",
+        description="A mouth shape such as M B P, or a phoneme such as AA",
         options={"SKIP_SAVE"},
     )
 
@@ -145,7 +145,7 @@ class RISORIUS_OT_sound_insert(_CorrectsSound, Operator):
 
     sound: bpy.props.StringProperty(
         name="Phoneme",
-        description="A mouth such as M B P, or a phoneme such as AA",
+        description="A mouth shape such as M B P, or a phoneme such as AA",
         default="AH",
         options={"SKIP_SAVE"},
     )

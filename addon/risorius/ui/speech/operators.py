@@ -47,7 +47,11 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         name="Text", description="A text of this file that holds the transcript"
     )
     intensity: bpy.props.FloatProperty(
-        name="Intensity", description="Strength of mouth and brows", default=1.0, min=0.0, max=4.0
+        name="Intensity",
+        description="Strength of the motion of mouth and brows",
+        default=1.0,
+        min=0.0,
+        max=4.0,
     )
     seed: bpy.props.IntProperty(name="Seed", description="Seed of the random times of the blinks")
     use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
@@ -135,7 +139,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Listening to {name}: {share} %, Esc cancels", name=name, share=share)
 
     def cancelled_text(self) -> str:
-        return words.say("Speech was cancelled.")
+        return words.say("Speak from Audio was cancelled.")
 
     def finish(self, context: Context) -> Result:
         """Place the animation on the face, unless the face was deleted or is not active."""
