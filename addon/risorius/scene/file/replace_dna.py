@@ -311,7 +311,7 @@ def _renew_board(
         change.report.append(told("New on the face board: {names}.", names=listed))
     if old - new:
         listed = names.listed(sorted(old - new))
-        change.report.append(told("Gone from the face board: {names}.", names=listed))
+        change.report.append(told("Removed from the face board: {names}.", names=listed))
 
 
 def _keep_report(change: Change) -> None:

@@ -95,7 +95,7 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     apart = np.flatnonzero(first != then)
     if len(apart):
         return labels[int(apart[0])]
-    return told("The turn of the head") if states[0][3:] != states[1][3:] else ""
+    return told("The rotation of the head") if states[0][3:] != states[1][3:] else ""
 
 
 def circle(rig: ArmatureObject) -> str:

@@ -31,13 +31,16 @@ def _all() -> dict[str, object]:
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
             description=(
-                "Amount by which both eyes turn towards the target itself; at 0 they stay parallel"
+                "Amount by which the eyes converge on the target; 0: the eyes stay parallel"
             ),
             **shared,
         ),
         "risorius_lids": bpy.props.FloatProperty(
             name="Lids Follow",
-            description="Motion of the lids with a gaze up or down, in addition to the rig",
+            description=(
+                "Strength of the lid motion with a gaze up or down, in "
+                "addition to the motion of the rig"
+            ),
             **shared,
         ),
         "risorius_body_turn": bpy.props.FloatProperty(

@@ -501,7 +501,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
             return
         if modifier.show_viewport or modifier.show_render:
             yield told(
-                "The modifier {modifier} of {mesh} comes before the armature.",
+                "The modifier {modifier} of {mesh} comes before the armature modifier.",
                 modifier=modifier.name,
                 mesh=item.name,
             )

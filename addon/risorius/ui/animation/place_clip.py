@@ -21,7 +21,7 @@ from ..words import say
 
 TARGETS = (
     ("ACTION", "Action", "As the active action of the face; the earlier action is kept"),
-    ("STRIP", "NLA Strip", "On a new NLA track"),
+    ("STRIP", "NLA Strip", "As a strip on a new NLA track"),
     ("LAYER", "Layer", "As a layer above the existing animation"),
 )
 RANGES = (
@@ -51,7 +51,7 @@ class PlacesClip(FaceOperator):
     )
     scene_range: bpy.props.EnumProperty(
         name="Scene Range",
-        description="Change of the first and last frame of the scene",
+        description="Choose whether the frame range of the scene changes",
         items=RANGES,
     )
 

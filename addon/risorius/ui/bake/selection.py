@@ -17,7 +17,7 @@ from ..common import FaceOperator, usable
 RANGES = (
     ("SCENE", "Scene", "The frame range of the scene"),
     ("PREVIEW", "Preview", "The preview range if it is set, otherwise the range of the scene"),
-    ("CUSTOM", "Custom", "Frames of your choice"),
+    ("CUSTOM", "Custom", "First and last frame of your choice"),
 )
 
 

@@ -154,7 +154,7 @@ class RISORIUS_OT_hide_handles(_SelectedOperator, Operator):
 
 
 class RISORIUS_OT_show_handles(FaceOperator, Operator):
-    """Show the hidden handles again, selected"""
+    """Show the hidden handles again, and select them"""
 
     bl_idname = "risorius.show_handles"
     bl_label = "Show Hidden Handles"

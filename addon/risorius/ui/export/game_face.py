@@ -31,11 +31,15 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     shapes: bpy.props.EnumProperty(
         name="Shapes",
         items=(
-            ("arkit", "ARKit", "The 52 units of ARKit"),
-            ("visemes", "Visemes", "The 15 visemes of Oculus lip sync"),
-            ("vrm", "VRM", "The preset expressions of VRM 1.0"),
-            ("expressions", "Expressions", "The expressions of Risorius"),
-            ("all", "All Controls", "Each control by its own name"),
+            ("arkit", "ARKit", "Morph targets for the 52 units of ARKit"),
+            ("visemes", "Visemes", "Morph targets for the 15 visemes of Oculus lip sync"),
+            ("vrm", "VRM", "Morph targets for the preset expressions of VRM 1.0"),
+            ("expressions", "Expressions", "Morph targets for the expressions of Risorius"),
+            (
+                "all",
+                "All Controls",
+                "A morph target for each control, with the name of the control",
+            ),
         ),
         options={"ENUM_FLAG"},
         default={"arkit", "visemes"},
@@ -51,14 +55,14 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
         max=1000.0,
     )
     use_skeleton: bpy.props.BoolProperty(
-        name="Skeleton", description="Joints of neck, head, jaw and eyes", default=True
+        name="Skeleton", description="Include joints for neck, head, jaw and eyes", default=True
     )
     body: bpy.props.EnumProperty(
         name="Body",
         description="Bones to add for a body, without meshes",
         items=(
             ("NONE", "None", "No bones for a body: only the joints of the face"),
-            ("minimal", "Minimal", "The bones that a VRM needs"),
+            ("minimal", "Minimal", "The bones of a body that VRM requires"),
             (
                 "mixamo",
                 "Mixamo",

@@ -36,7 +36,7 @@ class LicenceForm:
         name="Authors", description="Names of the authors, separated by commas"
     )
     avatar: _choice(
-        "Who May Use It",
+        "Who May Use the Avatar",
         ("onlyAuthor", "The Author", ""),
         ("onlySeparatelyLicensedPerson", "Persons with a Licence", ""),
         ("everyone", "Everyone", ""),
@@ -59,7 +59,7 @@ class LicenceForm:
         "Changes",
         ("prohibited", "Not Allowed", ""),
         ("allowModification", "Allowed", ""),
-        ("allowModificationRedistribution", "Allowed, and Passed On", ""),
+        ("allowModificationRedistribution", "Allowed, with Redistribution", ""),
     )
     licence_name: bpy.props.EnumProperty(
         name="Licence",

@@ -62,7 +62,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     all_shapes: bpy.props.BoolProperty(
         name="All Shapes",
-        description="Include shape keys that this range does not use",
+        description="Include shape keys that do not move in this frame range",
         default=False,
     )
     influences: bpy.props.IntProperty(

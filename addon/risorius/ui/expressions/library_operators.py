@@ -170,7 +170,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Regions to save; choose none for all regions that are not at rest",
+        description="Regions to save; no region: all regions that are not at rest",
         items=region_items,
         options={"ENUM_FLAG", "SKIP_SAVE"},
     )
@@ -297,7 +297,7 @@ class RISORIUS_OT_delete_expression(_OfOne, Operator):
 
 
 class RISORIUS_OT_star_expression(_OfOne, Operator):
-    """Favourites have a star and a category of their own"""
+    """Add this expression to the favourites, or remove it. Favourites have a star"""
 
     bl_idname = "risorius.star_expression"
     bl_label = "Favourite"

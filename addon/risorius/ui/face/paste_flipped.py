@@ -44,7 +44,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
     bl_label = "Paste Pose Flipped, with Sliders"
 
     selected: bpy.props.BoolProperty(
-        name="On Selected Only", description="Only onto selected bones", default=False
+        name="On Selected Only", description="Paste only onto selected bones", default=False
     )
 
     @classmethod

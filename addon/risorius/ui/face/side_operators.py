@@ -85,7 +85,10 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
             return False
         if face_controls(context).override_library:
             cls.poll_message_set(
-                say("The controls are a library override: Blender saves no drivers in it.")
+                say(
+                    "The controls are a library override: Blender saves no drivers "
+                    "in library overrides."
+                )
             )
             return False
         return True

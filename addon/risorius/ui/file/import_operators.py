@@ -105,7 +105,9 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         name="Custom Normals", description="Keep the file's own normals", default=True
     )
     use_materials: bpy.props.BoolProperty(
-        name="Materials", description="Build skin, eyes, teeth and lashes", default=True
+        name="Materials",
+        description="Build materials for skin, eyes, teeth and lashes",
+        default=True,
     )
     use_textures: bpy.props.BoolProperty(
         name="Textures",
@@ -114,7 +116,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
     )
     texture_folder: bpy.props.StringProperty(
         name="Texture Folder",
-        description="Folder of textures with MetaHuman names; empty: beside the file",
+        description="Folder of textures with MetaHuman names; empty: the folder of the DNA file",
         subtype="DIR_PATH",
     )
     use_simple_materials: bpy.props.BoolProperty(

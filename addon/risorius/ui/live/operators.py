@@ -45,7 +45,7 @@ def _has_controls(cls: type[Operator], context: Context) -> bool:
 
 
 class RISORIUS_OT_live_start(Operator):
-    """Let the active face follow a capture app until you stop it"""
+    """Let the active face follow a capture app until you stop live capture"""
 
     bl_idname = "risorius.live_start"
     bl_label = "Start"

@@ -75,7 +75,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     gain: bpy.props.FloatProperty(
         name="Gain",
-        description="Factor of all received values of the face",
+        description="Factor by which all received values of the face are multiplied",
         default=1.0,
         min=0.0,
         max=3.0,

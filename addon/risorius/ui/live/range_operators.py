@@ -68,8 +68,8 @@ class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
     performance: bpy.props.BoolProperty(
         name="Performance",
         description=(
-            "The take shows acting: only blinks, and peaks that stop at one height "
-            "again and again, count as extremes. Off: the take goes to all extremes "
+            "The take shows acting: only blinks, and peaks that repeatedly stop at "
+            "the same height, count as extremes. Off: the take goes to all extremes "
             "one after another"
         ),
     )
@@ -100,7 +100,11 @@ class RISORIUS_OT_learn_range_live(_Learns, Operator):
     bl_label = "Learn from Live"
 
     seconds: bpy.props.FloatProperty(
-        name="Seconds", description="Seconds to learn from", default=30.0, min=2.0, max=60.0
+        name="Seconds",
+        description="Length of the live capture to learn from, in seconds",
+        default=30.0,
+        min=2.0,
+        max=60.0,
     )
 
     @classmethod

@@ -116,7 +116,7 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
 
     kind: bpy.props.EnumProperty(
         name="Kind",
-        description="Source of the motion",
+        description="Motion that the colours show",
         items=(
             ("POSE", "From Neutral", "Distance of the current pose from the neutral pose"),
             ("CONTROL", "Reach of a Control", "Motion of the neutral face by one control"),

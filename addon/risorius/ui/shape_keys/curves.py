@@ -70,7 +70,7 @@ class RISORIUS_OT_choose_curve(_OfCurves, Operator):
     """Find a control or expression to assign to a curve of the imported file"""
 
     bl_idname = "risorius.choose_curve"
-    bl_label = "Choose for a Curve"
+    bl_label = "Choose a Control for a Curve"
     bl_property = "choice"
 
     curve: bpy.props.StringProperty(name="Curve", options={"SKIP_SAVE"})

@@ -32,9 +32,9 @@ from . import shown
 
 WAYS = (
     ("CHOSEN", "Control or Expression", "Assign the chosen control or expression"),
-    ("NAME", "By Its Name", "Guess from the name of the key"),
-    ("OWN", "Control of Its Own", "A new control with the name of the key"),
-    ("NOTHING", "Leave Out", "Leave the key out of the rig"),
+    ("NAME", "By Its Name", "Guess the control from the name of the shape key"),
+    ("OWN", "Control of Its Own", "A new control with the name of the shape key"),
+    ("NOTHING", "Leave Out", "Leave the shape key out of the rig"),
 )
 _AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 

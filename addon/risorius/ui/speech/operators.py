@@ -41,7 +41,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in SOUNDS), options={"HIDDEN"}
     )
     transcript: bpy.props.StringProperty(
-        name="Transcript", description="Spoken words in English; empty: recognise them"
+        name="Transcript",
+        description=("Spoken words in English; empty: recognise the words in the sound"),
     )
     transcript_text: bpy.props.StringProperty(
         name="Text", description="A text of this file that holds the transcript"
@@ -68,13 +69,15 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     use_whole_frames: bpy.props.BoolProperty(
         name="Whole Frames",
-        description="Keys on the scene's frames only; off: the voice is sampled 60 times a second, "
-        "and keys lie between frames too",
+        description="Insert keys only on frames of the scene; off: the voice is "
+        "sampled 60 times per second, and keys lie between frames too",
         default=True,
     )
     use_every_frame: bpy.props.BoolProperty(
         name="Every Frame",
-        description="A key at each frame; off: as few keys with handles as the curves need",
+        description=(
+            "Insert a key at each frame; off: insert as few keys with handles as the curves need"
+        ),
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
