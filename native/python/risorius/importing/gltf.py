@@ -201,7 +201,7 @@ class Document:
         rows = self._viewed(indices, f"{at}.indices", kind, (count, 1))[:, 0].astype(np.int64)
         if count and rows.max() >= len(out):
             raise self.fail(
-                f"{at}.indices", f"a row below {len(out)} was expected, found {rows.max()}"
+                f"{at}.indices", f"row {rows.max()} was found, a row below {len(out)} was expected"
             )
         out[rows] = self._viewed(values, f"{at}.values", dtype, (count, out.shape[1]))
 
