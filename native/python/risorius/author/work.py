@@ -137,9 +137,7 @@ def begin(dna: Dna) -> Work:
     shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     if not columns:
-        raise ArgumentError(
-            "a face with controls that move its meshes was expected, found no such control"
-        )
+        raise ArgumentError("a face with controls that move it was expected, found none")
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
