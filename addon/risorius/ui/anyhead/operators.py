@@ -50,7 +50,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
 
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_family: bpy.props.BoolProperty(
-        name="Include Related Meshes",
+        name="Take Others Along",
         description="Include other meshes of the same armature or parent object: eyes, teeth, hair",
         default=True,
     )

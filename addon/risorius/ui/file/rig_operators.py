@@ -63,7 +63,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     )
 
     use_family: bpy.props.BoolProperty(
-        name="Include Related Meshes",
+        name="Take Others Along",
         description="Include other meshes of the same armature or parent object: eyes, teeth, hair",
         default=True,
     )
