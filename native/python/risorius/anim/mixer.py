@@ -323,7 +323,9 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
                 "repeat and reverse, was expected"
             )
     elif not still and end is not None:
-        raise ArgumentError(f"layers[{place}].end: a clip ends by its length, none was expected")
+        raise ArgumentError(
+            f"layers[{place}].end: a clip ends by its length, so that no end was expected"
+        )
     if start is None:
         start = -math.inf if still else first
     weight = layer.weight

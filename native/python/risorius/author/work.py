@@ -130,13 +130,15 @@ def begin(dna: Dna) -> Work:
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
         joint = int(np.argwhere(deltas[..., 6:9].any(axis=(0, 2)))[0, 0])
-        raise ArgumentError(f"joint {dna.joint_names[joint]} changes its size: not supported")
+        raise ArgumentError(
+            f"joint {dna.joint_names[joint]} is scaled by a control, which is not supported"
+        )
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
     shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     if not columns:
-        raise ArgumentError("a face with controls that move it was expected, found none that does")
+        raise ArgumentError("a face with controls that move it was expected, found none")
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)

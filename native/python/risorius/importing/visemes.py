@@ -411,7 +411,9 @@ def _pgo_word(lines: Lines) -> Word:
     if len(parts) == 3:
         parts.insert(0, "")
     if len(parts) != 4:
-        raise lines.fail("a word, its first and last frame and its phonemes' number were expected")
+        raise lines.fail(
+            "a word, its first frame, its last frame and the number of its phonemes were expected"
+        )
     start, end, count = (lines.count(part, "a frame or a number") for part in parts[1:])
     phonemes = []
     for _ in range(count):

@@ -402,6 +402,6 @@ def _bound(host: str, port: int) -> socket.socket:
                 f"Port {port} is in use: close the program that listens there, or take another."
             ) from error
         raise LiveError(
-            f"Port {port} at {host} cannot be listened to: {error.strerror}."
+            f"Risorius cannot listen at {host}, port {port}: {error.strerror}."
         ) from error
     return listener

@@ -134,7 +134,9 @@ def render_script(
     page = empty_page()
     viewer, boot = dict(_ELEMENT.findall(page)), _BOOT.search(page)
     if boot is None or "viewer" not in viewer:
-        raise WebError("this build's web page is of an older make: packaging/ship/web.sh renews it")
+        raise WebError(
+            "the web page in this build of Risorius is outdated: packaging/ship/web.sh renews it"
+        )
     table, files = _content(dna, name, looks, clip, sound)
     face = f'{{"table":{_json(table)},"files":{_json({**files, **viewer})}}}'
     return (

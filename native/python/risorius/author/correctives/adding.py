@@ -41,7 +41,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     raw, had = len(dna.raw_control_names), dna.psd_count
     others = len(dna.machine_learned_behavior.neural_networks) + len(dna.rbf_behavior.solvers)
     if sk.column_count(dna) > raw + had or others:
-        raise ArgumentError("a face without networks and solvers was expected")
+        raise ArgumentError("a face without neural networks and RBF solvers was expected")
     channel_of = _channels(dna)
     new = [row for row in correctives if frozenset(row[0]) not in channel_of]
     out = _with_channels(dna, [controls for controls, _ in new])

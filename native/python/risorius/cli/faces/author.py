@@ -234,7 +234,9 @@ def _size(spec: Spec, args: argparse.Namespace) -> None:
     if args.onto is not None:
         return
     if said and "dna" in spec.source:
-        raise CommandLineError(f"author: a DNA file has its size: {next(iter(said))} is of others")
+        raise CommandLineError(
+            f"author: {next(iter(said))} is not possible with a DNA file, which has a fixed size"
+        )
     if said:
         spec.source = {k: v for k, v in spec.source.items() if k not in ("height_mm", "scale")}
         spec.source |= said
