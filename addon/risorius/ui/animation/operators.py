@@ -368,10 +368,16 @@ def _gains(text: str) -> dict[str, float]:
 
 def lines_of(report: "native.Report") -> list[str]:
     """The sentences of an import report, without its list of absent controls."""
-    lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
+    text = "{count} curves mapped by {mapping}."
+    lines = [words.say(text, count=len(report.mapped), mapping=report.mapping)]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
-    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]
-    return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
+    lines += [_as_line(f"{words.local(head)}: {', '.join(names)}") for head, names in told]
+    return [*lines, *(_as_line(words.local(note)) for note in report.notes)]
+
+
+def _as_line(text: str) -> str:
+    """The text with a capital letter at the beginning and a full stop at the end."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 class RISORIUS_FH_animation(FileHandler):

@@ -231,7 +231,7 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
             if not bpy.app.background:
                 framing.frame(context, rig)
         for sentence in notes[:5]:
-            self.report({"INFO"}, sentence)
+            self.report({"INFO"}, words.local(sentence))
         return done
 
     def draw(self, context: Context) -> None:

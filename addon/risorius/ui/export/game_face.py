@@ -163,7 +163,7 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         for note in made.notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, words.local(note))
         count = len(made.files[out.name])
         self.report({"INFO"}, words.say("{name}: {count:,} bytes", name=out.name, count=count))
         return {"FINISHED"}

@@ -214,9 +214,9 @@ def show_made(
         if not material.users:  # replaced by a material of the head
             bpy.data.materials.remove(material)
     for sentence in made.shapes.notes:
-        operator.report({"INFO"}, sentence)
+        operator.report({"INFO"}, words.local(sentence))
     for sentence in made.odd[:5]:
-        operator.report({"WARNING"}, sentence)
+        operator.report({"WARNING"}, words.local(sentence))
     rig = made.rig
     operator.report(
         {"INFO"},

@@ -157,7 +157,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
                 )
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
-            notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
+            told = task.result.metadata.get("notes", "").split("; ")
+            notes = [words.local(note) for note in told if note]
             name = Path(self.filepath).stem
             few = 0.0 if self.use_every_frame else self.tolerance
             action = self.place(

@@ -212,7 +212,7 @@ def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
 
 def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
     count = len({name for part in parts for name in part.shapes})
-    return [f"{counted(count, 'shape')} of the head itself left out"] if count else []
+    return [f"the head's own shapes are left out: {count:,}"] if count else []
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:

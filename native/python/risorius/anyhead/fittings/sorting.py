@@ -14,7 +14,6 @@ from ...author.heads.parts import HeadPart, first_vertices, taken_apart
 from ...author.heads.turning import Eye, take_eyes
 from ...author.input.obj import ObjMesh
 from ...base.errors import ArgumentError
-from ...base.words import counted
 from ..eyes.eyeballs import Eyeball
 from ..surface import Surface
 from .fitted import (
@@ -327,7 +326,11 @@ def _rows_of_teeth(row: Fitted, middle: float, notes: list[str]) -> list[Fitted]
     if low.all() or not low.any():
         hangs = JAW if low.all() else HEAD
         if len(low) == 1:
-            notes.append(f"{name} is one piece: it hangs on the {hangs}")
+            notes.append(
+                f"{name} is one piece: it follows the jaw"
+                if hangs == JAW
+                else f"{name} is one piece: it follows the head"
+            )
         row.part.name = f"{word}{'Lower' if hangs == JAW else 'Upper'}"
         return [Fitted(row.kind, row.part, "", hangs)]
     names = [f"{word}Upper", f"{word}Lower"]
@@ -356,5 +359,5 @@ def _said(out: Fittings) -> list[str]:
             notes.append(f"{', '.join(names)}: {words}")
     left = out.of(OTHER, SKIN)
     if left:
-        notes.append(f"{counted(len(left), 'mesh')} more hang on the head or on its skin")
+        notes.append(f"other meshes that follow the head or its skin: {len(left):,}")
     return notes

@@ -163,7 +163,7 @@ def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Mat
     index = webp.get("source") if isinstance(webp, dict) else texture.get("source")
     if index is None:
         names = ", ".join(extensions) or "no source"
-        out.notes.append(f"{out.name}: its {role} texture is left out: {names} is not read")
+        out.notes.append(f"{out.name}: its {role} texture is left out: {names} is not supported")
         return
     image = document.item("images", index, f"{out.name}.{role}")
     try:

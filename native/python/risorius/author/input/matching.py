@@ -174,10 +174,11 @@ def _said(value: sayings.Said) -> _Guess:
 
 def _twice(name: str, holder: str, controls: Sequence[str], own: str) -> str:
     meant = " and ".join(controls[:2]) + (" and more" if len(controls) > 2 else "")
-    same = " (their letters are the same)" if name.lower() == holder.lower() else ""
+    own = f"{name} becomes a control of its own, {own}; [controls] may say otherwise"
     return (
-        f"{holder} and {name} both mean {meant}{same}: {name} becomes a control of its own, {own}; "
-        "[controls] may say otherwise"
+        f"{holder} and {name} both mean {meant} (their letters are the same): {own}"
+        if name.lower() == holder.lower()
+        else f"{holder} and {name} both mean {meant}: {own}"
     )
 
 
