@@ -50,7 +50,7 @@ def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
     """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
 
     Args:
-        points: vertices of the LOD, at rest.
+        points: vertices of the LOD, in the rest pose.
         delta: float32[P, 3], the displacement of the vertices by the target, in metres.
     """
     found = list[float]()

@@ -454,7 +454,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; the mouth rests between words."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]

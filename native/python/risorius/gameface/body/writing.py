@@ -38,11 +38,14 @@ class Put:
 
 
 def frames(body: Body, version: str) -> tuple[Doubles, Doubles]:
-    """float64[n, 3], float64[n, 3, 3]: positions in metres and rotations of the exported nodes.
+    """Positions of the exported nodes in metres, and rotations from their axes to the scene's.
 
     Args:
         body: the body, facing along +z.
         version: VRM version; in "0.x" the body faces along -z, and no node is rotated.
+
+    Returns:
+        float64[n, 3] and float64[n, 3, 3].
     """
     if version == "0.x":
         return body.places * _FLIP, np.tile(np.eye(3), (len(body.names), 1, 1))
