@@ -32,7 +32,7 @@ class FitOptions:
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric
     threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
-    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # A joint does not move in an expression in which it would move every vertex by less than this
     # distance, in the mesh' unit.
     least_effect: float = 0.0
     # The result is the round with the smallest maximum error: among the second half of the rounds
@@ -77,8 +77,8 @@ def fit_joints(
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of the given joints.
-        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
-            all expressions.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must not move
+            in any expression.
         importance: float64[V], weight of a vertex' squared error; None: 1.
         pivots: points at which joints of some expressions are placed.
         options: options of the fit.
@@ -114,8 +114,8 @@ def fit_motions(
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of the given joints.
-        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
-            all expressions.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must not move
+            in any expression.
         weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
         at: index of the pivot of each new joint; None: the joint is placed in the middle of its

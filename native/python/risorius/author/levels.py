@@ -77,7 +77,7 @@ class _Merging:
     Attributes:
         points: float64[V, 4], vertices in homogeneous coordinates.
         weights: float64[V, J], skin weights of the joints that are still there.
-        motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
+        motions: float64[J, E, 3, 4], matrices from a vertex to its displacement by a joint.
         heirs: removed joint -> joint that took its vertices.
         there: bool[J], whether a joint is still there.
         can_leave: bool[J], whether a joint may be removed.

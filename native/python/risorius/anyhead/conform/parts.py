@@ -38,7 +38,7 @@ class Eye:
         radius: the radius on the source head.
         way: the similarity transform to the target head.
         joints: joints close to its centre, also joints of lids that slide on the eye.
-        holds: joints with more than half of the skin weights of the eyeball.
+        holds: the joint with more than half of the eyeball's skin weights; empty if none has.
     """
 
     middle: Doubles

@@ -39,8 +39,9 @@ class Turn:
 
     Attributes:
         name: name of the joint.
-        position: float64[3], the joint's position at rest.
-        motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
+        position: float64[3], the joint's position in the rest pose.
+        motions: raw control without prefix -> rotation [3, 3] from the rest pose about `position`,
+            and shift [3] of the position.
     """
 
     name: str
