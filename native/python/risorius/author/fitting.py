@@ -47,11 +47,15 @@ def bounded(options: FitOptions) -> FitOptions:
 
 
 def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:
-    """Rotation vectors and shifts of the joints, both float64[E, J, 3], of rigid motions.
+    """Split rigid motions into rotation vectors about the joints, and shifts of the joints.
 
     Args:
-        motions: float64[E, J, 3, 4], motion of each joint in each expression.
-        positions: float64[J, 3], positions of the joints.
+        motions: float64[E, J, 3, 4], motion of each joint in each expression, as a matrix from
+            neutral to posed positions.
+        positions: float64[J, 3], neutral positions of the joints.
+
+    Returns:
+        Both float64[E, J, 3]; an angle is in radians.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
     return rotation_vectors(motions[..., :3]), moved - positions

@@ -64,7 +64,7 @@ class Face:
     def rest(self, part: str) -> Floats:
         """The rest values of a part of the pose, one of PARTS.
 
-        The part "joints" has float32[joints, columns]; the other parts have float32[count].
+        The part "joints" has float32[joints, columns]; other parts have float32[n], one per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)

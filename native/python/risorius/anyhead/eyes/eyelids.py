@@ -95,7 +95,7 @@ class Eyelids:
         ball.keep(self._through)
 
     def _number(self) -> None:
-        """Number the edges and triangles of the lids by rows of `self.vertices`."""
+        """Store the edges and triangles of the lids as indices into `self.vertices`."""
         place = np.full(len(self._around), -1)
         place[self._lid] = np.arange(len(self._lid))
         self._own = place[self._triangles]  # -1: not a lid vertex

@@ -239,7 +239,9 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
 
 
 def look_turn(look: str) -> Doubles:
-    """float64[3, 3]: the usual rotation of an eye by a look control.
+    """float64[3, 3]: the usual rotation of an eye by a look control, from the rest pose.
+
+    It multiplies column vectors with x to the left, y up and z to the front.
 
     Args:
         look: key of LOOKS, the control's name without its side.

@@ -65,7 +65,7 @@ def find_skeleton(
 
     Args:
         dna: the face with its joints.
-        axes: float64[3, 3], maps the file's axes to glTF's.
+        axes: from parts.axes_of; maps the file's axes and unit to glTF's.
         kind: one of humanoid.KINDS, which adds missing bones; "": only joints of the face.
         is_body: whether to include the bones of the body that the face has.
         is_turned: whether bones have the axes of Mixamo's bones.
