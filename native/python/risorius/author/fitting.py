@@ -74,7 +74,7 @@ def fit_joints(
     progress: Progress | None = None,
 ) -> JointFit:
     """Fit positions and motions of new joints in addition to given joints, and weights of all
-    joints.
+    joints. A motion is a matrix from neutral to posed positions.
 
     Args:
         neutral: float64[V, 3], neutral vertices; the face's middle is x = 0.
@@ -112,6 +112,8 @@ def fit_motions(
     options: FitOptions | None = None,
 ) -> JointFit:
     """Fit positions and motions of new joints whose weights are known from another face.
+
+    A motion is a matrix from neutral to posed positions.
 
     Args:
         neutral: float64[V, 3], neutral vertices.
@@ -159,7 +161,7 @@ def fit_weights(
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of all joints.
-        motions: float64[E, J, 3, 4], motions of all joints.
+        motions: float64[E, J, 3, 4], matrices of all joints from neutral to posed positions.
         importance: float64[V], weight of a vertex' squared error; None: 1.
         mirrored: int64[J], the joint of the other side; None: found by place and motion.
         start: float64[V, J], weights to start with, for example of the finer mesh.

@@ -226,7 +226,7 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 
     Args:
         segments: phonemes from one decoder.
-        other: phonemes from the other decoder, in the same time.
+        other: phonemes from the other decoder, with times from the same beginning.
 
     Returns:
         Numbers from 0 to 1.

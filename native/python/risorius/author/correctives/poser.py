@@ -54,7 +54,7 @@ class Poser:
 
         Args:
             on: controls at 1.
-            corrected: whether to add the correctives in `added`.
+            corrected: whether to add the new correctives that the search put into `added`.
         """
         motions, columns, out = self.motions(on), self._active(on), []
         for number, mesh in enumerate(self._meshes):

@@ -97,7 +97,7 @@ def find_skeleton(
             humanoid.place_of(name, world[found["head"]], world[trunk]) if made else world[own]
         )
         turns.append(humanoid.turn_of(name) if is_turned else np.eye(3))
-    # Joints of the file that are below no exported bone move with this joint.
+    # Joints of the file that have no exported bone among their ancestors move with this joint.
     rest = number.get(humanoid.parent_of("neck", bones), 0)
     return Skeleton(
         [ROOT.get(kind, "Root"), *(humanoid.BONES[name].node for name in bones)],
