@@ -42,7 +42,8 @@ from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
-# Progress after each step, 0 to 1.
+# Finished share of the work, 0 to 1, after finding the face, reading the template, registering the
+# template onto the head, and transferring the displacements.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
 
 

@@ -153,7 +153,7 @@ def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]
     """The factor from the head's unit to cm, and notes on an unusual height.
 
     Args:
-        height: height of the face from the chin to the top, in the head's unit.
+        height: height from the chin to the top of the head, in the head's unit.
         unit: the unit of the file format.
         wishes: the user's unit, scale or height, which have precedence.
     """

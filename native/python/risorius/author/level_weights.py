@@ -75,7 +75,9 @@ def level_weights(
 
 
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
-    """Additional expressions that shift resting joints, so that vertices keep following them.
+    """Additional expressions that shift joints that no real expression moves, such as the neck.
+
+    Because of them, vertices keep following these joints.
 
     Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
         the source that the fit uses.

@@ -144,7 +144,7 @@ def joint_order(
     Args:
         positions: float64[V, 3], neutral vertices.
         weights: float64[V, J], skin weights.
-        rotations: float64[E, J, 3, 3], rotation of each joint in each expression.
+        rotations: float64[E, J, 3, 3], rotation of each joint in each expression, from neutral.
         translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.

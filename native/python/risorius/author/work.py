@@ -19,7 +19,7 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than
+# Shift in mm of an unmoved joint in carried_shifts(). A vertex that follows another neck joint than
 # in the source gets this error, because a rotated head separates such vertices about this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
@@ -44,7 +44,7 @@ class RigOptions:
     # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # A joint does not move in an expression in which it would move every vertex by less than this
     # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
@@ -106,7 +106,7 @@ class Work:
     names: list[str]  # names of these inputs
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
-    head: int  # the resting joint with the largest weights on moved vertices
+    head: int  # the joint that no expression moves with the largest weights on moved vertices
     wanted: dict[int, Doubles] = field(default_factory=dict)  # mesh -> [C, V, 3], released early
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
@@ -202,7 +202,9 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint with the largest sum of its weights times the motion of the vertices."""
+    """Of the joints that no expression moves, the one with the largest sum over the vertices of
+    its weight times the vertex' motion.
+    """
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -259,16 +261,16 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But each vertex must keep following its
-    resting joint, because an animator may rotate the neck.
+    The fit cannot distinguish these joints. But vertices must keep following the same one,
+    because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: for each joint, its own index if it rests, otherwise the index of the nearest
-    resting joint above it.
+    """int64[joints]: for each joint, its own index if no expression moves it, otherwise the index
+    of its nearest ancestor that no expression moves.
 
     Args:
         work: the face. New joints are included if their parents are chosen.
@@ -287,10 +289,9 @@ def carriers(work: Work) -> Ints:
 
 
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V, resting]: the fraction of a vertex' weights that each resting joint carries.
+    """float64[V, n]: the fraction of a vertex' weights that each of the n joints of resting() has.
 
-    It is the sum of the weights on the joints whose carriers() is the resting joint. Rows have the
-    sum 1.
+    It is the sum of the weights on the joints whose carriers() is this joint. Rows have the sum 1.
 
     Args:
         work: the face.
@@ -303,19 +304,19 @@ def carried_shares(work: Work, mesh: Mesh) -> Doubles:
 
 
 def carried_shift(work: Work) -> float:
-    """CARRIED_MM in the file's unit: the shift of resting joints in carried_shifts()."""
+    """CARRIED_MM in the file's unit: the shift of unmoved joints in carried_shifts()."""
     return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
-    """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
+    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.
 
     Args:
         work: the face; the parents of new joints must be known.
-        joints: n resting joints.
+        joints: n joints that no expression moves, see resting().
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
     out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])

@@ -133,7 +133,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
     Args:
         values: float32[n].
         names: names of the values; a value without a name is called "control" and its index.
-        first: index of the control that has the first value.
+        first: index of the control whose value is values[0].
     """
     return [
         {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Exports a face as one glTF file within a size: meshes, morph targets, materials, joints."""
+"""Exports a face as one glTF file within a size limit: meshes, targets, materials, joints."""
 
 from __future__ import annotations
 

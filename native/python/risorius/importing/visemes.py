@@ -378,7 +378,7 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Reads Papagayo's text file: voices with phrases with words with phonemes.
+    """Reads Papagayo's text file: voices, their phrases, the words of these, and their phonemes.
 
     Args:
         text: content of the file.
@@ -456,7 +456,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; the mouth rests between words."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]

@@ -210,7 +210,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject with the oldest place."""
+        """The latest frame of a subject; for "", of the subject that came first."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None

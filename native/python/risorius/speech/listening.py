@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the phonemes of a voice: cuts it in pauses, and aligns or recognises the pieces."""
+"""Finds the phonemes of a voice: cuts it at pauses, and aligns or recognises the pieces."""
 
 from __future__ import annotations
 

@@ -220,7 +220,7 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
         deep, wide = float(np.ptp(points[:, 2])), float(np.ptp(points[:, 0]))
         low = (points[:, 1].min() + points[:, 1].max()) / 2 < place.mouth_height
         full = len(points) > 30 and deep > 0.9 * wide and deep > 2.5 * place.unit
-        # A row of teeth is an arch with an empty middle, a tongue is not.
+        # A row of teeth is an arch with an empty middle; a tongue fills its middle.
         middle = np.abs(points[:, 0] - place.middle) < 0.15 * wide
         filled = np.ptp(points[middle, 2]) > 0.7 * deep if middle.any() else False
         return TONGUE if full and filled and low else TEETH

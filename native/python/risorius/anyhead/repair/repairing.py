@@ -64,7 +64,7 @@ def repair(
     """Repair expressions: close the lids and lips, and take skin out of eyes and teeth.
 
     Args:
-        target: the skin at rest, in cm, y up, the face towards +z.
+        target: the skin in the rest pose, in cm, y up, the face towards +z.
         faces: polygons of the skin.
         parts: eyes, teeth and other meshes; the notes of the report are added to its notes.
         landmarks: give the corners of the mouth; None: the corners are searched for.

@@ -186,7 +186,7 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
         except (binascii.Error, ValueError) as error:
             raise document.fail(place, f"base64 was expected: {error}") from error
     file = unquote(uri)
-    # Only files in the glTF's folder or below are read, as for buffers.
+    # Only files in the glTF's folder or below are read, because a URI could name any file.
     if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
         raise document.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
     try:

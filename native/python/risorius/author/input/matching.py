@@ -43,10 +43,10 @@ class Assignment:
 
 @dataclass(frozen=True)
 class _Guess:
-    """The meaning of a name: raw controls without prefix, an expression, and the source's rank.
+    """The meaning of a name: raw controls without prefix, an expression, and a rank.
 
-    Ranks: 0 the user, 1 ARKit or the head's main vocabulary, 2 another vocabulary, 3 a word,
-    4 unknown.
+    The rank shows the source of the meaning: 0 the user, 1 ARKit or the head's main vocabulary,
+    2 another vocabulary, 3 a plain word in the name such as "open", 4 none.
     """
 
     controls: tuple[str, ...] = ()

@@ -197,7 +197,7 @@ def _spec(args: argparse.Namespace) -> Spec:
 def as_names(became: Assignment) -> list[str]:
     """Lines of the TOML table [controls]: a row for each expression, with its assigned controls.
 
-    The last line is a comment with the number of expression names that the program knew.
+    The last line is a comment with the number of expression names that the program recognised.
     """
     lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
