@@ -28,7 +28,7 @@ from risorius_people.source import FACE_UNITS, TARGETS, BaseMesh, Source, fetch
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-HEADS, COMPONENTS, SEED = 1600, 40, 56
+HEADS, COMPONENTS, SEED = 1600, 120, 56
 STYLISED = 0.25  # fraction of heads with features stronger than those of people
 # Decimetres of the base mesh. Triangles below CUT in y or beyond WIDE in |x| are left out.
 CUT, WIDE = 5.75, 0.95
