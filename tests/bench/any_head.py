@@ -4,7 +4,7 @@
     python tests/bench/any_head.py [--heads 20] [--first 400] [--kind decimated] [--ict ict.npz]
         [--only registration]
 
-Every fourth head is an identity of ICT FaceKit, laid on by ICT's own skin; without its file these
+Every fourth seed is an identity of ICT FaceKit, laid on by ICT's own skin; without its file these
 rows are NOT RUN. The others are random people of the sample's generator, laid on by the man. KINDS
 of remeshing take turns; none of them welds the lips. Eyes and teeth are those that the program
 fits in. Contacts of ICT's heads are those of the default template's expressions.
@@ -53,7 +53,7 @@ from risorius_people.people import MAN
 MM = 10.0  # mm per cm
 KINDS = {"triangulated": 1.0, "decimated": 0.4, "scan": 1.0, "subdivided": 4.0, "dressed": 0.5}
 ICT = Path(__file__).parents[3] / "shared" / "data" / "real" / "ict" / "ict.npz"
-ICT_EACH, ICT_SKIN = 4, 11248  # every fourth head; the first vertices of ICT are its skin
+ICT_EACH, ICT_SKIN = 4, 11248  # every fourth seed; the first vertices of ICT are its skin
 CORNERS = (
     "eye_inner_L",
     "eye_inner_R",
@@ -211,8 +211,11 @@ def main() -> None:
     print(f"| head | {' | '.join(COLUMNS)} | misses | CPU s |\n|{'---|' * (len(COLUMNS) + 3)}")
     reached = ran = 0
     for number in range(args.heads):
-        seed, kind = args.first + number, args.kind or list(KINDS)[number % len(KINDS)]
-        of_ict = number % ICT_EACH == ICT_EACH - 1
+        seed, kind = (
+            args.first + number,
+            args.kind or list(KINDS)[(args.first + number) % len(KINDS)],
+        )
+        of_ict = seed % ICT_EACH == ICT_EACH - 1
         if of_ict and identities is None:
             print(f"| {seed} ICT | NOT RUN: {args.ict} |")
             continue
