@@ -172,10 +172,9 @@ def expressions(source: Source, true: TemplateFace, target: Surface, laid: Laid)
 
 def contacts(template, source: Source, target: Surface) -> list[float]:
     """The contacts after repair, as `risorius author --onto` makes them: the last of COLUMNS."""
-    part = HeadPart(
-        "head", ObjMesh(target.points, np.zeros((0, 2)), target.triangles.tolist(), []),
-        source="head",
-    )  # fmt: skip
+    faces = target.triangles.tolist()
+    mesh = ObjMesh(target.points, np.zeros((0, 2)), faces, [[] for _ in faces])
+    part = HeadPart("head", mesh, source="head")
     head = stand("head", [part], "cm", Wishes(), None)
     faults = contact.repaired(head, template, source.face).report.worst()
     return [faults.lid_gap, faults.cut, faults.lip_gap]
