@@ -19,7 +19,8 @@ GUI = [
     "CTRL_L_eye.ty",
     "CTRL_L_brow.ty",
 ]
-# input, output, from, to, slope, cut: a bent line, both halves of axes, a range in degrees
+# Rows (input, output, from, to, slope, cut) of the GUI table. Input 0 has two rows with different
+# slopes, inputs 3 and 4 drive different outputs up and down, and input 5 is in degrees.
 ROWS = [
     (0, 0, 0.0, 0.5, 0.5, 0.0),
     (0, 0, 0.5, 1.0, 1.5, -0.5),
@@ -70,7 +71,10 @@ def put(rig, **places):
 
 
 def raw_by_rows(gui, count=11):
-    """Raw controls from ROWS; of rows with one input and output, the first matching row counts."""
+    """Raw controls computed from ROWS.
+
+    Of rows with the same input and output, only the first whose range contains the input counts.
+    """
     raw, done = np.zeros(count), set()
     for control, out, low, high, slope, cut in ROWS:
         value = gui.get(GUI[control], 0.0)
@@ -90,7 +94,7 @@ def lead(rig):
 
 
 def shown(rig):
-    """The values of the face according to the add-on, by short names, without zeros."""
+    """Short name of a control -> its value according to the add-on; controls at 0 are left out."""
     values = scene.submodule("scene.character.sides").values_of(rig)
     return {name.rpartition(".")[2]: round(v, 5) for name, v in values.items() if v}
 
@@ -202,7 +206,7 @@ def test_switching_keeps_the_pose_and_says_what_is_lost(board_file):
     assert "risorius_lead" not in scene.controls(rig)
     assert len(scene.controls(rig).pose.bones) == 6  # a board is only made on request
     scene.add_board()
-    # Up and down at the same time share a handle; the larger value stays.
+    # One handle drives eyeLookUpL and eyeLookDownL, so only the larger of both values stays.
     expected = {"jawOpen": 0.4, "mouthCornerPullL": 0.6, "eyeLookUpL": 0.5}
     assert shown(rig) == expected
     keys = scene.submodule("scene.animation.board_keys")

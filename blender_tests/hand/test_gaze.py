@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that look at a target, with lids; blinks; rotations of a body."""
+"""Tests eyes that look at a target, lids that follow them, blinks, and rotations of a body."""
 
 import math
 
@@ -71,7 +71,7 @@ def eye(rig, side):
     """Centre and direction of an eye in world space, from the bone that deforms the skin."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # The direction that is -y at rest.
+    # The eye's direction is -y at rest.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (
@@ -213,7 +213,7 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A rotated body with base, neck and head bones at the places of the face's."""
+    """A rotated body with base, neck and head bones at the places of the face's bones."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)
@@ -316,7 +316,10 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
 
 
 def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
-    """The active object, or a selected one (an empty first), or the camera."""
+    """The active object is proposed; if it is the face, a selected object; else the camera.
+
+    Of several selected objects, an empty is proposed first.
+    """
     operators = scene.submodule("ui.hand.gaze")
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     empty = bpy.data.objects.new("empty", None)

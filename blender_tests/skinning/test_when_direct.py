@@ -37,7 +37,7 @@ def _smooth(head, place):
 
 
 def before(_rig, head):
-    """Enable a modifier before ours."""
+    """Add a modifier above the face's armature modifier."""
     return _smooth(head, 0)
 
 
@@ -48,7 +48,7 @@ def before_in_renders(_rig, head):
 
 
 def moved_down(_rig, head):
-    """Move our modifier below another one."""
+    """Move the face's armature modifier below another modifier."""
     modifier = head.modifiers.new("Mirror", "MIRROR")
     head.modifiers.move(0, 1)
 
@@ -85,7 +85,7 @@ def removed(rig, head):
 
 
 def of_another(rig, head):
-    """Assign another armature to our modifier."""
+    """Assign another armature to the face's armature modifier."""
     modifier = _armature(head)
     modifier.object = rig["risorius_controls"]
 
@@ -193,7 +193,7 @@ def key_edited_on_live(_rig, head):
 
 
 def basis_edited(_rig, head):
-    """Edit the rest form itself."""
+    """Move vertices of the basis shape key, which stores the neutral form."""
     points = head.data.shape_keys.reference_key.points
     for point in points[:20]:
         point.co.y -= 0.03
@@ -270,7 +270,10 @@ WHOLE_FACE = [rest_position, other_inheritance, bone_constraint]
 
 @contextmanager
 def _row(change):
-    """Add the row's name to a failure. All rows use one scene, because each change is undone."""
+    """Add the name of the tested change to an assertion that fails.
+
+    All changes are tested in one scene, because each is undone.
+    """
     try:
         yield
     except AssertionError as error:
@@ -344,7 +347,7 @@ def live_renamed(_rig, head):
 
 
 def live_moved(_rig, head):
-    """Move the live key to another place in the list."""
+    """Move the live key to another place in the list of shape keys."""
     _own_key(head)
     bpy.context.view_layer.objects.active = head
     head.active_shape_key_index = len(head.data.shape_keys.key_blocks) - 1
@@ -356,7 +359,7 @@ def live_deleted(_rig, head):
 
 
 def enabled(_rig, head):
-    """Enable our modifier, which Direct mode has disabled."""
+    """Enable the face's armature modifier, which Direct mode has disabled."""
     _armature(head).show_viewport = True
 
 
@@ -395,7 +398,7 @@ def test_a_mesh_stays_direct_through_an_edit(pair):
 
 
 def test_an_edited_rest_form(pair):
-    """A script's edit of the rest form becomes visible with the next update, in Live mode."""
+    """A script's edit of the basis shape key shows after the next update, as in Live mode."""
     pair.edit(basis_edited)
     pair.check()
     assert both_ways.is_direct(pair.direct)
@@ -427,13 +430,13 @@ def _noted(function, read):
 
 
 def test_a_deleted_live_key(pair):
-    """Without its live key, a Live face has no channels on the mesh, but joints still move it."""
+    """If the live key is deleted, joints still move the mesh in Live mode, but shapes do not."""
     pair.edit(live_deleted)
     pair.check()
 
 
 def test_another_object_with_the_same_data_keeps_the_rest_form(pair):
-    """The face's mesh gets its own data, as in Live mode."""
+    """If another object shares the mesh data, the face's mesh gets a copy, as in Live mode."""
     others = []
 
     def share(_rig, head):
@@ -466,7 +469,10 @@ def test_a_mesh_that_is_worked_on_is_live(pair):
 
 
 def _work(rig, mode, named):
-    """Enter a mode with the head mesh and leave it. Args: named whether the plan names it."""
+    """Enter a mode with the head mesh and leave it.
+
+    Args: named: whether the plan must state the head as a mesh that is not in Direct mode.
+    """
     head = scene.meshes(rig)[0]
     _mode(head, mode)
     both_ways.settle()
@@ -483,7 +489,7 @@ def _work(rig, mode, named):
 
 
 def test_vertices_moved_in_edit_mode(pair):
-    """Edit mode shows and stores the rest form."""
+    """In edit mode, the mesh shows the basis shape key, and moved vertices are stored in it."""
     for rig in pair.each():
         head = scene.meshes(rig)[0]
         head.active_shape_key_index = 0
@@ -544,7 +550,7 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """Neither Automatic nor a save enables a modifier that the user disabled in Live mode."""
+    """Neither the mode Automatic nor a save enables a modifier that the user disabled before."""
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

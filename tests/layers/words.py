@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Finds second definitions of the words that words.toml lists."""
+"""Finds functions, constants and tables that must be defined only once, but are defined twice.
+
+words.toml lists them: an entry (word) has a pattern of the definition, and the file that has it.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ KINDS = (".h", ".cpp", ".py", ".toml")
 
 
 def product_files(root: Path) -> dict[str, str]:
-    """Path below root -> text of each file of native, the package and the add-on."""
+    """Path below root -> text of each source file of native, the package and the add-on."""
     return {
         path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
         for folder in FOLDERS
@@ -24,7 +27,7 @@ def product_files(root: Path) -> dict[str, str]:
 
 
 def defines(word: Mapping, path: str, text: str) -> bool:
-    """Whether a file defines a word. Args: word  table of words.toml; path, text  the file."""
+    """Whether a file defines a word. Args: word  entry of words.toml; path, text  of the file."""
     if not path.endswith(word.get("in", "")):
         return False
     if "words" in word:
@@ -38,6 +41,6 @@ def _code(path: str, text: str) -> str:
 
 
 def second_definitions(word: Mapping, files: Mapping[str, str]) -> list[str]:
-    """The files that define a word but may not, and the files that should define it but do not."""
+    """Files that define a word but must not, and files that must define it but do not."""
     found = {path for path, text in files.items() if defines(word, path, text)}
     return sorted(found ^ {word["home"], *word.get("also", {})})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of repair: lids and lips close, and expressions without faults stay unchanged."""
+"""Tests of repair: lids and lips close, and expressions without faults do not change."""
 
 import copy
 import sys
@@ -13,6 +13,7 @@ from risorius.anyhead.eyes.eyelids import find_eyelids
 from risorius.anyhead.fittings import Bodies, sort_parts
 from risorius.anyhead.repair import repair
 from risorius.anyhead.repair.contact import Contacts
+from risorius.anyhead.repair.lips import Lips
 from risorius.anyhead.surface import Surface
 from risorius.author.heads.turning import look_turn
 
@@ -60,8 +61,11 @@ def mended(head, skin, fitted):
 
 
 def seen(skin, points, ball):
-    """The number of parallel rays from the front that hit the eye, in a grid of 0.2 mm, and the
-    largest number in one column. Independent of the code under test."""
+    """How much of an eye is visible from the front, computed without the code under test.
+
+    Parallel rays start in a grid of 0.2 mm. Returns the number of rays that hit the eye, and the
+    largest number in one column of the grid.
+    """
     at = np.arange(-RADIUS, RADIUS, 0.02)
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
     begin = ball.middle + np.stack([x, y, np.full(len(x), 9.0)], axis=1)
@@ -97,7 +101,7 @@ def test_lids_that_close_already_stay_as_they_are(skin, fitted, mended):
 
 
 def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
-    """A lid is pressed 1 mm into the eye while the eye looks down."""
+    """An upper lid that is pressed into an eye that looks down is lifted out of the cornea."""
     lids = find_eyelids(skin, fitted.eyes["L"])
     arm = skin.points - EYE
     inwards = np.where(
@@ -119,7 +123,8 @@ def test_lips_meet_where_an_open_jaw_is_closed(head, skin, mended):
     assert before.lip_gap > 1.5
     assert after.lip_gap <= 0.3
     assert after.lip_cut <= 0.15
-    # Measured independently: distances between lower and upper lip line, which coincide at rest.
+    # Distances between the lower and the upper line of the lips, which coincide at rest; they are
+    # measured without the tested code.
     points = skin.points + mended.combinations[CLOSED]
     line = np.flatnonzero(np.abs(skin.points[:, 1] - MOUTH) < 0.01)
     middle = line[np.abs(skin.points[line, 0]) < 0.6 * HALF]
@@ -197,3 +202,14 @@ def test_a_face_without_eyes_and_lips_stays_as_it_is(head, skin):
     out = repair(skin, head.faces, bare, None, None, ways, {})
     assert np.array_equal(out.expressions["browDownL"], ways["browDownL"])
     assert out.report.rows == {}
+
+
+def test_lips_that_a_triangle_connects_are_counted_as_welded(head, skin):
+    corners = np.stack([Corners.points[f"mouth_corner_{side}"] for side in "RL"])
+    assert Lips(skin, head.ways, corners).welded() == 0
+    lips = Lips(skin, head.ways, corners)
+    upper, lower = (np.unique(triangles) for triangles in (lips._upper, lips._lower))
+    above = upper[np.abs(skin.points[upper] - [0, MOUTH, 9]).sum(axis=1).argsort()[:2]]
+    below = lower[np.abs(skin.points[lower] - [0, MOUTH, 9]).sum(axis=1).argmin()]
+    welded = Surface(skin.points, np.concatenate([skin.triangles, [[*above, below]]]))
+    assert Lips(welded, head.ways, corners).welded() == 1

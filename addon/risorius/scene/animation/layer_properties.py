@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layers of a character as properties of its control armature: saved, copied and overridden."""
+"""Defines the layers of a character as properties, which Blender saves, copies and overrides.
+
+Reactions are properties too: short animations that start (are fired) at a frame.
+"""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
@@ -16,18 +19,22 @@ from ...logic.animation import layer_rules
 KINDS = (
     ("ACTION", "Action", "An action with keys of the controls"),
     ("EXPRESSION", "Expression", "A built-in pose"),
-    ("IDLE", "Idle Life", "Blinks, glances and small movements from a seed"),
+    ("IDLE", "Idle Life", "Random blinks, glances and small movements"),
 )
 BLENDS = (
     ("OVERRIDE", "Override", "Replace lower layers"),
-    ("ADD", "Add", "Add to lower layers"),
+    ("ADD", "Add", "Add this layer to lower layers"),
     ("MAXIMUM", "Maximum", "Use the higher value of this layer and lower layers"),
 )
 EXTENDS = (
-    ("HOLD", "Hold", "Hold the first and last frames"),
-    ("HOLD_FORWARD", "Hold Forward", "Nothing before the start; hold the last frame"),
-    ("NOTHING", "Nothing", "Nothing before the start and after the end"),
-    ("REPEAT", "Repeat", "Repeat before and after"),
+    ("HOLD", "Hold", "Hold the first frame before the start, and the last frame after the end"),
+    (
+        "HOLD_FORWARD",
+        "Hold Forward",
+        ("No effect before the start; hold the last frame after the end"),
+    ),
+    ("NOTHING", "Nothing", "No effect before the start and after the end"),
+    ("REPEAT", "Repeat", "Repeat the animation before the start and after the end"),
 )
 REGIONS = tuple((r.upper(), title, "") for r, title in native.regions().titles.items())
 INDEX = f"{layer_rules.COLLECTION}_index"
@@ -45,20 +52,25 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property without animation. Args: kind  function of bpy.props, given  its arguments."""
+    """A property that cannot have keys or drivers, because it lacks the option ANIMATABLE.
+
+    Args: kind  function of bpy.props that makes the property, given  arguments of this function.
+    """
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 
 class RISORIUS_PG_warp(bpy.types.PropertyGroup):
-    """A frame of the scene and the frame of the source that is shown there."""
+    """A warp point: a scene frame, and the frame of the layer's animation that plays at it."""
 
     frame: _still(
         bpy.props.FloatProperty,
         name="Frame",
-        description="Frame of the scene at which the layer shows the other frame",
+        description="Frame of the scene that is pinned to a frame of the layer",
     )
     source: _still(
-        bpy.props.FloatProperty, name="Shows", description="Frame of the layer's own animation"
+        bpy.props.FloatProperty,
+        name="Shows",
+        description=("Frame of the layer's animation that is pinned to a frame of the scene"),
     )
 
 
@@ -75,7 +87,7 @@ class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_layer(bpy.types.PropertyGroup):
-    """A layer of animation above the keys of the sliders."""
+    """An animation layer, which is mixed over the keyframe animation of the controls."""
 
     name: bpy.props.StringProperty(name="Name", override=_OVERRIDE)
     kind: _still(bpy.props.EnumProperty, name="Source", items=KINDS)
@@ -86,7 +98,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Edition of Risorius' built-in expressions; older files do not store it and mean edition 1.
+    # Edition of the built-in expressions that the layer plays. The default is 1, because .blend
+    # files from the time of edition 1 do not store it.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0
@@ -94,7 +107,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     blend: _still(bpy.props.EnumProperty, name="Blend", items=BLENDS)
     weight: bpy.props.FloatProperty(
         name="Weight",
-        description="Weight of the layer; it can have keys",
+        description="Weight of the layer; the weight can have keys",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -105,7 +118,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     regions: _still(
         bpy.props.EnumProperty,
         name="Regions",
-        description="Regions that the layer moves; none: all",
+        description="Regions that the layer moves; no region: all regions",
         items=REGIONS,
         options={"ENUM_FLAG"},
     )
@@ -113,8 +126,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         bpy.props.StringProperty,
         name="Controls",
         description=(
-            "Controls that the layer moves, as names or patterns such as "
-            "jawOpen mouth*; -name excludes one"
+            "Controls that the layer moves, as names or patterns such as jawOpen "
+            "mouth*; -name excludes a control"
         ),
     )
     start: _still(bpy.props.FloatProperty, name="Start", default=1.0, description="Frame")
@@ -135,7 +148,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     length: _still(
         bpy.props.FloatProperty,
         name="Length",
-        description="Length in frames; 0: no end",
+        description="Length of the layer in frames; 0: no end",
         min=0.0,
     )
     repeat: _still(bpy.props.FloatProperty, name="Repeat", default=1.0, min=0.01, max=1000.0)
@@ -177,15 +190,15 @@ def register() -> None:
         name="Exclude Opposites",
         translation_context=tables.CONTEXT,
         description=(
-            "On a face with layers, keep opposite controls apart: closed lips"
-            " hold the jaw, a blink holds wide lids"
+            "On a face with layers, prevent that opposite controls act together: "
+            "closed lips hold the jaw, a blink lowers wide lids"
         ),
         default=True,
     )
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")

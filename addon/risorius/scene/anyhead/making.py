@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Background tasks on a head without expressions: making its rig, or conforming a face to it."""
+"""Runs background tasks on a head without expressions: make a rig, or conform a face to it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,19 @@ _FITTED = 0.6  # share of the total time after which the head has its expression
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task of two stages; `stage` is FIT or JOINTS."""
+    """A task that first fits a template face to the head, then makes the joints.
+
+    The attribute `stage` is FIT or JOINTS.
+    """
 
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """The progress function of a stage, which counts from 0 to 1.
+        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
-            begin, end: shares of the task at which the stage begins and ends.
+            begin, end: progress of the task, 0 to 1, when the stage begins and ends.
         """
         self.stage = stage
 
@@ -65,7 +68,7 @@ class Template(NamedTuple):
 
 
 class Transfer(NamedTuple):
-    """Options of the transfer.
+    """Options for the transfer of expressions from a template face to a head.
 
     Attributes:
         strength: factor of all expressions, 0 to 1.5.
@@ -121,7 +124,10 @@ def rig_task(
 def _carry_over(
     head: finding.Head, template: Template, transfer: Transfer, progress: Callable[[float], bool]
 ) -> tuple[native.Onto, native.Read]:
-    """The head with the expressions of the template, and the face of blend shapes made of it."""
+    """The head with the expressions of the template, and a face whose rig has only blend shapes.
+
+    The face is made from the head with its expressions; it has no joints.
+    """
     dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
     options = onto.OntoOptions(
@@ -150,7 +156,7 @@ def _write(dna: native.Dna, read: native.Read, path: str) -> None:
 
 
 def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:
-    """A task that gives a face the form of a head. A cancelled task writes no file.
+    """A task that gives a face the shape of a head. A cancelled task writes no file.
 
     Args:
         head: the result of finding.read; it may be a sculpt with the topology of the face.
@@ -174,7 +180,7 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The textures of a face's DNA file, by their paths for the new file.
+    """The texture files of a face as bytes, by the paths that belong to the new DNA file.
 
     Args:
         dna: the face.

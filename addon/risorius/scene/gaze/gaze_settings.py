@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the gaze, lids and head of a character, as properties of its control armature."""
+"""Defines settings of gaze, lids and head of a character, as properties of its control armature."""
 
 from __future__ import annotations
 
@@ -31,27 +31,30 @@ def _all() -> dict[str, object]:
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
             description=(
-                "Amount by which both eyes turn towards the target itself; at 0 they stay parallel"
+                "Amount by which the eyes converge on the target; 0: the eyes stay parallel"
             ),
             **shared,
         ),
         "risorius_lids": bpy.props.FloatProperty(
             name="Lids Follow",
-            description="Motion of the lids with a gaze up or down, in addition to the rig",
+            description=(
+                "Strength of the lid motion with a gaze up or down, in "
+                "addition to the motion of the rig"
+            ),
             **shared,
         ),
         "risorius_body_turn": bpy.props.FloatProperty(
             name="Body's Turn",
-            description="Share of the turn of the body's neck and head that the face follows",
+            description="Share of the rotation of the body's neck and head that the face follows",
             default=1.0,
             **shared,
         ),
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
             description=(
-                "Fill the raw controls of head and neck rotations from their "
-                "joints, so that poses of the file repair neck and jaw. Off: "
-                "the sliders of these controls lead"
+                "Set the raw controls of head and neck rotation from the joints, so "
+                "that the corrective poses of the DNA file correct neck and jaw. "
+                "Off: their sliders set these raw controls"
             ),
             default=True,
             override=_OVERRIDE,
@@ -68,7 +71,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)
 
@@ -85,7 +88,10 @@ def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
 
 
 def moves_lids(live: runtime.Runtime) -> bool:
-    """Whether a look control up or down moves blend shapes, or joints other than the eyes."""
+    """Whether a look control for looking up or down also moves more than the eye joints.
+
+    It may move other joints, or blend shapes.
+    """
     eyes = set(live.anchors.eyes.values())
     for controls in live.look.values():
         for index, _yaw, pitch in controls:

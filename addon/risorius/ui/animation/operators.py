@@ -42,13 +42,13 @@ CAPTURE_RANGES = (
         "Use the range of this face from the panel Capture Range",
     ),
     ("TAKE", "Of This File", "Learn the range from this file"),
-    ("NONE", "None", "Values stay as captured"),
+    ("NONE", "None", "Keep the captured values unchanged"),
 )
 TIME_UNITS = (
     (
         "AUTO",
         "As the File Says",
-        ("Read the unit from the header, or from the size of the numbers"),
+        "Detect the unit of time from the header, or from the size of the numbers",
     ),
     ("S", "Seconds", ""),
     ("MS", "Milliseconds", ""),
@@ -56,14 +56,14 @@ TIME_UNITS = (
     ("NS", "Nanoseconds", ""),
     ("MIN", "Minutes", ""),
     ("H", "Hours", ""),
-    ("FRAMES", "Frame Numbers", "At the rate of the file"),
+    ("FRAMES", "Frame Numbers", "Times are frame numbers at the rate of the file"),
     ("ROWS", "Rows", "Ignore the times: each row is a frame at the rate of the file"),
 )
 ANGLES = (
     (
         "AUTO",
         "As the File Says",
-        ("Radians; angles that no head can turn are refused with a question"),
+        "Radians; angles that no head can turn stop the import with a message",
     ),
     ("RADIANS", "Radians", ""),
     ("DEGREES", "Degrees", ""),
@@ -88,15 +88,18 @@ SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mo
 @session.cached(("unregister",))
 def _kinds() -> list[Item]:
     kinds = native.part("importing").KINDS.items()
-    return [("AUTO", "Automatic", "Detect from the file"), *((k, t, "") for k, t in kinds)]
+    return [
+        ("AUTO", "Automatic", "Detect the kind from the contents of the file"),
+        *((k, t, "") for k, t in kinds),
+    ]
 
 
 @session.cached(("unregister",))
 def _mappings() -> list[Item]:
     importing = native.part("importing")
     return [
-        ("AUTO", "Automatic", "The mapping that knows most names of the file"),
-        ("FILE", "File", "A mapping of your own, a TOML file"),
+        ("AUTO", "Automatic", "Use the mapping that knows the most names in the file"),
+        ("FILE", "File", "Use your own mapping, a TOML file"),
         *((name, importing.mapping_title(name), "") for name in importing.mapping_names()),
     ]
 
@@ -112,7 +115,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"}
     )
     kind: bpy.props.EnumProperty(
-        name="Kind", description="Kind of the file", items=lambda _s, _c: _kinds()
+        name="Kind", description="Kind of the imported file", items=lambda _s, _c: _kinds()
     )
     mapping: bpy.props.EnumProperty(
         name="Mapping",
@@ -120,14 +123,14 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         items=lambda _s, _c: _mappings(),
     )
     mapping_file: bpy.props.StringProperty(
-        name="Mapping File", description="A TOML file", subtype="FILE_PATH"
+        name="Mapping File", description="TOML file with your own mapping", subtype="FILE_PATH"
     )
     rate_mode: bpy.props.EnumProperty(
         name="Keys", description="Frames at which samples of the file become keys", items=RATES
     )
     file_rate: bpy.props.FloatProperty(
         name="File Rate",
-        description="Frames per second of a file that does not state its rate; 0: as found",
+        description="Frames per second of a file that does not state its rate; 0: detect the rate",
         min=0.0,
         soft_max=240.0,
     )
@@ -138,7 +141,10 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     timecode_rate: bpy.props.FloatProperty(
         name="Timecode Rate",
-        description="Frames a second of the timecode, if the file does not show it; 0: as found",
+        description=(
+            "Frames per second of the timecode, if the file does not show "
+            "this rate; 0: detect the rate"
+        ),
         min=0.0,
         soft_max=240.0,
     )
@@ -150,9 +156,9 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     full_value: bpy.props.FloatProperty(
         name="Full Value",
         description=(
-            "Value of a full movement in the file: 100 for per cent, 255 for "
-            "bytes; 1 keeps all values. 0: like 1, but values far above 1 are"
-            " refused with a question"
+            "Value of a full movement in the file: 100 for per cent, 255 for bytes; "
+            "1 keeps all values. 0: like 1, but values far above 1 stop the import "
+            "with a message"
         ),
         min=0.0,
         soft_max=255.0,
@@ -161,11 +167,15 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         name="Angles", description="Unit of the file's angles of head and eyes", items=ANGLES
     )
     gain: bpy.props.FloatProperty(
-        name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
+        name="Gain",
+        description="Factor by which the values of all controls are multiplied",
+        default=1.0,
+        min=0.0,
+        soft_max=2.0,
     )
     gains: bpy.props.StringProperty(
         name="Single Gains",
-        description="Factors of single controls or patterns of their names, as "
+        description="Factors of single controls or patterns of their names, such as "
         "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
     )
     smoothing: bpy.props.FloatProperty(
@@ -229,7 +239,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _read(
         self, context: Context, live: runtime.Runtime
     ) -> tuple["native.Clip", list[str], str]:
-        """Read the file as a clip of raw controls; also report lines and the mapping's name."""
+        """Read the file. Returns: clip of raw controls, lines for the report, mapping's name."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
@@ -253,7 +263,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         return clip, lines_of(report), report.mapping
 
     def _keep_unknown(self, controls: ArmatureObject, mapping: str, names: Sequence[str]) -> None:
-        """Store the curves that the mapping does not know, so that the user can map them."""
+        """Store the names of curves that the mapping lacks, so that the user can map them."""
         settings = {key: getattr(self, key) for key in self.properties.keys()}  # noqa: SIM118
         plain = {k: v for k, v in settings.items() if isinstance(v, (str, int, float))}
         found = unknown_curves.Unknown(mapping, {**plain, "filepath": self.filepath}, list(names))
@@ -270,8 +280,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     ) -> "native.Clip":
         """Stretch the clip by the chosen capture range, and add a line about it to the notes.
 
-        A table of raw controls is never stretched by the face's range, because it may have been
-        stretched before.
+        The face's stored range is never applied to a table of raw controls, because such a table
+        may have been stretched before.
         """
         module, ranges = native.part("ranges"), None
         is_raw = mapping == "controls"
@@ -390,7 +400,10 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
     )
     source: bpy.props.StringProperty(
         name="Object",
-        description="A mesh whose shape keys move; empty: the selected one, else the only one",
+        description=(
+            "A mesh whose shape keys move; empty: the selected mesh, or the "
+            "only mesh with animated shape keys"
+        ),
         options={"SKIP_SAVE"},
     )
 
@@ -442,7 +455,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
 
 
 def draw_import(self: Menu, _context: Context) -> None:
-    """Entry of File > Import."""
+    """Draw the entry for animation in the menu File > Import."""
     self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
 
 

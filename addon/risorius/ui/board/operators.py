@@ -22,7 +22,7 @@ from ..hand.base import HandOperator
 from ..words import say
 
 LEADERS = (
-    ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
+    ("SLIDERS", "Sliders", "The sliders in the panel Controls move the face"),
     ("BOARD", "Board", "The face board moves the face; the sliders show its values"),
 )
 
@@ -80,7 +80,7 @@ class _OwnArmature(_Leading):
 
 
 class _OnBoard(HandOperator):
-    """Base of operators that need a face that its board moves."""
+    """Base of operators for a face whose sliders follow the face board."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -142,7 +142,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
-        """Replace the existing board by the other kind, and convert pose and keys."""
+        """Replace the existing board by a board of another kind, and convert pose and keyframes."""
         done = board_keys.exchange(context, rig, kind)
         lost = board_keys.lost(done.loss)
         if lost is not None:
@@ -166,7 +166,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
 
 def _take_up(context: Context, rig: ArmatureObject) -> None:
-    """Enter pose mode and show the new board beside the head, if the controls are visible."""
+    """Enter pose mode and show the new board beside the head.
+
+    Nothing happens if the control armature is hidden or not selectable.
+    """
     controls = parts.controls_there(rig)
     if not controls.visible_get() or controls.hide_select:
         return
@@ -233,7 +236,9 @@ class RISORIUS_OT_lead(_Leading, Operator):
     bl_idname = "risorius.lead"
     bl_label = "Lead"
 
-    by: bpy.props.EnumProperty(name="By", description="What moves the face", items=LEADERS)
+    by: bpy.props.EnumProperty(
+        name="By", description="Sliders or face board: one of them moves the face", items=LEADERS
+    )
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",
         description="Convert the keys in a copy of the action; the original is kept",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of points on the skin: pins, and handles that are selected, hidden and keyed."""
+"""Operators that pin points of the skin, and that select, hide and key handles on it."""
 
 import bpy
 
@@ -17,13 +17,22 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """Base of operators on one point, which is the vertex of the properties or under the cursor."""
+    """Base of operators on one point of a face.
+
+    A click uses the point under the cursor; scripts set the properties `mesh` and `vertex`.
+    """
 
     mesh: bpy.props.IntProperty(
-        name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
+        name="Mesh",
+        description="Number of the mesh in the DNA file, from 0",
+        min=0,
+        options={"SKIP_SAVE"},
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Number of the vertex", min=-1, options={"SKIP_SAVE"}
+        name="Vertex",
+        description="Number of the vertex in the mesh, from 0",
+        min=-1,
+        options={"SKIP_SAVE"},
     )
 
     def fits(self, hit: picking.Hit) -> bool:
@@ -51,7 +60,8 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same click selects a handle, and Blender may reverse the order of our key bindings.
+        # The same kind of click selects a handle. If Blender tries this operator first, a handle is
+        # refused here, so that the select operator gets the click.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:
@@ -129,7 +139,7 @@ class _SelectedOperator(FaceOperator):
 
 
 class RISORIUS_OT_hide_handles(_SelectedOperator, Operator):
-    """Hide the selected handles; their points can be dragged as any other"""
+    """Hide the selected handles; their points can be dragged like any other point"""
 
     bl_idname = "risorius.hide_handles"
     bl_label = "Hide Handles"
@@ -145,7 +155,7 @@ class RISORIUS_OT_hide_handles(_SelectedOperator, Operator):
 
 
 class RISORIUS_OT_show_handles(FaceOperator, Operator):
-    """Show the hidden handles again, selected"""
+    """Show the hidden handles again, and select them"""
 
     bl_idname = "risorius.show_handles"
     bl_label = "Show Hidden Handles"
@@ -167,7 +177,7 @@ class RISORIUS_OT_show_handles(FaceOperator, Operator):
 
 
 class RISORIUS_OT_key_handles(_SelectedOperator, Operator):
-    """Insert keyframes on the sliders that move the selected handles, as on selected bones"""
+    """Insert keyframes on the sliders that move the selected handles"""
 
     bl_idname = "risorius.key_handles"
     bl_label = "Key Handles"

@@ -65,7 +65,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
 
 
 class _FileOperator(FaceOperator):
-    """Base of operators on a face that may lack its controls or DNA, which a file restores."""
+    """Base of operators on a face that may lack controls or DNA; the operator restores both."""
 
     whole_face = False
 
@@ -84,7 +84,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
-    """Read the file of the face again; asks for the file if it has moved"""
+    """Read the DNA file of the face again; opens a file browser if the file is missing"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
@@ -118,8 +118,8 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     bl_idname = "risorius.export_dna"
     bl_label = "Export DNA"
     bl_description = (
-        "Write this face's DNA file: byte for byte as imported, with your edits of shape keys, "
-        "neutral vertices, joints and weights"
+        "Write this face's DNA file: unchanged since the import, except for your "
+        "edits of shape keys, neutral vertices, joints and weights"
     )
     bl_options = {"PRESET"}
 
@@ -175,9 +175,9 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
 
 def draw_export(self: Menu, _context: Context) -> None:
-    """Add entries to File > Export."""
+    """Add the entries for faces to the menu File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Placed near Blender's own entries, which write live faces at rest.
+    # Users also find Blender's own exporters in this menu, but these write live faces at rest.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

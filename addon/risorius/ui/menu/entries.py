@@ -52,7 +52,7 @@ class RISORIUS_MT_face_sides(Menu):
             button = layout.operator("risorius.copy_side", text=text)
             button.region, button.from_left = "", from_left != seen
         layout.separator()
-        for enable, text in ((True, "Link Left and Right"), (False, "Free Left and Right")):
+        for enable, text in ((True, "Link Left and Right"), (False, "Unlink Left and Right")):
             button = layout.operator("risorius.link_sides", text=text)
             button.enable, button.from_left = enable, not seen
 
@@ -206,7 +206,7 @@ class RISORIUS_MT_face_about(Menu):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
-        # Blender's operators are not in our translation table.
+        # Names of Blender's operators are not in our translation table, so give a translated text.
         text = words.say("Preferences")
         layout.operator(
             "preferences.addon_show", text=text, icon="PREFERENCES", translate=False

@@ -23,19 +23,23 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
     """Sentences about textures that were not mixed, except hair, which is never mixed.
 
     Args:
-        own: name of a texture -> reason.
+        own: name of a texture -> reason why it was not mixed.
     """
 
     def names(why: str) -> str:
         return ", ".join(name for name, found in own.items() if found == why)
 
     texts = {
-        "missing": say("Not mixed, as not every face has them: {names}", names=names("missing")),
+        "missing": say(
+            "Not mixed, because not every face has these textures: {names}", names=names("missing")
+        ),
         "format": say(
-            "Not mixed, as Risorius mixes its own kind of PNG alone: {names}", names=names("format")
+            "Not mixed, because Risorius mixes only PNG files of the kind that it writes: {names}",
+            names=names("format"),
         ),
         "size": say(
-            "Not mixed, as the faces have them in different sizes: {names}", names=names("size")
+            "Not mixed, because these textures have different sizes on the faces: {names}",
+            names=names("size"),
         ),
     }
     return [text for why, text in texts.items() if names(why)]
@@ -184,7 +188,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         except (OSError, *native.user_errors()) as error:
-            # The name of the missing file, if the file of a parent is missing.
+            # If the file of a mixed face is missing, the error contains its name.
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A triangle mesh with its normals, edges and border."""
+"""Defines a triangle mesh, and computes its normals, edges and border."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Surface:
         """A surface of polygons, which are split into fans of triangles.
 
         Args:
-            points: float64[V, 3].
+            points: float64[V, 3], vertex positions.
             faces: vertices of each polygon, counter-clockwise seen from outside.
         """
         fans = [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the meshes of all levels of a joint rig: weights, blend shapes for errors, errors."""
+"""Makes the meshes of a joint rig: fits weights, adds corrective shapes, and measures errors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LEAST_WEIGHT = 1e-3
 
 
 class Made:
-    """Makes the meshes of all levels, one level after the other."""
+    """Makes the meshes of all LODs, one LOD after the other."""
 
     def __init__(
         self,
@@ -46,10 +46,10 @@ class Made:
         """Prepare an empty list of meshes.
 
         Args:
-            work: the face; its joints are made.
+            work: the face; it must already have the new joints.
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes.
-            coarse: triangles of the coarser levels.
+            coarse: triangles of the coarser LODs.
             like: reference to reuse, or None.
             whole: whether to make blend shapes and measure errors.
         """
@@ -66,10 +66,10 @@ class Made:
         self._numbers: dict[int, int] = {}  # mesh of the source -> mesh here; levels share meshes
 
     def add_level(self, lod: int, wanted: dict[int, Doubles], needs: set[int]) -> None:
-        """Make the meshes of a level: meshes of the source, or simplified meshes of LOD 0.
+        """Make the meshes of a LOD: meshes of the source, or simplified meshes of LOD 0.
 
         Args:
-            lod: the level; levels are added in order.
+            lod: index of the LOD; LODs are added in order.
             wanted: mesh of the source -> displacements float64[E, V, 3].
             needs: meshes that get weights on new joints.
         """
@@ -107,7 +107,7 @@ class Made:
         return self.coarse.triangles.get((lod, m), none)
 
     def _start(self, mesh: Mesh) -> Doubles:
-        """Weights float64[V, joints] of the nearest vertices of the finest level."""
+        """Weights float64[V, joints] of the nearest vertices of the meshes of LOD 0."""
         source = self.work.source
         fine = np.concatenate([np.asarray(source.meshes[m].positions) for m in self.weights])
         rows = np.concatenate(list(self.weights.values()))
@@ -131,12 +131,12 @@ class Made:
         """Add a mesh with its own weights, or fit new weights that start with `rows`.
 
         Args:
-            lod: the level.
+            lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
             wanted: its displacements float64[E, V, 3].
             rows: dense weights to start with; None keeps the mesh unchanged.
-            finest: index of the mesh of the source if coarser levels start with its new weights.
+            finest: index of the mesh of the source if coarser LODs start with its new weights.
         """
         self.listed[lod].append(len(self.meshes))
         self.names.append(name)

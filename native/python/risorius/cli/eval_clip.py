@@ -74,9 +74,9 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Sort the names of parts in the order of PARTS.
+    """Check the names of the pose parts that are to be written, and sort them as in PARTS.
 
-    Raises: ValueError: a part is unknown or repeated, or there is none.
+    Raises: ValueError: a part is unknown or repeated, or no part is named.
     """
     for text in texts:
         if text not in PARTS:
@@ -106,7 +106,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
     if kind is None:
         raise CommandLineError(f"-o: a name ending in .npz or .csv was expected, found {args.out}")
     if args.compress and kind != "npz":
-        raise CommandLineError("--compress: only an .npz is compressed")
+        raise CommandLineError("--compress is only for .npz output")
     if len(args.controls) != 1:
         raise CommandLineError(
             f"-o writes the frames of a clip: CLIP DNA were expected, found {args.file} and "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face regions of controls, from the beginnings of their names in regions.toml."""
+"""Finds the face region of a control from the beginning of its name, listed in regions.toml."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def mask(
         float32[names].
 
     Raises:
-        ValueError: a weight out of range, or a part that matches no control.
+        ValueError: a weight out of range, or a part that is no region and matches no control.
     """
     out = np.full(len(names), default, np.float32)
     for part, weight in parts.items():

@@ -15,7 +15,7 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Key of a contribution: index of a control, or name of a source that combines several controls.
+# Source of a contribution: index of a control, or name of a setup that combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""
@@ -26,9 +26,10 @@ def contributions(
 ) -> Contributions:
     """Compute the contribution of each control to each joint; they sum to the joint's pose.
 
-    Rows of joint groups are sums over controls. Products of quaternions are not: there a control's
-    contribution is the change of the Euler angles when its quaternion is multiplied, in the order
-    of the columns. A twist, a swing, or a quaternion of a network is one contribution.
+    Most joint values are sums over controls. But the rotation of a joint with quaternions is a
+    product, so a control's contribution is the change of the Euler angles when its quaternion is
+    multiplied, in the order of the columns. A twist, a swing, or a quaternion of a network is one
+    contribution.
 
     Args:
         dna: the face.
@@ -56,7 +57,7 @@ def contributions(
 
 
 def _replace_rotation(out: Contributions, joint: int, parts: dict[Key, Doubles]) -> None:
-    """Replace all contributions to the rotation of a joint by these parts."""
+    """Replace all contributions to the rotation of a joint by the contributions in `parts`."""
     mine = out.setdefault(joint, {})
     for v in mine.values():
         v[3:6] = 0
@@ -242,10 +243,11 @@ def explain_joints(
 ) -> list[dict[str, Any]]:
     """Each joint that is not at rest; the joint that moves most is first.
 
-    Movement is a length: translation, plus bone length times angle in radians, plus bone length
-    times change of scale. The bone length is the median of the file. A control's share is the part
-    of its contribution in the direction of the joint's whole movement. The shares of a joint sum to
-    1; a control that works against the movement has a negative share.
+    Movement is the length of a vector of nine elements: translations, angles in radians times the
+    bone length, and changes of scale times the bone length. The bone length is the median of the
+    file. A control's share is the part of its contribution in the direction of the joint's whole
+    movement. The shares of a joint sum to 1; a control that works against the movement has a
+    negative share.
 
     Args:
         dna: the face.

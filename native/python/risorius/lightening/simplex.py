@@ -15,7 +15,7 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
     """float64[n, k]: for each problem, weights w that minimise w^T G w - 2 b^T w.
 
     They are at least 0 and sum to 1. Negative weights of a problem are removed all at once, then
-    the smallest beyond the limit, so the result is near the minimum but not always exact.
+    the smallest until `most` are left, so the result is near the minimum but not always exact.
 
     Args:
         grams: float64[n, k, k], G of each problem, symmetric.
@@ -45,7 +45,7 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """Minimises with sum 1 over the active weights, which may be negative; the others are 0."""
+    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0."""
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

@@ -95,7 +95,7 @@ def _names(one: Dna, other: Dna) -> str | None:
         if lacking:
             return f"it has no {word} {lacking[0]}"
         if more:
-            return f"it has a {word} {more[0]} that the other lacks"
+            return f"the other face has no {word} {more[0]}"
         return f"its {plural(word)} are in another order"
     if [int(p) for p in one.joint_parents] != [int(p) for p in other.joint_parents]:
         return "a joint hangs on another one"
@@ -163,7 +163,7 @@ def alike(one: object, other: object) -> bool:
 
 
 def turned_groups(dna: Dna) -> list[int]:
-    """Numbers of the joint groups that move a joint with quaternion rotation.
+    """Indices of the joint groups that move a joint with quaternion rotation.
 
     Args:
         dna: a face.

@@ -60,7 +60,7 @@ def conform(
             file; the skin of LOD 0 is required.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
-        balls: eyeballs of the target head; each eye of the face moves to the one near it.
+        balls: eyeballs of the target head; each eye of the face moves to the eyeball near it.
         teeth: float64[n, 3], the lower teeth of the target head, of any topology.
 
     Raises:
@@ -104,7 +104,7 @@ def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Dou
     if skin < 0:
         raise ArgumentError("a face with a mesh of skin at LOD 0 was expected, found none")
     if dna.mesh_names[skin] not in moved:
-        raise ArgumentError(f"places of {dna.mesh_names[skin]}, the skin, were expected")
+        raise ArgumentError(f"vertex positions of {dna.mesh_names[skin]}, the skin, were expected")
     counts = {n: len(m.positions) for n, m in zip(dna.mesh_names, dna.meshes, strict=False)}
     out = {}
     for name, points in moved.items():
@@ -176,7 +176,7 @@ def _target(target: BlendShapeTarget, linear: Doubles) -> BlendShapeTarget:
 
 
 def _normals(mesh: Mesh, moved: Moved) -> Doubles:
-    """float64[N, 3]: the normals of the file, rotated with the vertex normals of the surface."""
+    """float64[N, 3]: the mesh's stored normals, rotated as its geometric vertex normals rotate."""
     own = np.asarray(mesh.normals, np.float64)
     rows = np.asarray(mesh.layout_normals, np.int64)
     vertex = np.full(len(own), -1)

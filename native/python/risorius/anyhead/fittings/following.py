@@ -102,7 +102,7 @@ def _patches(skin: Surface, anchors: Ints, size: int) -> Ints:
     for begin in range(0, len(anchors), _BLOCK):
         own = anchors[begin : begin + _BLOCK]
         away = np.linalg.norm(skin.points[own][:, None] - skin.points[None], axis=2)
-        # Excludes the other lid and the inside of a lip.
+        # Vertices with an opposite normal may be on the other lid or on the inside of a lip.
         against: npt.NDArray[np.bool_] = normals[own] @ normals.T < 0.0
         away = np.where(against, away + 1.0, away)
         out[begin : begin + _BLOCK] = np.argpartition(away, size - 1, axis=1)[:, :size]

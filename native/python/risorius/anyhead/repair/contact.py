@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Measures skin that cuts into teeth and gums and moves it out; counts stretched polygons."""
+"""Measures skin that cuts into teeth and gums and moves it out; counts stretched polygons.
+
+The target is the head to which expressions were transferred.
+"""
 
 from __future__ import annotations
 
@@ -93,8 +96,8 @@ class Contacts:
         return float(beyond @ self._share) * MM**3
 
     def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """The same volume in mm3, measured by SkinChecker; contacts of the skin with itself do not
-        count. Slower than `volume`.
+        """The volume of `volume` in mm3, measured by SkinChecker, which is slower. Contacts of the
+        skin with itself do not count.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.
@@ -120,8 +123,8 @@ class Contacts:
         return self._lifted(out, posed) if self.volume(out, controls) > LEAST else out
 
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
-        """float64[V, 3]: displacements with skin pushed out of teeth along their normals, and a
-        smooth fall-off around it."""
+        """float64[V, 3]: displacements with skin pushed out of teeth along the teeth's normals. The
+        push falls off smoothly around this skin."""
         points = self.skin.points + displacement
         edges = self._edges()
         for _ in range(_ROUNDS):
@@ -223,7 +226,7 @@ class Contacts:
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
             arm = points - surface.at(triangle.astype(np.int64), shares)
-            # Excludes points next to the open border of gums, which are not inside.
+            # Excludes points next to the open border of gums, because these points are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
             deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
@@ -232,7 +235,7 @@ class Contacts:
 
 
 def _spread(push: Doubles, edges: Ints) -> Doubles:
-    """float64[V, 3]: the pushes, with a smooth fall-off to neighbouring vertices."""
+    """float64[V, 3]: the displacements `push`, with a smooth fall-off to neighbouring vertices."""
     a, b = edges.T
     count = np.maximum(np.bincount(a, minlength=len(push)) + np.bincount(b, minlength=len(push)), 1)
     need, out = np.linalg.norm(push, axis=1), push.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faults of expressions (gaps, cuts and stretched polygons) before and after the repair."""
+"""Reports faults of expressions (gaps, cuts, stretched polygons) before and after the repair."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Faults:
 
     Attributes:
         lid_gap: mm, largest visible height of an eye that the pose closes; 0 in other poses.
-        cut: mm, largest depth of the outside of lids in an eye.
+        cut: mm, largest depth in an eye that the outer side of a lid reaches.
         lip_gap: mm, widest gap between the lips if the pose closes the mouth; 0 in other poses.
-        lip_cut: mm, largest depth of one lip in the other beyond rest, in the same poses.
-        volume: mm3 of skin inside teeth and gums, beyond rest.
+        lip_cut: mm by which one lip is deeper in the other than at rest, in the poses of lip_gap.
+        volume: mm3 of skin inside teeth and gums, in addition to the volume at rest.
         stretched: number of polygons with more than 2.5 times their area at rest.
     """
 

@@ -27,7 +27,7 @@ _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as restin
 
 @dataclass
 class ShapeSet:
-    """A mesh with y up and its expressions, in one unit. heads.joining joins several meshes."""
+    """A joined mesh (y is up) and its expressions, in one unit; `parts` are the original meshes."""
 
     name: str
     mesh: ObjMesh
@@ -40,7 +40,7 @@ class ShapeSet:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Beginnings of the names of meshes that follow an eye's joint only."""
+        """Beginnings of the names of meshes that follow only the joint of an eye."""
         return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
 
 
@@ -111,7 +111,7 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
 
 
 def take_combined(shapes: ShapeSet) -> dict[str, Doubles]:
-    """Remove and return the sculpts of combined expressions, whose names join names by +.
+    """Remove and return the sculpts of combined expressions, which are named like smile+jawOpen.
 
     Args:
         shapes: the mesh and its expressions; it is changed.
@@ -138,8 +138,8 @@ def combined_rows(
         controls: expression -> raw controls without prefix.
         raw: names of all raw controls.
 
-    Returns: for each sculpt, the indices of its raw controls and its displacements float64[V, 3]
-        minus those of its expressions and of its smaller combinations.
+    Returns: for each sculpt, the indices of its raw controls, and its displacements float64[V, 3]
+        without the displacements of its single expressions and of its smaller combinations.
 
     Raises:
         ShapeFileError: a combination names an unknown expression.
@@ -170,7 +170,7 @@ def combined_rows(
 def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
     """Make a Dna with a mesh for each part and a blend shape for each control.
 
-    The joints are root and head, and those of eyes and jaw if the face has any.
+    The joints are root and head, and eyes and jaw if `shapes` has joints for them.
 
     Args:
         shapes: the mesh and its expressions.
@@ -246,7 +246,7 @@ def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
 def _add_meshes(
     dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[Doubles]
 ) -> None:
-    """Add a mesh with blend shape targets for each part."""
+    """Add a mesh with blend shape targets for each entry of `parts`."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
     joints, meshes, mapping = list(dna.joint_names), [], []
     for number, part in enumerate(parts):
@@ -300,8 +300,8 @@ def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doub
     """float64[V, 1] for each control: its fraction of an expression. The fractions sum to 1.
 
     Controls that end in L and R get the left and right half. Controls of lips such as ...UL and
-    ...DL get the upper and lower part, divided at the weighted middle of the displacements. The
-    edges are soft.
+    ...DL get the upper and lower part, divided at the mean height of the vertices, weighted by
+    their motion. The edges are soft.
     """
     if len(named) == 1:
         return [1.0]
