@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import risorius
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "python" / "support"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
@@ -203,7 +204,7 @@ def main() -> None:
     args = parser.parse_args()
     people = any_heads.generator()
     man = source_of(read_template(assemble(people, lambda _: None, MAN)[0]))
-    template = default_template()
+    template = risorius.load(default_template())
     default = Source(read_template(template), [])
     identities = Identities(args.ict) if args.ict.exists() else None
     own = source_of(identities.face) if identities else None

@@ -3,6 +3,7 @@
 
 import copy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,19 @@ def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
     turn = look_turn("eyeLookDown")
     assert lids.cut(inwards, turn) > 0.05
     assert lids.cut(lids.lifted(inwards, turn), turn) < 0.005
+
+
+def test_closed_lids_are_lifted_out_of_a_cornea_that_turns_below_them(skin, fitted, mended):
+    """The lids meet and show nothing of the eye, so the cut is their only fault."""
+    ball, blink, turn = fitted.eyes["L"], mended.expressions["eyeBlinkL"], look_turn("eyeLookUp")
+    arm = ball.points - EYE
+    front = np.clip(8 * arm[:, 2:] / RADIUS - 7, 0, 1)
+    lids = find_eyelids(skin, replace(ball, points=ball.points + 0.15 * front * arm, _surface=[]))
+    assert lids.gap(blink, turn) == 0
+    assert lids.cut(blink, turn) > 0.05
+    out = lids.closed(blink, turn)
+    assert lids.gap(out, turn) <= 0.015
+    assert lids.cut(out, turn) < 0.005
 
 
 def test_an_eye_behind_skin_has_no_lids(skin, fitted):

@@ -31,6 +31,7 @@ _LOWER = 0.15  # share of the gap that the lower lid closes
 _VIEW = 80  # rays per axis of the grid of a view of closed lids
 _VIEWS = ((0.0, 0.0), (-25.0, 0.0), (25.0, 0.0), (0.0, 20.0), (0.0, -20.0))  # degrees
 _ROUNDS = 8
+_CUT = 0.02  # mm: smaller depths of closed lids in the eye are ignored
 _ENOUGH = 0.04  # mm: largest visible gap of closed lids
 _SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # smoothing weights of neighbouring columns
 _HELD = 1.5  # of the radius: from this distance to the eye's centre on, lid motion fades out
@@ -169,29 +170,22 @@ class Eyelids:
         return float(self._lacks(points, turn, 0.0).max(initial=0.0))
 
     def closed(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
-        """float64[V, 3]: the displacements of a blink, corrected so that the lid edges meet.
+        """float64[V, 3]: the displacements of a blink, corrected so that the lid edges meet and no
+        lid cuts into the eye.
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
             turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
-        frame = self.opening.frame
-        rest_up = frame.angles(self.rest)[1]
+        rest_up = self.opening.frame.angles(self.rest)[1]
         points = self.rest + displacement[self.vertices]
         best, least = points, np.inf
         for number in range(_ROUNDS):
-            across, up, away = frame.angles(points)
             apart = self._apart(points, turn)
-            if not apart.any():
-                break
-            fade = self._fade(float(np.abs(apart).max()))
-            down = np.interp(across, self.opening.across, apart)
-            if number == 0:
-                lowered = self._scaled(across, up - rest_up, points, turn, (1 - _LOWER) * apart)
-            else:
-                lowered = (1 - _LOWER) * down * fade
-            new = up + np.where(self._above, -lowered, _LOWER * down * fade)
-            points = frame.middle + away[:, None] * frame.rays(across, new)
+            if apart.any():
+                points = self._approached(points, turn, apart, rest_up if number == 0 else None)
+            elif number or self._lacks(points, turn, 0.0).max(initial=0.0) <= _CUT * self.mm:
+                break  # closed lids that cut into the eye are lifted first
             points = self._lifted(points, turn)
             wrong = self._gap(points, turn)
             if wrong < least:
@@ -201,6 +195,24 @@ class Eyelids:
         out = displacement.copy()
         out[self.vertices] = self._level(best, turn) - self.rest
         return out
+
+    def _approached(
+        self, points: Doubles, turn: Doubles | None, apart: Doubles, rest_up: Doubles | None
+    ) -> Doubles:
+        """The points with the edges of both lids turned towards each other.
+
+        apart: the result of _apart. rest_up: float64[n], angles up in the rest pose, in radians:
+        the upper lid's own turn from there is scaled first; None: all of the turn fades out.
+        """
+        frame = self.opening.frame
+        across, up, away = frame.angles(points)
+        turned = np.interp(across, self.opening.across, apart)
+        turned *= self._fade(float(np.abs(apart).max()))
+        lowered = (1 - _LOWER) * turned
+        if rest_up is not None:
+            lowered = self._scaled(across, up - rest_up, points, turn, (1 - _LOWER) * apart)
+        new = up + np.where(self._above, -lowered, _LOWER * turned)
+        return np.asarray(frame.middle + away[:, None] * frame.rays(across, new))
 
     def _level(self, points: Doubles, turn: Doubles | None) -> Doubles:
         """Closed lids with both edges at the same distance from the eye's centre, so that no gap
