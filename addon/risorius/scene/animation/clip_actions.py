@@ -248,7 +248,7 @@ def _add_turn(
 ) -> None:
     """Add F-curves of a bone's rotation in its rotation mode.
 
-    turns: float64[n, 4], quaternions in the armature's axes.
+    turns: float64[n, 4], quaternions (w x y z) in the armature's axes.
     """
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
@@ -262,14 +262,17 @@ def rotation_path(bone: bpy.types.PoseBone) -> str:
 
 
 def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions float64[n, 4] in the armature's axes, converted to the bone's axes."""
+    """Convert quaternions float64[n, 4], w x y z, from the armature's axes to the bone's axes."""
     rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
     back = rest * [1.0, -1.0, -1.0, -1.0]
     return clip_units.multiply(clip_units.multiply(back, turns), rest)
 
 
 def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions as values of a rotation mode, float64[n, 3 or 4], angles in radians."""
+    """Convert quaternions float64[n, 4], w x y z, to values of a rotation mode.
+
+    Returns: float64[n, 3 or 4], angles in radians.
+    """
     if mode == "QUATERNION":
         return turns
     if mode == "AXIS_ANGLE":

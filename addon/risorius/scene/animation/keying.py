@@ -160,17 +160,17 @@ def by_hand(
         context: has the settings and the current frame.
         rig: the character.
         move: a function that moves sliders and bones from their current values. It returns the
-            names of the sliders that it handled, or None if it did nothing.
+            names of all sliders that it set, even to equal values; None if it did nothing.
         at_selected: True: move at every frame with a selected key of this face, and key all
             changes; False: move at the current frame.
-        at: a function that is called with the frame before each move.
+        at: a function that is called before each move; its argument is the frame of the move.
 
     Returns:
         The number of keyed properties.
 
     Raises:
-        FaceError: no key is selected, or an active tweak does not reach this frame. Nothing has
-            changed.
+        FaceError: with at_selected, no key is selected or a tweak is active; without it, an active
+            tweak does not include the current frame. Nothing has changed.
     """
     controls = parts.controls_there(rig)
     shown_keys.show_some(controls)

@@ -162,9 +162,10 @@ def take(
     Args:
         controls: control armature with an active tweak.
         labels: sliders to store.
-        frame: of the scene.
+        frame: frame of the scene.
         bones: data paths of `paths_of`; others are ignored.
-        held: True: controls without a difference get a key too if the tweak moves them already.
+        held: True: controls that were not edited get a key too if the tweak already has keys of
+            them.
         old: curves to which the changes are added, from `curves_so_far`; None: the current curves.
 
     Returns:
@@ -389,7 +390,7 @@ def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     Args:
         controls: the control armature.
         tweak: the active tweak.
-        frame: of the scene.
+        frame: frame of the scene.
     """
     base = Stand(
         dict(tweak.base),

@@ -196,7 +196,7 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters whose controls were updated, or their body, or the camera.
+    """The characters to evaluate, because their controls, their body or the camera was updated.
 
     The body of a character is the armature to which its face is attached.
     """

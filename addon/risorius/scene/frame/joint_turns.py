@@ -98,6 +98,6 @@ def _bones(
 
 
 def _one_sign(turn: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """Return q or -q, so that the last component that is not 0 is positive."""
+    """Return q or -q (x y z w), so that the last component that is not 0 is positive."""
     last = next((part for part in reversed(turn) if abs(part) > _NOTHING), 1.0)
     return tuple(-part for part in turn) if last < 0.0 else turn

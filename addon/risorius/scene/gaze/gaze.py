@@ -62,8 +62,8 @@ def target_of(
         live: the character's Runtime.
         turns: rotations of "neck" and "head" in the armature's axes, including rotations of the
             body.
-        local: displacement of the target bone from rest, including layers, in the axes of the bone;
-            None at rest.
+        local: displacement of the target bone from its rest position, including layers, in the
+            axes of the bone; None without a displacement.
     """
     bone = seen.pose.bones.get("eyes")
     if bone is None:
@@ -222,7 +222,7 @@ def frame_of(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion] | None = None,
 ) -> tuple[Float, Float]:
-    """Position and rotation of a joint, in the armature's axes.
+    """Position and rotation of a posed joint, in the armature's space.
 
     Args:
         live: the character's Runtime.
@@ -231,7 +231,8 @@ def frame_of(
         turns: rotations of "neck" and "head", applied as on the bones of the rig.
 
     Returns:
-        float64[3] position in Blender units and float64[3, 3] rotation; joint scales are ignored.
+        float64[3] position in Blender units, and float64[3, 3] rotation matrix whose columns are
+        the joint's axes; joint scales are ignored.
     """
     chain = live.chain(joint)
     moved = np.asarray(deltas[chain.joints], np.float64)

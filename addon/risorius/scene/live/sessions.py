@@ -66,7 +66,8 @@ class Session:
         before: slider -> value before the capture.
         turn: (rotation mode, values of the rotation) of the head bone before the capture, or None.
         recording: the running Recording, or None.
-        recent: the last 3600 frames of any subject, one minute at 60 frames per second.
+        recent: the last 3600 captured frames, also of earlier subjects: one minute at 60 frames per
+            second.
         ranges_seen: value of range_properties.changes() when the shaper got the ranges.
         names: control names of the last frame.
         sliders: (slider, index in `names`) for each name that this character has.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warns if Blender's own exporters would write live faces at rest."""
+"""Warns if Blender's own exporters would write live (not baked) faces in their rest pose."""
 
 from collections.abc import Mapping
 
