@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inserts keys by Blender's settings: auto-key, keying set, only needed, key type, group.
+"""Inserts keyframes (keys) by Blender's settings: auto-key, keying set, only needed, key type.
 
 Code that moves sliders or control bones for the animator does so in a function that it passes to
-`by_hand`, or calls `changed` after the move.
+`by_hand`, or calls `changed` after the move. While a tweak is on, edits go into its additive layer.
+Either the sliders or the face board lead, that is, move the face; the others have no effect.
 """
 
 from __future__ import annotations
@@ -121,7 +122,7 @@ def pose_of(controls: ArmatureObject) -> Pose:
 def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
     """The sliders that the face board moves, and the bones of all its handles.
 
-    If the sliders lead, the board moves no slider.
+    If the sliders lead, the first set is empty.
     """
     handles = {handle.bone for handle in live.handles}
     if not board.leads(controls, live):

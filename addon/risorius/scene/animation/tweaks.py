@@ -3,7 +3,7 @@
 
 While a tweak is on, the layer stores the difference between an edited slider and the keys below,
 and the slider returns to the value of these keys. The same applies to the bones of head, neck and
-eyes, to the gaze target, and to the handles of a leading face board.
+eyes, to the gaze target, and to the handles of a face board that leads (moves the face).
 """
 
 from __future__ import annotations

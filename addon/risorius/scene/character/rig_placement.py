@@ -207,7 +207,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; bones at rest are left out.
+        "neck" and "head" -> Quaternion in the control armature's axes; without unrotated bones.
     """
     hold = body_of(controls)
     if hold is None:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirrors poses, copies or links the sides of a face, and sets poses of regions."""
+"""Mirrors poses, copies or links the sides of a face, and sets poses of regions.
+
+Either the sliders or the face board lead, that is, move the face; the others have no effect.
+"""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ def handles_of(
 
 
 def size_of(rig: ArmatureObject, live: runtime.Runtime) -> float:
-    """The largest extent of the first mesh at rest, in world space.
+    """The largest extent of the first mesh of the DNA file, neutral, in world space.
 
     Args:
         rig, live: the character and its Runtime.

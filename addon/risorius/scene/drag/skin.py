@@ -120,7 +120,7 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex nearest to the mirror image of a vertex, both at rest; None if none is near.
+        """The vertex nearest to the mirror image of a vertex in the neutral face, or None if far.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.

@@ -168,7 +168,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
                 continue
             was = last_written.inputs.get(rig.session_uid)
             if again:
-                # Animation of the rig's bones has overwritten the pose of the evaluator.
+                # Write the pose again, because animation of the rig's bones has overwritten it.
                 last_written.inputs.pop(rig.session_uid, None)
             if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
                 now = last_written.inputs.get(rig.session_uid)

@@ -58,7 +58,7 @@ def fill(
         live: the character's Runtime.
         depsgraph: graph for reading bones of the deforming armature, if needed.
         raw: float32[R], the raw controls.
-        turns: "neck" and "head" -> Quaternion in the armature's axes; bones at rest may be missing.
+        turns: "neck" and "head" -> Quaternion in the armature's axes; a missing bone is unrotated.
     """
     if not live.turning or not seen.risorius_neck_poses:
         return

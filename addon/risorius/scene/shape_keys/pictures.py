@@ -73,7 +73,7 @@ class Job(NamedTuple):
     samples: Sequence[str]
 
 
-# Pictures of the heads of this file: session_uid of the mesh -> key name -> path.
+# Pictures of the heads of this file: session uid of the mesh -> name of a shape key -> path.
 _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo", "load"))
 
 

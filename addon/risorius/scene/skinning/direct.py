@@ -259,7 +259,7 @@ def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
 
 
 def write(jobs: Sequence[Job]) -> None:
-    """Write final vertex positions to the live shape keys of all given faces at once.
+    """Write final vertex positions to the live shape keys of all given faces together.
 
     Args:
         jobs: see `prepare`.
