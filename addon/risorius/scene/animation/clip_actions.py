@@ -246,7 +246,7 @@ def _add_turn(
     turns: NDArray[np.float64],
     fitter: Fitter | None,
 ) -> None:
-    """Add F-curves of a bone's rotation in its rotation mode.
+    """Add F-curves of a bone's rotation, in the rotation mode of the bone.
 
     turns: float64[n, 4], quaternions (w x y z) in the armature's axes.
     """
@@ -423,7 +423,8 @@ def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.
 
     Args:
         action: any action.
-        owner: the object or the shape keys; of an action with slots, only its slot is read.
+        owner: the object or the shape keys; of an action with slots, only the slot of this
+            owner is read.
     """
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))

@@ -429,7 +429,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of a curve's newest key if it has at most two keys."""
+    """Set interpolation and handle types of the newest key of a curve with at most two keys."""
     if len(curve.keyframe_points) > 2:
         return  # Blender copied them from the previous key
     for key in (

@@ -359,7 +359,7 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
     """Times in seconds at which a layer plays a constant pose: always, from the start of the layer
-    on, or for its length."""
+    on, or for the length of the layer."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}

@@ -163,7 +163,7 @@ def take(
         controls: control armature with an active tweak.
         labels: sliders to store.
         frame: frame of the scene.
-        bones: data paths of `paths_of`; others are ignored.
+        bones: data paths of bones to store; paths that `paths_of` does not contain are ignored.
         held: True: controls that were not edited get a key too if the tweak already has keys of
             them.
         old: curves to which the changes are added, from `curves_so_far`; None: the current curves.
@@ -172,8 +172,8 @@ def take(
         The number of tweaked sliders and bones.
 
     Raises:
-        FaceError: the frame is outside the tweak, or its weight is too small for such a large
-            rotation.
+        FaceError: the frame is outside the tweak, or the weight of the tweak at this frame is too
+            small to store a large rotation.
     """
     tweak = of(controls)
     assert tweak is not None

@@ -29,7 +29,7 @@ class HeadTask(Task[Result], Generic[Result]):
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
+        """Begin a stage of the task. Returns: a function that takes the stage's progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.

@@ -274,7 +274,7 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the matrices of the control bones for one frame.
+        """Store the matrices of the control bones for one frame, see Samples.basis.
 
         Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
         gaze target after the layers are mixed.

@@ -114,7 +114,10 @@ def mirror(rig: ArmatureObject, region: str = "") -> None:
 
 
 def mirror_bones(controls: ArmatureObject) -> None:
-    """Mirror the transforms of control bones at x = 0; the eye bones exchange their rotations."""
+    """Mirror the transforms of control bones at the armature's plane x = 0.
+
+    The left and the right eye bone exchange their mirrored transforms.
+    """
     bones = controls.pose.bones
     turned = {}
     for name in runtime.CONTROL_BONES:

@@ -76,8 +76,10 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
 def _first(
     context: Context, origin: Vector, direction: Vector
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
-    """The first object on a ray that is not drawn as wire or bounds: (original object, location,
-    polygon, object matrix)."""
+    """The first object that a ray meets, except objects drawn as wire or bounds.
+
+    Returns: (original object, location in world space, index of the polygon, world matrix).
+    """
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
         met, place, _normal, index, item, matrix = context.scene.ray_cast(

@@ -42,7 +42,7 @@ class Options:
         symmetric: move the mirrored point too.
         method: "near": few sliders that mainly move the dragged area; "least_squares": all sliders;
             or "transpose", see solve_drag.
-        single: move only the best control; with `symmetric` its partner too.
+        single: move only the best control; with `symmetric` also its partner on the other side.
         choice: with `single`: 0: the best control, 1: the second best, and so on.
         region: use only controls of the region of the point.
         others: points that move together with the dragged point.
@@ -139,7 +139,7 @@ class Stroke:
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
         """Move the point to its target, and insert keys.
 
-        Controls that changed very little during the drag get their values before the drag again.
+        Controls that changed very little during the drag are reset to their values before the drag.
 
         Args:
             context: has the settings for keys.

@@ -355,7 +355,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     """Show the change that an operator made: evaluate one character and the scene.
 
     Args:
-        context: its view layer is evaluated before and after.
+        context: its view layer is evaluated before and after the character.
         rig: deforming armature of the character.
     """
     context.view_layer.update()

@@ -353,8 +353,8 @@ class Skin:
     def _normal_map(self) -> Socket | None:
         """The normal from the normal textures; None if there are none.
 
-        The normals of the texture sets are mixed into the normal of the base texture by their
-        amounts.
+        The normals of the texture sets are mixed into the normal of the base texture; the
+        amount of each set is its factor.
         """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)
