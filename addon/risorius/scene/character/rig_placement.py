@@ -39,7 +39,11 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
 
 
 def has_strayed(rig: ArmatureObject) -> bool:
-    """Whether the user or a script moved a rig that follows its controls. Args: rig  original."""
+    """Whether the user or a script moved a rig that follows its controls.
+
+    Args:
+        rig: the original (not evaluated) deforming armature.
+    """
     last = last_written.places.get(rig.session_uid)
     return isinstance(last, bytes) and _follows(rig) and not _is_at(rig, np.frombuffer(last))
 

@@ -174,7 +174,7 @@ def handles_of(
 
 
 def size_of(rig: ArmatureObject, live: runtime.Runtime) -> float:
-    """The largest extent of the first mesh of the DNA file, neutral, in world space.
+    """The largest extent of the neutral first mesh of the DNA file, in world space.
 
     Args:
         rig, live: the character and its Runtime.

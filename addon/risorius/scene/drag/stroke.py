@@ -176,7 +176,7 @@ class Stroke:
         self.skin.show(context)
 
     def moved(self, count: int = 3) -> list[tuple[str, float]]:
-        """(name, change) of the controls that changed most. Args: count  largest number of them."""
+        """(name, change since the press) of the `count` controls that changed most."""
         change = (self.raw - self.state.seen).astype(np.float64)
         order = np.argsort(-np.abs(change), kind="stable")[:count]
         return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]

@@ -168,7 +168,7 @@ def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
 
 
 def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
-    """Whether the inputs of a face depend on a face of `others`, which includes the face itself."""
+    """Whether the inputs of a face depend on a face of `others`; `others` contains this face."""
     made = stage.Stage(_roots([face]))
     try:
         with stage.alone(c for _rig, c in others):

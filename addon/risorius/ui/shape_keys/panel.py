@@ -180,7 +180,7 @@ def _icon(paths: Mapping[str, Path] | None, key: str) -> int:
 
 
 def _ask_once(mesh: int, sample: str) -> None:
-    """Start to draw missing pictures once, after the panel is drawn."""
+    """Start to draw missing pictures after the panel is drawn, once for each mesh and sample."""
     if (mesh, sample) in _asked or bpy.app.background:
         return
     _asked.add((mesh, sample))
