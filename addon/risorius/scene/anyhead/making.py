@@ -85,7 +85,7 @@ class Made(NamedTuple):
     Attributes:
         finding: the landmarks of the head.
         shapes: the head with its expressions.
-        rigged: the joint rig.
+        rigged: the joint rig that was made from the head.
     """
 
     finding: finding.Finding

@@ -207,7 +207,7 @@ def add_look(
         live: the character's Runtime.
         raw: float32[R], changed in place.
         side: L or R.
-        yaw, pitch: radians.
+        yaw, pitch: the two angles in radians.
         maximum: upper limit of the control values.
     """
     for index, yaw_at_one, pitch_at_one in live.look[side]:

@@ -60,7 +60,7 @@ class Session:
     Attributes:
         uid, name: session uid and last name of the control armature.
         key: (source, port, host) of its receiver.
-        shaper: risorius.live.Shaper.
+        shaper: risorius.live.Shaper, which converts captured faces to controls.
         subject: name of the subject; "" for the first one received.
         sequence: number of the last written frame.
         before: slider -> value before the capture.

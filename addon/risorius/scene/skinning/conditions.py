@@ -50,8 +50,8 @@ class _Kept:
     """State of a face at the last check.
 
     Attributes:
-        plan: Plan.
-        signature: see _signature.
+        plan: the Plan of the face.
+        signature: settings that are compared to notice changes, from _signature.
         is_fresh: False if an edit since then may have changed the plan.
     """
 

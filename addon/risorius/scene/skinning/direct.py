@@ -43,8 +43,8 @@ class Frame:
     """The data for writing the meshes of a face.
 
     Attributes:
-        live: the Runtime.
-        shape: Shape.
+        live: Runtime of the character.
+        shape: the inputs of the shown pose.
         bones: bones of the deforming armature.
         writer: writer of the bones that the evaluator owns.
     """
