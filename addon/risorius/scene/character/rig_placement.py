@@ -131,7 +131,7 @@ def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
 
 
 def _named(bones: Iterable[bpy.types.Bone], word: str) -> str:
-    """The bone nearest to the root whose name contains the word as a whole word, or ""."""
+    """Of the bones whose names contain a whole word, the bone nearest to the root; "" if none."""
     pattern = re.compile(rf"(?:^|[^a-z]){word}(?![a-z])", re.IGNORECASE)
     found = [b for b in bones if pattern.search(_split(b.name))]
     found.sort(key=lambda b: (len(b.parent_recursive), b.name))

@@ -170,7 +170,11 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the sliders of the mouse press. Args: context  with the visible view layer."""
+        """Restore the sliders of the mouse press.
+
+        Args:
+            context: its view layer is evaluated with the restored sliders.
+        """
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)

@@ -25,7 +25,7 @@ from . import lateness
 
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
-# Session uid of the user's scene -> temporary scene with its controls.
+# Session uid of a scene of the user -> temporary scene with the controls of the user's scene.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
 # _edited: whether the file may have been edited since the last frame. _simulated: whether the file
 # has a simulation.

@@ -177,7 +177,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """The inputs of a simple character, for comparison. Args: seen  evaluated control armature."""
+    """The inputs of a character for which _is_simple is True. Args: seen  evaluated controls."""
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)

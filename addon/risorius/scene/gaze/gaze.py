@@ -250,8 +250,10 @@ def frame_of(
 
 
 def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion]) -> Float | None:
-    """float64[3, 3]: rotation that a joint gets from the neck or head bone, or None. The neck
-    joints share the neck's rotation equally."""
+    """float64[3, 3]: rotation in the armature's axes that a joint gets from the neck or head bone.
+
+    None if the joint gets none. The neck joints share the neck's rotation equally.
+    """
     if joint == live.anchors.head and "head" in turns:
         return np.array(turns["head"].to_matrix())
     if joint in live.anchors.neck and "neck" in turns:

@@ -291,7 +291,7 @@ def lashes(graph: Graph, look: Look) -> None:
 
 
 def _strands(graph: Graph, look: Look) -> Socket:
-    """Noise that is stretched along the hairs: along v of the UV map, or else along y."""
+    """Noise that is stretched along the hairs: along v of the UV map, or y without a UV map."""
     where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
     reach = 1.0 if look.has_uvs else 1.0 / look.unit
     stretched = graph.vector("MULTIPLY", where, (110 * reach, 0.6 * reach, 110 * reach))
