@@ -109,7 +109,7 @@ class HeadTurns:
         return (result @ self._place.T)[:, :3]
 
     def of_joint(self, joint: int) -> Float:
-        """float64[4, 4]: matrix in armature space that moves the posed vertices of a joint further.
+        """float64[4, 4]: matrix in armature space, applied to a joint's posed vertices (v' = M v).
 
         It contains motions of the joint and its parents that the raw controls do not contain.
         """

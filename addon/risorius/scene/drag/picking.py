@@ -121,8 +121,8 @@ def _nearest(
 def computed(
     context: Context, rig: ArmatureObject, live: runtime.Runtime, skin: Skin, mesh: int
 ) -> NDArray[np.float64]:
-    """float64[V, 3]: vertices of a mesh in world space, after the armature and without the other
-    modifiers.
+    """float64[V, 3]: vertices of a mesh in world space, deformed by the armature but not by the
+    other modifiers.
 
     Args:
         context: has the visible scene.

@@ -34,7 +34,7 @@ class Skin:
         surface: the face in file space (axes and unit of the DNA file), at the visible level of
             detail.
         items: mesh index -> mesh object.
-        size: largest extent of the face at rest, in Blender units.
+        size: largest extent of the neutral face, in Blender units.
         depsgraph: dependency graph of the view.
         live: Runtime of the character.
         pressed: float64[3], world position of the dragged vertex at the mouse press, or None.

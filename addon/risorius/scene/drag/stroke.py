@@ -170,7 +170,7 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the sliders of the mouse press.
+        """Restore the slider values of the mouse press.
 
         Args:
             context: its view layer is evaluated with the restored sliders.

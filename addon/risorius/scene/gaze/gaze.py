@@ -90,7 +90,7 @@ def target_of(
 
 
 def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
-    """Displacement of a bone from rest in its own axes, including its constraints.
+    """Displacement of a bone from its rest position, in the bone's axes, with its constraints.
 
     Args:
         seen: the evaluated armature.

@@ -157,7 +157,7 @@ class _Edits:
 
     Attributes:
         told: number of the last write that the graph reported before.
-        meshes: session uids of characters' mesh objects that were not edited by this add-on.
+        meshes: session uids of characters' mesh objects that anyone but this add-on edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object outside all characters was edited.
     """
