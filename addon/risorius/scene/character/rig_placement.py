@@ -250,7 +250,7 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move the face so that its head bone meets the body's head bone in rest position.
+    """Move the face so that its head bone at rest meets the body's head bone at rest.
 
     Without head bones, the neck bones are used. `scale`: also scale the face, so that its neck is
     as long as the neck of the body.

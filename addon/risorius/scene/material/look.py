@@ -35,7 +35,7 @@ class Look:
         uses: effects of the animated maps of the face.
         areas: skin areas of a face, such as the forehead, that this mesh has.
         border: whether the mesh has an open border away from the face, such as at the neck.
-        found: texture_search.TexturePlan.
+        found: textures found for the face.
         images: loader of images.
         atlas, places: image with the wrinkle masks of all regions; region -> its tile and colour
             channel in this image.

@@ -172,7 +172,7 @@ def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
 
 
 def draw(model: Model, key: str) -> Floats:
-    """Draw a head with one key and its motion in colour.
+    """Draw a head with one shape key at value 1; the parts that the key moves are orange.
 
     Args:
         model: the head.
