@@ -152,7 +152,7 @@ def bundled_sample(person: str) -> Path | None:
 
 
 def sample_module() -> ModuleType:
-    """The package that makes sample people; it is loaded only when one is built.
+    """The package that makes sample people; it is loaded only when a person is built.
 
     Raises:
         UnusableError: a wheel is missing or has another version, as the text says.

@@ -309,7 +309,8 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # In float32, a very short bone loses its direction, so bones get at least 3 % of `reach`.
+    # In float32, a very short bone loses its direction, so each bone is at least 3 % as long as the
+    # largest extent of all joints.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:

@@ -29,7 +29,7 @@ class HeadTask(Task[Result], Generic[Result]):
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
+        """Begin a stage of the task. Returns: a function that takes the stage's progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
@@ -85,7 +85,7 @@ class Made(NamedTuple):
     Attributes:
         finding: the landmarks of the head.
         shapes: the head with its expressions.
-        rigged: the joint rig.
+        rigged: the joint rig that was made from the head.
     """
 
     finding: finding.Finding

@@ -51,7 +51,7 @@ def export(
         the imported file.
 
     Raises:
-        ExportError: the polygons of a mesh differ from its file, a mesh is in edit mode, or the
+        ExportError: the polygons of a mesh differ from the DNA file, a mesh is in edit mode, or the
             data of the file are missing.
     """
     options = options or ExportOptions()

@@ -96,7 +96,7 @@ def shapes_of(
         context: its scene gives the unit.
         item: mesh object of the head with shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
-        height_mm: height from the chin to the top to which the head is scaled; 0: no scaling.
+        height_mm: the head is scaled to this height from chin to top of the head; 0: no scaling.
         said: the user's assignment of shape keys to controls, see risorius.author.input.said.
 
     Raises:

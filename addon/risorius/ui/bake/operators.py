@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bake faces to plain actions and remove them again."""
+"""Operators that bake faces to plain actions, and that remove these actions again."""
 
 import time
 import traceback

@@ -197,7 +197,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
                 if self.bake_materials:
                     run(context, plain_materials.flatten(override, loans, self.texture_size))
                 # Blender's exporters overwrite an existing file from its start, so a failure would
-                # damage it.
+                # damage it. So they write another file, which then replaces the existing file.
                 with native.part("files.fileio").staging(path) as made:
                     export(self, override, made)
                     if self.bake_materials and self.format == "ALEMBIC":

@@ -39,7 +39,7 @@ WAYS = (
 _AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 
 EnumItem = tuple[str, str, str, int, int]
-# Items of an enum; Blender keeps no references to their strings.
+# Items of an enum, kept alive here because Blender keeps no references to their strings.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
