@@ -192,8 +192,9 @@ struct MlJoint {
 /// A twist or swing setup. Four controls are a rotation, which consists of a *twist* about an axis
 /// and a *swing* of that axis. Joints get shares of one of them, for example along a neck.
 struct TwistSwing {
-  // The rotation of which joints get shares. kTwist: the twist; kUntwist: the inverse of the twist;
-  // kSwing: the inverse of the swing; in addition each joint gets the whole inverse of the twist.
+  // The rotation that is distributed over the joints. kTwist: the twist; kUntwist: the inverse of
+  // the twist; kSwing: the inverse of the swing, and each joint also gets the whole inverse of the
+  // twist.
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
   std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
   std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
@@ -232,8 +233,8 @@ enum StepList : std::uint32_t {
   // correctives.
   kChained,
   // Steps that depend on themselves, directly or through others, and steps that depend on them. A
-  // settled evaluation does not run them, so that their outputs remain at rest. A latent one runs
-  // their correctives.
+  // settled evaluation does not run them, so that their outputs keep their initial values. A latent
+  // one runs their correctives.
   kCyclic,
   // For latent evaluation: networks and then solvers, in the order of the file.
   kReference,
@@ -272,7 +273,7 @@ struct RigArrays {
   A<std::uint32_t> text_ends;
 
   A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
-  A<float> initial_controls;  // [controls]: the control vector at rest
+  A<float> initial_controls;  // [controls]: values before any step runs
   // The table from GUI controls to raw controls. For the inverse, gui_ranges lists ranges of rows
   // with equal bounds, sorted by GUI control and then by their first rows.
   A<ConditionalRow> gui_rows;

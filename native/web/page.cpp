@@ -29,7 +29,7 @@ struct PageMesh {
   const std::uint32_t* channels;  // [targets]
   const std::uint32_t* moves;     // [moved]: positions
   const Four* deltas;             // [moved]
-  const Four* normals;            // [positions] at rest; null: computed from the triangles
+  const Four* normals;            // [positions] undeformed; null: computed from the triangles
   Four* shaped;                   // [positions]
   Four* placed;                   // [positions]
   Four* turned;                   // [positions]

@@ -60,11 +60,11 @@ def curves(action):
 
 
 def turn(bone, degrees):
-    """Turn a pose bone about the scene's axes.
+    """Set the XYZ Euler angles of a pose bone, given about the armature's axes.
 
     Args:
         bone: the pose bone.
-        degrees: angles about x, y and z in degrees.
+        degrees: angles about the armature's x, y and z; converted to the bone's axes.
     """
     bone.rotation_mode = "XYZ"
     to_bone = bone.bone.matrix_local.to_3x3().inverted()

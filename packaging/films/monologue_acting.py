@@ -53,7 +53,8 @@ LOOKS = [
     (17.3, (-0.1, 3.0, 0.05)),
     (20.0, (-0.1, 3.0, 0.05)),
 ]
-# (second, rotation of the head in degrees): nod, tilt to a shoulder, turn.
+# (second, (nod, tilt, turn) of the head in degrees); positive: down, to the left shoulder, to the
+# left.
 TURNS = [
     (0.0, (-2, 0, 10)),
     (1.2, (-1, 0, 9)),

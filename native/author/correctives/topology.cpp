@@ -157,7 +157,8 @@ void touch_skin(const Topology& topology, const Region& region, const std::vecto
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
   const Nearest nearest(region.triangles, skin);
   for (const std::uint32_t v : region.vertices) {
-    // A resting vertex needs no check: the vertex that moves into it finds the contact.
+    // A vertex at its neutral position needs no check: a vertex that moves into it finds the
+    // contact.
     if ((skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
     const auto& near = topology.around[v];
     const auto takes = [&](std::uint32_t t) {

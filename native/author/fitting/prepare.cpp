@@ -35,7 +35,7 @@ void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
 }
 
 /// Converts displacements to the fit's unit. An expression without a partner on the other side gets
-/// a mirrored copy, so that the middle and both sides have the same goals.
+/// a mirrored copy, so that the fit treats both sides of the face alike.
 void take_displacements(const Shapes& shapes, Problem& problem) {
   std::vector<std::uint32_t> alone;
   if (!problem.mirror.empty()) {

@@ -18,9 +18,10 @@ struct SpaceConvention {
   float scale = 1;
 };
 
-/// Converts poses to the bones of another program. A bone rests in the neutral pose n of its joint.
-/// A pose with the deltas dt, dr and ds gives the bone the transform R(n)^-1 T(dt) R(n + dr) S(1 +
-/// ds), in the axes of the other program.
+/// Converts poses to the bones of another program. The rest pose of a bone is the neutral pose of
+/// its joint, with the rotation angles n. A pose with the deltas dt, dr and ds gives the bone the
+/// transform R(n)^-1 T(dt) R(n + dr) S(1 + ds) relative to its rest pose, in the axes of the other
+/// program.
 struct BoneSpace {
   struct Bone {
     std::uint32_t joint;

@@ -199,7 +199,7 @@ async def try_gaze(shown: Shown, found: GlbFile) -> None:
 
 
 def turned(rest: Any, at: Any) -> Any:
-    """float64[3, 3]: the rotation that fits the posed vertices of an eye to the neutral ones.
+    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto the posed ones.
 
     Args:
         rest: neutral vertices [V, 3].

@@ -96,7 +96,7 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Key rest, a blink, surprise and rest. Check the keyframes in all editors, and move a few."""
+    """Key neutral, blink, surprise, neutral. Check the keyframes in all editors, move a few."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
