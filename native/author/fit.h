@@ -18,7 +18,8 @@
 namespace risorius::author {
 
 /// Motion of a joint in an expression. A vertex p becomes position + R(rotation) (p - position) +
-/// translation. rotation is a vector along the axis; its length is the angle in radians.
+/// translation, in the axes of the shapes. rotation is a vector along the axis of a right-handed
+/// rotation; its length is the angle in radians.
 struct JointMotion {
   Vector3 rotation{};
   Vector3 translation{};

@@ -226,7 +226,7 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
       problem.pivots[i].mirrored = k;
       problem.pivots[k].mirrored = i;
     }
-    // A pivot without a mirrored pivot that is near the plane x = 0 is moved into it.
+    // A pivot that has no mirrored pivot and is near the plane x = 0 is moved into this plane.
     if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
       problem.pivots[i].position.x() = 0.0;
     }

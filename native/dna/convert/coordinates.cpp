@@ -359,7 +359,8 @@ bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_c
   return true;
 }
 
-// Converts the axes of quaternions. If the basis mirrors, the sense of rotation is reversed.
+// Converts quaternions from the source's axes to the target's. If the basis mirrors, the sense of
+// rotation is reversed.
 Array<float> converted_quaternions(const Basis& basis, const Array<float>& values) {
   std::vector<float> out(values.begin(), values.end());
   for (std::size_t i = 0; i + 3 < out.size(); i += 4) {

@@ -24,7 +24,7 @@ struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
     std::shared_ptr<const Skin> skin;
-    std::vector<float> base;  // [vertices, 3]: the vertices without channels and bones
+    std::vector<float> base;  // [vertices, 3], which channels and bones then move
   };
   std::shared_ptr<const Rig> rig;
   std::shared_ptr<const BoneSpace> space;
@@ -70,8 +70,8 @@ class DirectFace {
   /// Sets the transforms of all bones of FaceParts::chain: location [bones, 3], rotation [bones, 4]
   /// as w x y z, scale [bones, 3]. The bones that the rig moves get new transforms in each frame.
   void keep(const float* location, const float* rotation, const float* scale);
-  /// Sets the vertices of a mesh without channels and bones. In: mesh  below the number of meshes;
-  /// base  float32[vertices, 3]
+  /// Sets the base vertices of a mesh, which its channels and bones then move.
+  /// In: mesh  below the number of meshes; base  float32[vertices, 3]
   void set_base(std::uint32_t mesh, const float* base);
   /// Makes the next frame write every mesh.
   void forget() noexcept;

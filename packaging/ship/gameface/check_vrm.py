@@ -80,7 +80,7 @@ class Shown:
 
 
 def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
-    """Target -> its weight. Asserts that all meshes have the same weights."""
+    """Morph target -> its weight. Asserts that all meshes have the same weights."""
     out: dict[str, float] = {}
     for weights in state["weights"].values():
         for name, weight in weights.items():
@@ -89,7 +89,7 @@ def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
 
 
 def expect(weights: Mapping[str, float], wanted: Mapping[str, float]) -> None:
-    """Check that the wanted targets have their weights, clamped to 0..1, and all others have 0."""
+    """Check that the wanted morph targets have their weights, clamped to 0..1, all others 0."""
     for name, weight in weights.items():
         asked = min(1.0, max(0.0, wanted.get(name, 0.0)))
         if abs(weight - asked) > 1e-3:

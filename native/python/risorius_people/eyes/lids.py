@@ -51,7 +51,7 @@ _MOVES = 0.03 * MM  # decimetres: smaller displacements do not move the lids
 
 
 def rotation(degrees: float, axis: int) -> Floats:
-    """float64[3, 3]: a rotation about an axis.
+    """float64[3, 3]: a right-handed rotation about an axis, for column vectors.
 
     Args:
         degrees: angle of the rotation.

@@ -112,7 +112,7 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _channels(dna: Dna, lod: int) -> dict[str, int]:
-    """Name -> number of the blend shape channels of a LOD."""
+    """Name -> index, for each blend shape channel of a LOD."""
     listed = {int(c) for c in dna.lod_blend_shape_mapping[lod]}
     names = enumerate(dna.blend_shape_channel_names)
     return {name: channel for channel, name in names if channel in listed}
