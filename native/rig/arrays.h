@@ -45,7 +45,7 @@ struct RowRun {
 };
 
 /// A corrective ("pose space deformation", hence Psd): a control that corrects the combined effect
-/// of several controls, such as lips that are pulled and pressed at once. Its value is min(1,
+/// of several controls, such as lips that are both pulled and pressed. Its value is min(1,
 /// weight * the product of its factors); each factor is another control clamped to [0, 1].
 struct Psd {
   std::uint16_t output = 0;         // the control that the corrective writes

@@ -16,7 +16,7 @@ template <class T>
 constexpr T rounded_up(T rows) {
   return (rows + kWidest - 1) / kWidest * kWidest;
 }
-/// Number of frames that a batch kernel evaluates at once.
+/// Number of frames that a batch kernel evaluates together.
 inline constexpr std::size_t kFrames = 8;
 
 /// A column of a matrix and the index of its weight.

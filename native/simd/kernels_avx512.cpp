@@ -17,7 +17,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts sixteen rotations at once, four in a register. The function for the sines then loads
+// Converts sixteen rotations together, four in a register. The function for the sines then loads
 // exactly these registers; loads that span two stores of half a register would have to wait for
 // both. The number after each rotation is read and written with it.
 struct SixteenByFour {

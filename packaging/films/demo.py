@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the demo in Blender: installs the extension, imports the face, keys the acting, renders.
+"""Makes the demo in Blender: installs the extension, imports the face, adds the acting, renders.
 
 demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key the tracks of acting.py on the bone `face`, and the rotations of BONES on other bones."""
+    """Insert keyframes: tracks of acting.py on the bone `face`, rotations of BONES on others."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

@@ -103,7 +103,7 @@ void add_cold(const std::string& name, Step step, const Frames& frames) {
   b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Adds a benchmark that evaluates many frames or faces at once. Several threads are measured by
+// Adds a benchmark that evaluates many frames or faces together. Several threads are measured by
 // wall time and in rounds, because starting a thread on an idle core of a virtual machine takes as
 // long as hundreds of frames. One thread is measured by its processor time, which does not count
 // the time of other processes.

@@ -157,7 +157,7 @@ class Mixer {
  public:
   /// In:    controls   names, each once
   ///        low, high  [controls], low <= high
-  ///        max_fired  largest number of reactions that are active at once
+  ///        max_fired  largest number of reactions that are active at the same time
   /// Fails: kInvalidLength, kInvalidValue.
   static core::Result<Mixer> make(std::vector<std::string> controls, std::vector<float> low,
                                   std::vector<float> high, std::size_t max_fired = 256);

@@ -412,7 +412,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// The numbers of the networks are not converted. Instead, keys 3 to 9 of MlJoints name the
+// The numbers of the networks are not converted. Instead, parameters 3 to 9 of MlJoints name the
 // coordinate system to which the numbers refer.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;

@@ -2,7 +2,7 @@
 """check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests exported VRM files in three-vrm.
 
 With each expression alone, the vertices must equal both the sum of the file's numbers and the
-rig's vertices. A real take plays by the 52 ARKit units, and a voice by the visemes. Also checks
+rig's vertices. A real take is played by the 52 ARKit units, a voice by visemes. Also checks
 that emotions override blinks as the file says, that the head turns, and that the eyes look at a
 target by expressions.
 """
