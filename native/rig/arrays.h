@@ -78,8 +78,8 @@ struct JointGroup {
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
-/// Numbers of coefficients and columns that one control, or all controls together, make an
-/// evaluation read in the joint groups of a LOD.
+/// Numbers of coefficients and columns of the joint groups that an evaluation of a LOD reads for
+/// one control, or for all controls together.
 struct ControlReads {
   std::uint32_t values = 0;   // coefficients that an evaluation reads
   std::uint32_t columns = 0;  // the columns that hold these coefficients
@@ -101,8 +101,8 @@ struct QuaternionJoint {
 };
 
 /// A column that rotates joints by quaternions. The columns are ordered by group, and within a
-/// group as in the file. The rotations are multiplied in this order, because quaternions do not
-/// commute.
+/// group as in the file. The rotations are multiplied in this order, each from the left, because
+/// quaternions do not commute.
 struct QuaternionColumn {
   std::uint32_t control = 0;
   std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
