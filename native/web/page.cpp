@@ -54,7 +54,8 @@ void add_shapes(const PageMesh& mesh, const float* channels) {
   }
 }
 
-// Deforms positions and normals by the joints. In: matrices  four columns for each joint
+// Deforms positions and normals by the joints. In: matrices  the four columns of each joint's
+// skinning matrix
 void add_joints(const PageMesh& mesh, const Four* matrices) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) {
     Four x{}, y{}, z{}, w{};

@@ -35,7 +35,7 @@ struct BoneSpace {
 };
 
 /// Prepares the conversion of some joints' poses to bones.
-/// In:  neutral_rotations  float32[joint_count, 3] in the file's unit
+/// In:  neutral_rotations  float32[joint_count, 3], Euler angles in the file's unit and order
 ///      bones              the joint of each bone, below joint_count
 BoneSpace make_bone_space(const SpaceConvention& convention, const float* neutral_rotations,
                           std::uint32_t joint_count, const std::vector<std::uint32_t>& bones);
