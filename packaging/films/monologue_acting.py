@@ -19,7 +19,7 @@ LINES = [
 
 INTENSITY = 0.75  # of the speech; below 1, because a mood has already moved the mouth
 
-# Moods: (first and last second at full strength, expression, strength, mirrored).
+# Moods: (first and last second at full strength, expression, strength, whether mirrored).
 MOODS = [
     (0.0, 0.6, "relief", 0.15, False),
     (1.4, 4.6, "doubt", 0.7, False),

@@ -136,7 +136,8 @@ class Simplex {
     weights_ = Column::Zero(right_.size());
   }
 
-  /// In: start  candidates that are in the first passive set
+  /// Solves by the active set method of NNLS.
+  /// In: start  candidates of the first passive set, whose weights may be above 0
   void solve(const std::vector<int>& start) {
     passive_ = start;
     for (const int c : start) weights_[c] = 1.0 / static_cast<double>(start.size());
