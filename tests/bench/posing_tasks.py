@@ -269,7 +269,10 @@ def is_mirrored(face, goal):
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, raw controls, vertex before, its target, key events) of the best drag, or None."""
+    """(error in mm, raw controls, start, target, key events) of the best drag, or None.
+
+    Start and target are places of the dragged vertex.
+    """
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
     picked, order = [], np.argsort(-off)
