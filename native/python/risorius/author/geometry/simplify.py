@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -39,27 +39,40 @@ def fan_triangles(mesh: Mesh) -> Ints:
     return layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
-def attributes_of(mesh: Mesh, displacements: Doubles) -> Floats:
+def attributes_of(
+    mesh: Mesh, some: Doubles, blocks: Iterable[tuple[Ints, Mesh, Doubles]] | None = None
+) -> Floats:
     """float32[layouts, n]: texture coordinates and principal components of the displacements.
 
     Args:
         mesh: the mesh.
-        displacements: float64[E, V, 3], displacements of its vertices by the expressions.
+        some: float64[E, n, 3], displacements of all or many vertices by the expressions, which
+            determine the components.
+        blocks: indices of the vertices, part of the mesh and displacements float64[E, n, 3] of
+            each block; each vertex is in one. None: `some` has all vertices.
     """
     size = _size(mesh)
     places = np.asarray(mesh.layout_positions, np.int64)
     uvs = np.asarray(mesh.texture_coordinates, np.float64)
     own = uvs[np.asarray(mesh.layout_texture_coordinates, np.int64)]
-    moving = np.abs(displacements).max(axis=(1, 2), initial=0.0) > 0
-    displacements = displacements[moving]
-    if not len(displacements):
+    moving = np.flatnonzero(some.any(axis=(1, 2)))
+    if not len(moving):
         return (_UV * own).astype(np.float32)
-    moved = displacements.transpose(1, 0, 2).reshape(len(mesh.positions), -1) / size
+    moved = _by_vertex(some, moving) / size
     spread, axes = np.linalg.eigh(moved.T @ moved)
     main = axes[:, np.argsort(-spread, kind="stable")[:_COMPONENTS]]
     # The sign of an eigenvector is arbitrary. Its largest entry is made positive on every machine.
     main = main * np.where(main[np.abs(main).argmax(axis=0), range(main.shape[1])] < 0, -1, 1)
-    return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]]).astype(np.float32)
+    along = np.zeros((len(mesh.positions), main.shape[1]))
+    for vertices, _, displacements in blocks or [(np.arange(len(along)), mesh, some)]:
+        along[vertices] = _by_vertex(displacements, moving) / size @ main
+    return np.column_stack([_UV * own, _MOTION * along[places]]).astype(np.float32)
+
+
+def _by_vertex(displacements: Doubles, expressions: Ints) -> Doubles:
+    """float64[V, 3 n]: the displacements [E, V, 3] by n of the expressions."""
+    own = displacements[expressions]
+    return own.transpose(1, 0, 2).reshape(own.shape[1], -1)
 
 
 def _size(mesh: Mesh) -> float:
