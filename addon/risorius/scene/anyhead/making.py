@@ -106,7 +106,8 @@ def rig_task(
         tell = telling(task.part(FIT, 0.0, _FITTED), cancelled)
         made, read = _carry_over(head, template, transfer, tell)
         tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
-        rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell)
+        few = native.part("anyhead.onto").FIT_VERTICES
+        rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell, few)
         if not cancelled():
             _write(rig.dna, read, wishes.path)
         found = finding.on_object(head, made.landmarks)

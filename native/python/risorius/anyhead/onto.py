@@ -6,7 +6,7 @@ The steps: standing, laying, transfer, fittings, repair, author's joining, Shape
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from .. import Conditionals, Dna
 from ..author.correctives import add_correctives
 from ..author.geometry.skeleton import Doubles
+from ..author.geometry.sparse import SparseShapes, subset
 from ..author.heads.joining import join
 from ..author.heads.parts import HeadPart, Wishes
 from ..author.input.matching import Assignment
@@ -35,10 +36,11 @@ from .laying import lay
 from .repair import repair
 from .standing import Standing, stand
 from .surface import Surface
-from .transfer.template import Floats, Pose, Progress, read_template
+from .transfer.template import Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
+FIT_VERTICES = 12_000  # joints are fitted to a head simplified to this, see RigOptions
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
 # Progress after each step, 0 to 1.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
@@ -129,8 +131,8 @@ def onto(
     carried = transfer(source, target, laid.points, laid.trust, wanted, rest, jaw)
     fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
     mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
-    every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
-    every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
+    every = head_parts(fitted, _of_length(mended, single=True))
+    every[0].shapes.update(_of_length(mended, single=False))
     names = {name: [name] for name in source.controls}
     joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
     shapes = shape_set(template.name or "head", joined)
@@ -143,22 +145,35 @@ def _mended(
     target: Surface,
     fitted: Fittings,
     head: Standing,
-    ways: dict[Pose, Doubles],
+    ways: SparseShapes[Pose],
     o: OntoOptions,
     progress: Progress | None,
     tell: Say,
-) -> dict[Pose, Doubles]:
+) -> SparseShapes[Pose]:
     """The displacements of the poses, repaired unless the options forbid it."""
     if not o.repaired or not o.strength:
         return ways
     tell("closing lids and lips, taking skin out of eyes and teeth")
     out = repair(
         target, fitted.face.mesh.faces, fitted, head.found.landmarks, None,
-        {pose[0]: way for pose, way in ways.items() if len(pose) == 1},
-        {pose: way for pose, way in ways.items() if len(pose) > 1},
+        _of_length(ways, single=True), subset(ways, [pose for pose in ways if len(pose) > 1]),
         progress,
     )  # fmt: skip
-    return {(name,): way for name, way in out.expressions.items()} | dict(out.combinations)
+    both = SparseShapes[Pose](ways.count)
+    for name in out.expressions:
+        both.take((name,), out.expressions, name)
+    for pose in out.combinations:
+        both.take(pose, out.combinations, pose)
+    return both
+
+
+def _of_length(ways: SparseShapes[Pose], *, single: bool) -> SparseShapes[str]:
+    """The displacements of single controls or of combinations, by their names joined by +."""
+    out = SparseShapes[str](ways.count)
+    for pose in ways:
+        if (len(pose) == 1) == single:
+            out.take("+".join(pose), ways, pose)
+    return out
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:
@@ -173,11 +188,10 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
         ArgumentError: no expression moves a vertex.
     """
     shapes = made.shapes
-    together = {  # without correctives of controls that the head lacks, such as a tongue's
-        name: delta
-        for name, delta in take_combined(shapes).items()
-        if set(name.split("+")) <= set(shapes.expressions)
-    }
+    every = take_combined(shapes)
+    # Without correctives of controls that the head lacks, such as a tongue's.
+    known = set(shapes.expressions)
+    together = subset(every, [name for name in every if set(name.split("+")) <= known])
     odd = [note for note in check_shapes(shapes) if "moves nothing" not in note]
     controls = {name: [name] for name in shapes.expressions}
     dna = make_shape_face(shapes, controls)
@@ -193,17 +207,23 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
     return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
 
 
-def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
-    """float64[V, 3] by pose: the displacements with all controls of the pose at 1.
+def whole_ways(ways: SparseShapes[Pose], progress: Progress | None = None) -> SparseShapes[Pose]:
+    """The displacements [V, 3] by pose with all controls of the pose at 1.
 
     Args:
         ways: the result of `transfer`: for a control its displacements, for a corrective only its
             own addition to them.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
     """
-    out = {}
-    for pose in ways:
-        parts = [way for other, way in ways.items() if set(other) <= set(pose)]
-        out[pose] = np.sum(parts, axis=0, dtype=np.float64)
+    out = SparseShapes[Pose](ways.count)
+    for number, pose in enumerate(ways):
+        _at(progress, number / len(ways))
+        parts = [other for other in ways if set(other) <= set(pose)]
+        if len(parts) == 1:
+            out.take(pose, ways, pose)
+        else:
+            out[pose] = sum((ways[other] for other in parts), np.zeros(1))
     return out
 
 

@@ -20,7 +20,6 @@ from .work import Work
 
 _SMALL = 2000  # vertices: smaller meshes are not simplified
 _FACING = 0.4  # least cosine between the normals of a vertex and of its place when simplified
-_POSES = 12  # expressions with the largest motion that decide between two candidates for weights
 
 
 @dataclass
@@ -172,17 +171,18 @@ def _take_own(wanted: Wanted, kept: Ints, corners: Ints, shares: Doubles) -> Non
         kept: int64[n], index in the whole mesh of each vertex of the simplified mesh.
         corners, shares: as in Simplified; changed.
     """
-    poses = np.argsort(-wanted.squares, kind="stable")[:_POSES]
-    ways = wanted.ways(poses)
-    of_kept = ways[:, kept]
-    placed, alone = np.zeros(len(corners)), np.zeros(len(corners))
+    of_kept = wanted.at(kept)
     owner = _owners(wanted.mesh, kept)
-    for way, own in zip(ways, of_kept, strict=True):
-        mixed = sum(shares[:, k, None] * own[corners[:, k]] for k in range(3))
-        placed += np.square(mixed - way).sum(axis=1)
-        alone += np.square(own[owner] - way).sum(axis=1)
-    better = alone < placed
-    corners[better], shares[better] = owner[better, None], [1.0, 0.0, 0.0]
+    for block in wanted.blocks():
+        at = block.vertices
+        placed, alone = np.zeros(len(at)), np.zeros(len(at))
+        for row in np.flatnonzero(block.wanted.any(axis=(1, 2))).tolist():
+            way, own = block.wanted[row], of_kept[row]
+            mixed = sum(shares[at, k, None] * own[corners[at, k]] for k in range(3))
+            placed += np.square(mixed - way).sum(axis=1)
+            alone += np.square(own[owner[at]] - way).sum(axis=1)
+        better = at[alone < placed]
+        corners[better], shares[better] = owner[better, None], [1.0, 0.0, 0.0]
 
 
 def _owners(mesh: Mesh, kept: Ints) -> Ints:

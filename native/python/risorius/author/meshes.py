@@ -168,21 +168,27 @@ class Made:
         small = self.fewer.meshes.get(m) if self.fewer is not None else None
         if small is not None and self.fewer is not None:
             assert not isinstance(start, SparseWeights)
-            own = self.fewer.wanted[m]
             if not wanted.small:
-                start = self._fitted(lod, small.mesh, name, own.at(np.arange(len(own))), start)
-            made = copy.copy(small.mesh)
-            _set_skin(made, start)
-            self.fewer.made[m] = made
+                self._add_large(lod, m, name, wanted, start)
+                return
             start = small.carried(start)
         every = np.arange(len(wanted))
-        if not wanted.small:
-            assert isinstance(start, SparseWeights)
-            rows: Rows = start
-        else:
-            rows = self._fitted(lod, mesh, name, wanted.at(every), start[every])
-        self.weights[m] = rows
-        self._finished(lod, mesh, name, wanted, rows)
+        self.weights[m] = self._fitted(lod, mesh, name, wanted.at(every), start[every])
+        self._finished(lod, mesh, name, wanted, self.weights[m])
+
+    def _add_large(self, lod: int, m: int, name: str, wanted: Wanted, start: Doubles) -> None:
+        """Add a large mesh of the finest level with the weights of its simplified mesh."""
+        assert self.fewer is not None
+        small = self.fewer.meshes[m]
+        own = self.fewer.wanted[m].at(np.arange(len(small.kept)))
+        rows = self._fitted(lod, small.mesh, name, own, start)
+        made, left = _finish_mesh(self.ways, small.mesh, rows, own, self.options)
+        _set_skin(made, rows)
+        self.fewer.made[m] = made
+        self.weights[m] = small.carried(rows)
+        self._finished(lod, wanted.mesh, name, wanted, self.weights[m])
+        if self.whole:  # between 0 and 1, only the errors of the simplified mesh are measured
+            self.errors[-1].between_largest = left.between_largest
 
     def _add_coarse(
         self, lod: int, mesh: Mesh, name: str, wanted: Wanted, m: int, kept: Ints
@@ -227,7 +233,6 @@ class Made:
         if not self.whole:
             return
         shaped = self.options if lod < self.own else replace(self.options, shapes=False)
-        # Between 0 and 1 the errors of a large mesh are measured on its simplified mesh.
         shaped = replace(shaped, between=shaped.between and wanted.small)
         parts, left = [], _no_errors(len(wanted), self.work.names)
         for block in wanted.blocks():

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ... import Dna
 from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles
+from ...author.geometry.sparse import subset
 from ...author.heads.islands import islands_of
 from ...author.heads.parts import HeadPart
 from ...author.input.obj import ObjMesh
@@ -200,13 +201,13 @@ def head_parts(fittings: Fittings, expressions: Mapping[str, Doubles]) -> list[H
     """
     face = fittings.face
     skin = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
-    out = [replace(face, shapes=dict(expressions))]
+    out = [replace(face, shapes=subset(expressions, expressions))]
     for row in fittings.rows:
         if row.kind not in (LASHES, BROWS, SKIN):
             out.append(row.part)
             continue
         islands = islands_of(row.part.mesh) if row.kind == LASHES else None
         follow = Followers(skin, row.part.mesh.positions, islands)
-        shapes = follow.ways(dict(expressions))
-        out.append(replace(row.part, shapes=row.part.shapes | shapes))
+        shapes = follow.ways(expressions)
+        out.append(replace(row.part, shapes={**row.part.shapes, **shapes}))
     return out

@@ -44,9 +44,10 @@ class Contacts:
             bodies: teeth and gums.
         """
         self.skin, self.bodies = skin, bodies
-        sizes = np.array([len(face) for face in faces], np.int64)
+        sizes = np.fromiter(map(len, faces), np.int64, len(faces))
         self._offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.uint32)
-        self._corners = np.concatenate([np.asarray(face, np.int64) for face in faces])
+        corners = itertools.chain.from_iterable(faces)
+        self._corners = np.fromiter(corners, np.int64, int(sizes.sum()))
         of_triangle = np.repeat(np.arange(len(faces)), np.maximum(sizes - 2, 0))
         self._face_of = of_triangle if len(of_triangle) == len(skin.triangles) else None
         self._area = self._areas(skin.points, np.arange(len(skin.triangles)))

@@ -13,7 +13,7 @@ from ... import Dna, load
 from ...anyhead.borrowing import lend_materials
 from ...anyhead.default import default_template
 from ...anyhead.landmarks.marks import landmarks_path, landmarks_text, read_landmarks
-from ...anyhead.onto import OntoOptions, onto, shape_face
+from ...anyhead.onto import FIT_VERTICES, OntoOptions, onto, shape_face
 from ...anyhead.reading import read_head
 from ...anyhead.transfer.transfer import STRENGTHS
 from ...author.heads.parts import Wishes
@@ -130,6 +130,7 @@ def spec_of(args: argparse.Namespace) -> Spec:
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
+    spec.options = replace(spec.options, fit_vertices=FIT_VERTICES)
     if spec.options.tolerance_mm is None:  # a fraction of the head, not of the whole body
         spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
