@@ -205,12 +205,11 @@ class Made:
         """
         self._listed(lod, name)
         finest = self.weights[m]
-        if len(kept) <= LARGE:
+        if len(kept) <= LARGE or not isinstance(finest, SparseWeights):
             own = wanted.at(kept)
             rows: Rows = self._fitted(lod, mesh, name, own, finest[kept])
             at = np.arange(len(kept))
         else:  # the errors of a large mesh are measured at some of its vertices
-            assert isinstance(finest, SparseWeights)
             rows = inherited(self.work, finest.some(kept), lod)
             at = np.arange(0, len(kept), -(-len(kept) // LARGE))
             own = wanted.at(kept[at])

@@ -103,13 +103,15 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
     label = np.arange(count)
     begins = np.cumsum(sizes) - sizes
     while len(sizes):
-        least = np.minimum.reduceat(label[corners], begins)
-        new = label.copy()
-        np.minimum.at(new, corners, np.repeat(least, sizes))
-        new = new[new]
-        if np.array_equal(new, label):
+        own = label[corners]
+        least = np.repeat(np.minimum.reduceat(own, begins), sizes)
+        larger = own > least
+        if not larger.any():
             break
-        label = new
+        np.minimum.at(label, own[larger], least[larger])
+        above = label[label]
+        while not np.array_equal(above, label):
+            label, above = above, above[above]
     return label
 
 

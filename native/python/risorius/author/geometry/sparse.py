@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from .skeleton import Doubles
 
 K = TypeVar("K")
 L = TypeVar("L")
-Numbers = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+Numbers = npt.NDArray[Any]
 
 
 class SparseShapes(MutableMapping[K, Doubles]):
