@@ -40,10 +40,12 @@ from .transfer.template import Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
+_READ, _CHECKED, _SHAPED = 0.1, 0.4, 0.8  # progress of shape_face
 FIT_VERTICES = 12_000  # joints are fitted to a head simplified to this, see RigOptions
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
 # Progress after each step, 0 to 1.
-_FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
+_FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.8
+_COMPLETE, _WHOLE, _MENDED = 0.83, 0.85, 0.97
 
 
 @dataclass(frozen=True)
@@ -129,9 +131,12 @@ def onto(
     wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
     jaw = None if laid.jaw is None else jaw_by_teeth(laid.jaw, template, found)
     carried = transfer(source, target, laid.points, laid.trust, wanted, rest, jaw)
-    fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
-    mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
-    every = head_parts(fitted, _of_length(mended, single=True))
+    fitted = complete(found, template, laid.points, _part(progress, _CARRIED, _COMPLETE))
+    ways = whole_ways(carried.ways, _part(progress, _COMPLETE, _WHOLE))
+    del carried
+    mended = _mended(target, fitted, head, ways, o, _part(progress, _WHOLE, _MENDED), tell)
+    del ways
+    every = head_parts(fitted, _of_length(mended, single=True), _part(progress, _MENDED, 1.0))
     every[0].shapes.update(_of_length(mended, single=False))
     names = {name: [name] for name in source.controls}
     joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
@@ -176,30 +181,35 @@ def _of_length(ways: SparseShapes[Pose], *, single: bool) -> SparseShapes[str]:
     return out
 
 
-def shape_face(made: Onto, template: Dna, where: str) -> Read:
+def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None = None) -> Read:
     """The head with expressions as a face of blend shapes, in the form of author.input.spec.Read.
 
     Args:
         made: the head with expressions; its shapes are changed.
         template: the face whose GUI controls are copied.
         where: name of the head in error messages.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
         ArgumentError: no expression moves a vertex.
+        Stopped: `progress` returned False.
     """
     shapes = made.shapes
     every = take_combined(shapes)
     # Without correctives of controls that the head lacks, such as a tongue's.
     known = set(shapes.expressions)
     together = subset(every, [name for name in every if set(name.split("+")) <= known])
-    odd = [note for note in check_shapes(shapes) if "moves nothing" not in note]
+    notes = check_shapes(shapes, lambda: _at(progress, _READ))
+    odd = [note for note in notes if "moves nothing" not in note]
     controls = {name: [name] for name in shapes.expressions}
-    dna = make_shape_face(shapes, controls)
+    dna = make_shape_face(shapes, controls, lambda: _at(progress, _CHECKED))
     looks = zip(dna.mesh_names, (part.material for part in shapes.parts), strict=True)
     materials = {name: look for name, look in looks if look is not None}
     rows = combined_rows(where, shapes, together, controls, dna.raw_control_names)
     if rows:
         face = shapes.parts[0]
+        _at(progress, _SHAPED)
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
         dna = add_correctives(dna, 0, own)
     _copy_board(template, dna)

@@ -79,6 +79,7 @@ def fewer_vertices(
     wanted: Mapping[int, Wanted],
     most: int,
     attributes: dict[int, Floats],
+    levels: Mapping[tuple[int, int], Ints],
     go_on: Callable[[], None],
 ) -> Fewer | None:
     """Simplify meshes for the fit of joints. Returns None if they have few vertices.
@@ -89,6 +90,7 @@ def fewer_vertices(
         wanted: mesh -> its displacements.
         most: wanted number of vertices of all these meshes.
         attributes: attributes for the simplification by mesh; missing ones are added.
+        levels: (level, mesh) -> triangles of the coarser levels of detail, as layouts.
         go_on: called before each mesh; raises an error to stop.
     """
     counts = {m: len(wanted[m]) for m in shaped}
@@ -101,9 +103,9 @@ def fewer_vertices(
     for m in large:
         go_on()
         budget = max(round(share * counts[m]), _SMALL)
-        triangles = fewer_triangles(
-            wanted[m].mesh, known_attributes(attributes, m, wanted[m]), budget
-        )
+        own = known_attributes(attributes, m, wanted[m])
+        finer = None if wanted[m].small else _finer(levels, m, budget)
+        triangles = fewer_triangles(wanted[m].mesh, own, budget, finer)
         if budget < counts[m] and len(triangles):
             made[m] = _simplified(wanted[m], triangles)
     source = _with_meshes(work.source, {m: fewer.mesh for m, fewer in made.items()})
@@ -111,6 +113,12 @@ def fewer_vertices(
     small.source = source
     own = {m: Wanted(small, made[m].mesh) if m in made else wanted[m] for m in shaped}
     return Fewer(small, own, made)
+
+
+def _finer(levels: Mapping[tuple[int, int], Ints], m: int, vertices: int) -> Ints | None:
+    """The triangles of the coarsest level that has clearly more vertices than wanted, or None."""
+    able = [t for (_, mesh), t in levels.items() if mesh == m and len(t) > 4 * vertices]
+    return min(able, key=len, default=None)
 
 
 def _with_meshes(dna: Dna, changed: Mapping[int, Mesh]) -> Dna:

@@ -6,6 +6,7 @@ Dna --columns, displacements--> fit --weights, joint groups--> Dna --errors--> b
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ from .combinations import Combination, Combinations
 from .fewer import fewer_vertices
 from .fitting import FitOptions, Progress, fit_joints
 from .geometry import skeleton as sk
+from .geometry.blocks import LARGE
 from .geometry.simplify import Floats
 from .geometry.skeleton import Doubles
 from .level_meshes import LevelMeshes, level_meshes
@@ -48,7 +50,8 @@ from .work import (
     resting,
 )
 
-_FIT, _MESHES = 0.7, 0.8  # progress at the ends of the fit and of the meshes
+# Progress at the ends of the preparation, of the fit and of the meshes.
+_BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
 _SOLVED = 0.6  # of the progress of correctives, at the end of their solution
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
 
@@ -207,7 +210,7 @@ def _made(
         region.
     """
     o.lods.check()
-    go_on = _asking(progress, 0.0)
+    go_on = _counting(progress, sum(1 + len(m.positions) // LARGE for m in dna.meshes))
     work = begin(dna, go_on)
     wanted, work.wanted = work.wanted, {}  # large arrays, so they are released early
     needs = {m for m in wanted if needs_joints(work, wanted[m])}
@@ -228,11 +231,13 @@ def _made(
         o = replace(o, tolerance_mm=o.tolerance * height_mm(dna))
     on, fewer = work, None
     if like is None:
-        fewer = fewer_vertices(work, shaped, wanted, o.fit_vertices, attributes, go_on)
+        fewer = fewer_vertices(
+            work, shaped, wanted, o.fit_vertices, attributes, coarse.triangles, go_on
+        )
         on = fewer.work if fewer is not None else work
         fitted = fewer.wanted if fewer is not None else wanted
         # The fit takes most of the time, so it gets most of the progress.
-        fit, weights = _new_joints(on, shaped, fitted, o, _part(progress, 0.0, _FIT))
+        fit, weights = _new_joints(on, shaped, fitted, o, _part(progress, _BEGUN, _FIT))
         _take_chosen(work, on)
     else:
         like.check(work)
@@ -256,6 +261,22 @@ def _take_chosen(work: Work, other: Work) -> None:
     """Take joints of levels and parents that were chosen for the face with simplified meshes."""
     work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
     work.mirrored, work.heirs = other.mirrored, other.heirs
+
+
+def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
+    """As _asking(), with a share that grows with each call towards _BEGUN.
+
+    Args:
+        progress: gets the share.
+        least: after this number of calls the share is half of _BEGUN.
+    """
+    calls = itertools.count(1)
+
+    def ask() -> None:
+        done = next(calls)
+        _asking(progress, _BEGUN * done / (done + least))()
+
+    return ask
 
 
 def _asking(progress: Progress | None, share: float) -> Callable[[], None]:

@@ -81,7 +81,10 @@ def level_meshes(
             if not budget:
                 continue
             go_on()
-            triangles = fewer_triangles(mesh, known_attributes(known, m, wanted[m]), budget)
+            # A large mesh is simplified from level to level, because that takes less time.
+            finer = None if wanted[m].small else out.triangles.get((lod - 1, m))
+            own = known_attributes(known, m, wanted[m])
+            triangles = fewer_triangles(mesh, own, budget, finer)
             if len(triangles):
                 made[lod, m] = triangles
         wrong = "" if options.vertices else check.wrong(made.get((lod, skin)))

@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import Dna
 from ..base.errors import ArgumentError
+from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
 
 # Fraction of LOD 0's joints at each level, about as in hand-made faces. It falls more slowly than
@@ -34,7 +35,8 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
+    # Vertices of each level; empty: 0.6 times the level before, and at most 60,000.
+    vertices: tuple[int, ...] = ()
 
     def check(self) -> None:
         """Raise ValueError if a budget has not `count` numbers or grows from level to level."""
@@ -183,7 +185,7 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each level.
+    """The number of vertices of each level. The level after a large one has at most LARGE.
 
     Args:
         options: budgets, if given.
@@ -193,7 +195,7 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
     out = list(existing)
     while len(out) < levels:
         given = options.vertices[len(out)] if len(out) < len(options.vertices) else None
-        out.append(given if given is not None else round(_FALL * out[-1]))
+        out.append(given if given is not None else min(round(_FALL * out[-1]), LARGE))
     return out[:levels]
 
 

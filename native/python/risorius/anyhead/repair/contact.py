@@ -53,6 +53,7 @@ class Contacts:
         self._area = self._areas(skin.points, np.arange(len(skin.triangles)))
         self._checker: SkinChecker | None = None
         self._rest: SkinFaults | None = None
+        self._edges: Ints | None = None
         self._near = self._near_teeth()
         self._rest_depth = self._depth(skin.points[self._near], bodies.rest)
         area = np.zeros(len(skin.points))
@@ -123,23 +124,26 @@ class Contacts:
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
         """float64[V, 3]: displacements with skin pushed out of teeth along their normals, and a
         smooth fall-off around it."""
-        points = self.skin.points + displacement
-        edges = self._edges()
+        if self._edges is None:
+            self._edges = self._edges_near_teeth()
+        out = displacement.copy()
+        points = self.skin.points[self._near] + displacement[self._near]
         for _ in range(_ROUNDS):
-            push = np.zeros_like(points)
-            depth, normal = self._depths(points[self._near], posed)
+            depth, normal = self._depths(points, posed)
             lack = np.maximum(depth - self._rest_depth, 0.0)
             if lack.max(initial=0.0) < _DEEP:
                 break
-            push[self._near] = lack[:, None] * normal
-            points = points + _spread(push, edges)
-        return np.asarray(points - self.skin.points)
+            moved = _spread(lack[:, None] * normal, self._edges)
+            points = points + moved
+            out[self._near] += moved
+        return out
 
-    def _edges(self) -> Ints:
-        near = np.zeros(len(self.skin.points), bool)
-        near[self._near] = True
-        edges = self.skin.edges()
-        return np.asarray(edges[near[edges].all(axis=1)])
+    def _edges_near_teeth(self) -> Ints:
+        """int64[E, 2]: edges between vertices near teeth and gums, as indices in `_near`."""
+        place = np.full(len(self.skin.points), -1)
+        place[self._near] = np.arange(len(self._near))
+        edges = place[self.skin.edges()]
+        return np.asarray(edges[(edges >= 0).all(axis=1)])
 
     def _made(self) -> SkinChecker:
         if self._checker is None:

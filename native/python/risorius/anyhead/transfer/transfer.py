@@ -83,7 +83,8 @@ def transfer(
     ways = Carrying(face, points, trust, teeth).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
-    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
+    begun = None if progress is None else lambda share: progress(0.1 + 0.1 * share)
+    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads, begun)
     if not (spreading.known > 0.1).any():
         raise AnyHeadError("the fitted template touches no part of the head: check the landmarks")
     _tell(progress, 0.2)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ... import Mesh, _native
+from .blocks import LARGE
 from .skeleton import Doubles, Ints
 
 _UV = 0.5  # weight of texture coordinates relative to positions in units of the mesh' size
@@ -115,7 +116,9 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
     return label
 
 
-def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
+def fewer_triangles(
+    mesh: Mesh, attributes: Floats, vertices: int, begin: Ints | None = None
+) -> Ints:
     """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
     The simplification keeps texture coordinates and displacements by expressions beside the form.
@@ -127,8 +130,10 @@ def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
         mesh: the mesh; it is not changed.
         attributes: float32[layouts, n], see attributes_of().
         vertices: wanted largest number of vertices; seams and borders may require more.
+        begin: int64[n, 3], triangles of a finer level as layouts, which are simplified further;
+            None: all triangles of the mesh.
     """
-    triangles = fan_triangles(mesh).astype(np.uint32)
+    triangles = (fan_triangles(mesh) if begin is None else begin).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)
     if not len(triangles):
         return np.asarray(triangles, np.int64)
@@ -202,7 +207,8 @@ def _fewer(
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
-        found, _ = _native.simplify(points, attributes, triangles, count)
+        begin = found if len(triangles) > 4 * LARGE else triangles  # to save time
+        found, _ = _native.simplify(points, attributes, begin, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):
             break

@@ -333,4 +333,6 @@ def mesh_edges(mesh: Mesh) -> npt.NDArray[np.uint32]:
     following[offsets[1:][full] - 1] = offsets[:-1][full]
     pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    return np.unique(pairs, axis=0).astype(np.uint32)
+    count = max(len(mesh.positions), 1)
+    key = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    return np.stack(np.divmod(key, count), axis=1).astype(np.uint32)

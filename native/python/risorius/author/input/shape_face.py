@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,29 +67,29 @@ def shape_set(name: str, head: Joined) -> ShapeSet:
     )
 
 
-def check_shapes(shapes: ShapeSet) -> list[str]:
+def check_shapes(shapes: ShapeSet, go_on: Callable[[], object] = lambda: None) -> list[str]:
     """Check expressions. Returns sentences on unusual ones, which are no errors.
 
     Args:
         shapes: the mesh and its expressions.
+        go_on: called before each expression; an exception that it raises stops the work.
 
     Raises:
         ArgumentError: coordinates are too large, all vertices are in one point, an expression has
             another number of vertices, or no expression moves a vertex.
     """
     size = float(np.ptp(shapes.mesh.positions, axis=0).max())
-    for name, points in (("the neutral mesh", shapes.mesh.positions), *shapes.expressions.items()):
-        if not np.abs(points).max(initial=0.0) <= FARTHEST:
-            raise ArgumentError(
-                f"{name}: coordinates up to {FARTHEST:g} were expected, found "
-                f"{np.abs(points).max():g}"
-            )
+    if not np.abs(shapes.mesh.positions).max(initial=0.0) <= FARTHEST:
+        raise ArgumentError(_too_large("the neutral mesh", shapes.mesh.positions))
     if not size:
         raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
     out: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0
     for name, delta in shapes.expressions.items():
+        go_on()
+        if not np.abs(delta).max(initial=0.0) <= FARTHEST:
+            raise ArgumentError(_too_large(name, delta))
         if delta.shape != shapes.mesh.positions.shape:
             raise ArgumentError(
                 f"expression {name}: {len(shapes.mesh.positions):,} vertices were expected, "
@@ -105,13 +105,31 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
             out.append(f"{name} moves the whole mesh: is another neutral baked into it?")
         elif length.mean() > 0.25 * size:
             out.append(f"{name} is far from the neutral mesh: another unit or other axes?")
-        key = hashlib.sha256(np.round(delta / size, 6)).digest()
+        key = _key(delta, length, size)
         if key in seen:
             out.append(f"{name} is the same as {seen[key]}")
         seen.setdefault(key, name)
     if not moving:
         raise ArgumentError("no expression moves a vertex of the neutral mesh")
     return out
+
+
+def _too_large(name: str, points: Doubles) -> str:
+    return f"{name}: coordinates up to {FARTHEST:g} were expected, found {np.abs(points).max():g}"
+
+
+def _key(delta: Doubles, length: Doubles, size: float) -> bytes:
+    """Bytes that are equal for shapes that are equal to six decimals of the mesh' size.
+
+    Args:
+        delta: float64[V, 3].
+        length: float64[V], lengths of the displacements.
+        size: size of the mesh.
+    """
+    rows = np.flatnonzero(length > 0.4e-6 * size)
+    even = np.round(delta[rows] / size, 6) + 0.0  # without the sign of -0.0
+    moved = even.any(axis=1)
+    return hashlib.sha256(rows[moved].tobytes() + even[moved].tobytes()).digest()
 
 
 def take_combined(shapes: ShapeSet) -> MutableMapping[str, Doubles]:
@@ -171,7 +189,11 @@ def combined_rows(
     return out
 
 
-def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
+def make_shape_face(
+    shapes: ShapeSet,
+    controls: Mapping[str, Sequence[str]],
+    go_on: Callable[[], object] = lambda: None,
+) -> Dna:
     """Make a Dna with a mesh for each part and a blend shape for each control.
 
     The joints are root and head, and those of eyes and jaw if the face has any.
@@ -182,6 +204,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
             several, the expression is divided among them, so that their sum is the expression:
             controls of a side or a lip get that side or lip with a soft edge, other controls equal
             parts. An expression without controls is left out.
+        go_on: called before each control; an exception that it raises stops the work.
 
     Raises:
         ArgumentError: all expressions are left out.
@@ -218,7 +241,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
     dna.joint_row_count, dna.joint_column_count = 9 * len(dna.joint_names), columns
     if shapes.turns:
         dna.joint_groups = _turning(dna, shapes.turns)
-    _add_meshes(dna, shapes, parts, deltas)
+    _add_meshes(dna, shapes, parts, deltas, go_on)
     dna.lod_joint_mapping = [list(range(len(dna.joint_names)))]
     dna.lod_blend_shape_mapping = [range(count)]
     return dna
@@ -248,13 +271,18 @@ def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
 
 
 def _add_meshes(
-    dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[_Delta]
+    dna: Dna,
+    shapes: ShapeSet,
+    parts: Sequence[FacePart],
+    deltas: Sequence[_Delta],
+    go_on: Callable[[], object],
 ) -> None:
     """Add a mesh with blend shape targets for each part."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
     joints, meshes = list(dna.joint_names), []
     targets: list[list[BlendShapeTarget]] = [[] for _ in parts]
     for channel, (_, expression, share) in enumerate(deltas):
+        go_on()
         delta = shapes.expressions[expression] * share
         for part, own_targets in zip(parts, targets, strict=True):
             own = delta[part.start : part.stop]

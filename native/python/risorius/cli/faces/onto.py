@@ -172,7 +172,8 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     if args.spec is not None:
         own = {part.source for part in parts}
         lend_materials(made.shapes.parts, template, args.spec, own)
-    read = shape_face(made, template, str(args.onto))
+    clock.line("making a face of blend shapes")
+    read = shape_face(made, template, str(args.onto), clock)
     return replace(read, odd=made.notes + read.odd), files
 
 
