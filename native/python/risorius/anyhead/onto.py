@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from ..author.input.shape_face import (
     take_combined,
 )
 from ..author.input.spec import Read
+from ..base.patience import patiently
 from ..base.words import counted
 from .errors import Stopped
 from .fittings import Fittings, complete, head_parts, sort_parts
@@ -118,7 +120,7 @@ def onto(
     tell("looking for the face")
     _at(progress, 0.0)
     head = stand(where, parts, unit, o.wishes, o.marks, _part(progress, 0.0, _FACE))
-    found = sort_parts(head.parts)
+    found = patiently(partial(sort_parts, head.parts), lambda: _at(progress, _FACE))
     face = found.face
     target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
     tell("reading the template")
@@ -139,7 +141,9 @@ def onto(
     every = head_parts(fitted, _of_length(mended, single=True), _part(progress, _MENDED, 1.0))
     every[0].shapes.update(_of_length(mended, single=False))
     names = {name: [name] for name in source.controls}
-    joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
+    unchanged = Wishes(mesh=every[0].source)
+    joining = partial(join, where, every, "cm", unchanged, names, stands=True)
+    joined = patiently(joining, lambda: _at(progress, 1.0))
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
     joint = head.found.pose.place(_JOINT)[0]
@@ -211,7 +215,8 @@ def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None 
         face = shapes.parts[0]
         _at(progress, _SHAPED)
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
-        dna = add_correctives(dna, 0, own)
+        adding = partial(add_correctives, dna, 0, own)
+        dna = patiently(adding, lambda: _at(progress, _SHAPED))
     _copy_board(template, dna)
     _place_head(dna, made.joint)
     return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)

@@ -6,10 +6,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from .. import Dna, Mesh, _native
+from ..base.patience import patiently
 from .geometry import skeleton as sk
 from .geometry.blocks import SparseWeights, split_mesh
 from .geometry.simplify import Floats, fan_triangles, fewer_triangles, simplified
@@ -103,11 +105,12 @@ def fewer_vertices(
     for m in large:
         go_on()
         budget = max(round(share * counts[m]), _SMALL)
-        own = known_attributes(attributes, m, wanted[m])
+        known = known_attributes(attributes, m, wanted[m])
         finer = None if wanted[m].small else _finer(levels, m, budget)
-        triangles = fewer_triangles(wanted[m].mesh, own, budget, finer)
+        simplify = partial(fewer_triangles, wanted[m].mesh, known, budget, finer)
+        triangles = patiently(simplify, go_on)
         if budget < counts[m] and len(triangles):
-            made[m] = _simplified(wanted[m], triangles)
+            made[m] = patiently(partial(_simplified, wanted[m], triangles), go_on)
     source = _with_meshes(work.source, {m: fewer.mesh for m, fewer in made.items()})
     small = copy.copy(work)
     small.source = source

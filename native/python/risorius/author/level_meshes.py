@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from .. import Mesh, _native
+from ..base.patience import patiently
 from .geometry.blocks import LARGE
 from .geometry.simplify import Floats, attributes_of, fan_triangles, fewer_triangles, pieces_of
 from .geometry.skeleton import Doubles, Ints
@@ -83,8 +85,8 @@ def level_meshes(
             go_on()
             # A large mesh is simplified from level to level, because that takes less time.
             finer = None if wanted[m].small else out.triangles.get((lod - 1, m))
-            own = known_attributes(known, m, wanted[m])
-            triangles = fewer_triangles(mesh, own, budget, finer)
+            features = known_attributes(known, m, wanted[m])
+            triangles = patiently(partial(fewer_triangles, mesh, features, budget, finer), go_on)
             if len(triangles):
                 made[lod, m] = triangles
         wrong = "" if options.vertices else check.wrong(made.get((lod, skin)))
