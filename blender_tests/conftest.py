@@ -102,16 +102,16 @@ def _repository(installed):
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or real keys on posed bones.
+    """The mode of the face: Direct mode, or posed bones with real keys.
 
-    Tests of frames add a live key.
+    Test files about frames replace this fixture and add the mode with one live key.
     """
     return request.param
 
 
 @pytest.fixture
 def dna_file(tmp_path):
-    """A small DNA file like a face, made by our own code."""
+    """The path of a small DNA file that contains a simple face."""
     from support.faces import small_face
 
     path = tmp_path / "small.dna"

@@ -45,7 +45,7 @@ def main() -> int:
     """Prepare a throw-away user folder, install, and run pytest on this folder."""
     made = None
     if "BLENDER_USER_RESOURCES" not in os.environ:
-        # Read when Blender starts: must be set before bpy is first imported.
+        # Blender reads this variable when it starts, so it is set before bpy is imported.
         made = os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-blender-")
     os.environ["RISORIUS_TEST_USER"] = os.environ["BLENDER_USER_RESOURCES"]
     options, rest = _arguments()

@@ -203,9 +203,9 @@ run_pytest() {
     files=$(echo "$files" | grep -vxF "$(printf '%s\n' "${slow[@]}")")
   fi
   rm -f "$logs/pytest.xml"
-  "$python" -m pytest -q -rs "${slow[@]/#/--ignore=}" --durations 25 --junitxml "$logs/pytest.xml" tests > "$logs/pytest.log" 2>&1
+  limited 4000 "$python" -m pytest -q -rs "${slow[@]/#/--ignore=}" --durations 25 --junitxml "$logs/pytest.xml" tests > "$logs/pytest.log" 2>&1
   code=$?
-  tail -n 15 "$logs/pytest.log"
+  [ $code -eq 0 ] && tail -n 15 "$logs/pytest.log" || tail -n 120 "$logs/pytest.log"
   # shellcheck disable=SC2086  # one word a file
   note_report "Python $version" "$logs/pytest.xml" $code --files $files
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Risorius: faces from DNA files in Blender. All work is done in `registration`."""
+"""Entry points of the add-on that Blender calls; the module `registration` does their work."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,9 @@ def unregister() -> None:
 
 
 def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
-    """Blender's glTF exporter looks for this name in every add-on and calls it before it writes.
+    """Prepare all faces for a glTF export.
+
+    Before Blender's glTF exporter writes, it calls the function of this name in every add-on.
 
     Args:
         settings: settings of the exporter.
@@ -30,7 +32,11 @@ def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
 
 
 def glTF2_post_export_callback(settings: Mapping[str, object]) -> None:
-    """Blender's glTF exporter calls this after it has written. Args: settings  of the exporter."""
+    """Undo the pre-export function; Blender's glTF exporter calls this after it has written.
+
+    Args:
+        settings: settings of the exporter.
+    """
     del settings
     from . import registration
 

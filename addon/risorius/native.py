@@ -178,7 +178,8 @@ def part(name: str) -> ModuleType:
     try:
         return import_module(f"risorius.{name}")
     except ModuleNotFoundError as error:
-        # The error may name a folder of the package instead of the module.
+        # The error may name a parent folder instead of the module. An error about any other module
+        # is a fault of the program.
         if not error.name or not f"risorius.{name}.".startswith(f"{error.name}."):
             raise
         raise UnusableError(
@@ -188,7 +189,7 @@ def part(name: str) -> ModuleType:
 
 @cache
 def regions() -> FaceRegions:
-    """The regions of a face; without regions if the native module is missing."""
+    """The regions of a face; the object has no regions if the native module is missing."""
     if problem():
         return FaceRegions({}, lambda _: "", lambda _: "")
     known, sides = part("controls.regions"), part("controls.sides")
@@ -210,7 +211,8 @@ class LiveSource(TypedDict):
 def live_sources() -> dict[str, LiveSource]:
     """Programs that send captured faces, by name; empty without the native module.
 
-    Blender needs them when it starts, so only the TOML file is read and no receiver is loaded.
+    Blender needs these names when it starts. To be quick, this reads only the TOML file and loads
+    no receiver.
     """
     if problem():
         return {}
@@ -219,12 +221,12 @@ def live_sources() -> dict[str, LiveSource]:
 
 
 def dna_error() -> type[Exception]:
-    """The class of errors about bad DNA files; a class that is never raised without the module."""
+    """The class of errors about bad DNA files; without the native module, `_Never`."""
     return _risorius.DnaError if _risorius is not None else _Never
 
 
 def user_errors() -> tuple[type[Exception], ...]:
-    """The errors that an operator reports: mendable errors of add-on, package and system.
+    """The errors that an operator reports, because a user can mend them.
 
     Any other exception is a fault of the program and must stay visible.
     """
@@ -232,7 +234,7 @@ def user_errors() -> tuple[type[Exception], ...]:
 
 
 class UnusableError(FaceError, RuntimeError):
-    """The native module is missing, of another version, or lacks a part."""
+    """The native module is missing, has another version, or lacks a module of the package."""
 
 
 class _Never(Exception):  # noqa: N818

@@ -39,6 +39,7 @@ from .ui import (
 from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.anyhead import operators as head_operators
+from .ui.anyhead import overlay as landmark_overlay
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
 from .ui.drag import tool as drag_tool
@@ -82,7 +83,7 @@ CLASSES = (
 )
 
 
-# Caches of files of the extension, which do not change before Blender ends.
+# These caches are kept until Blender quits, because the extension's files do not change.
 session.adopt(
     ("quit",),
     native.addon_version,
@@ -97,7 +98,7 @@ session.adopt(
     tables.search_words,
     tables.translation,
 )
-# The class that is registered if another copy of the add-on is active.
+# RISORIUS_Idle, if it was registered because another copy of the add-on is active; else empty.
 _idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
@@ -137,7 +138,8 @@ def _window_properties() -> dict[str, object]:
 def register() -> None:
     """Register classes, properties, menus and handlers.
 
-    If another copy is active, this one does nothing, because two would move each face twice.
+    If another copy of the add-on is active, this copy does nothing, because two active copies would
+    move each face twice.
     """
     words.follow_language()
     other = native.other_copy()
@@ -176,11 +178,12 @@ def register() -> None:
     capture.register()
     drag_tool.register()
     why_overlay.start()
+    landmark_overlay.start()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """Handle the start of an export by Blender's glTF exporter.
+    """Warn about live faces and switch off Direct mode before Blender's glTF exporter writes.
 
     Args:
         settings: settings of the exporter.
@@ -191,7 +194,7 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def after_gltf() -> None:
-    """Handle the end of an export by Blender's glTF exporter."""
+    """Allow Direct mode again after Blender's glTF exporter has written."""
     if not _idle:
         ordinary_form.end(ordinary_form.GLTF)
 
@@ -212,6 +215,7 @@ def unregister() -> None:
         bpy.app.timers.unregister(_refresh_once)
     why_panel.stop()
     why_overlay.stop()
+    landmark_overlay.stop()
     drag_tool.unregister()
     capture.unregister()
     paste_flipped.unregister()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The self-test, the contents of a face, and the timing overlay in every mode."""
+"""Tests of the self-test, of the list of a face's contents, and of the timing overlay."""
 
 import bpy
 import numpy as np
@@ -165,7 +165,7 @@ def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
     lines = timing.lines()
     assert lines[0].startswith("Risorius, faces: 2")
     assert [line.split()[0] for line in lines[2:6]] == ["controls", "rig", "bones", "shapes"]
-    # The lines are not compared, because a small face takes less than the 0.01 ms that they show.
+    # The times are not read from the lines, which show 0.01 ms; a small face takes less.
     played = [frame for frame in timing.frames if frame.characters]
     assert len(played) == 6
     assert all(frame.stages[stage] > 0 for frame in played for stage in timing.STAGES)

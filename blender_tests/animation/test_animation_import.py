@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions of the controls and are exported again, at any rate and in every target."""
+"""Clips become actions, strips or layers of the controls at any rate, and are exported again."""
 
 import hashlib
 import importlib.util
@@ -57,7 +57,10 @@ def _table(tmp_path):
 
 
 def test_what_an_import_leaves_as_it_was_is_named_and_can_be_brought_to_rest(rig, tmp_path, capfd):
-    """An import as a layer reports nothing, because a layer does not change unmoved controls."""
+    """Controls that an imported action does not move are reported, and `use_rest` resets them.
+
+    An import as a layer reports nothing, because a layer does not change such controls.
+    """
 
     def bring(**options):
         scene.set_controls(rig, browDownL=0.38, mouthCornerPullL=0.2, jawOpen=0.6)
@@ -244,7 +247,10 @@ EXPECTED = (JAW, PULL, BROW, "CTRL_expressions.eyeLookUpL")
 
 @pytest.fixture
 def capture(tmp_path):
-    """A take in Live Link Face's form: 30 rows per second, 60 frames in timecodes, one row lost."""
+    """A take in Live Link Face's form, with one lost row.
+
+    It has 30 rows per second; its timecodes count 60 frames per second.
+    """
     names = ["JawOpen", "MouthSmileLeft", "BrowDownLeft", "EyeLookUpLeft", "TongueOut", "HeadYaw"]
     lines = [",".join(["Timecode", "BlendShapeCount", *names, "Surprise"])]
     for row in [0, 1, 2, 4, *range(5, 40)]:
@@ -329,7 +335,7 @@ def test_a_long_pause_makes_no_keys(rig, tmp_path):
 def test_the_scenes_range_is_extended_fitted_or_kept(rig, capture, choice, before, after):
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = before
     bpy.context.scene.render.fps = 24
-    # 39 thirtieths of a second are 31.2 frames, from frame 18.9 on.
+    # The take lasts 39/30 s, which are 31.2 frames at 24 fps; it begins at frame 18.9.
     done = bpy.ops.risorius.import_animation(filepath=str(capture), start=18.9, **choice)
     assert done == {"FINISHED"}
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == after

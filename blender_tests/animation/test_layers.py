@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers above the sliders: Blender shows the values of the Mixer, which equal the NLA's."""
+"""Layers of animation on a face: it shows the values of risorius.Mixer and of Blender's NLA."""
 
 import bpy
 import numpy as np
@@ -171,7 +171,7 @@ def _performance(rig, rules):
 
 
 def _mixer(rig, rules):
-    """The same layers in risorius.Mixer, with times in seconds."""
+    """The layers of `_performance` in risorius.Mixer, with times in seconds."""
     import risorius
 
     names = scene.submodule("scene.character.runtime").of(rig).labels
@@ -657,7 +657,10 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
 
 
 def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
-    """Other .blend files in the folder use the same catalogue file, which may be a link."""
+    """A catalogue file is replaced, not rewritten, so that other readers never see half of it.
+
+    It keeps its old catalogues, and stays a link if it is a link.
+    """
     shared, link = tmp_path / "shared.txt", tmp_path / "blender_assets.cats.txt"
     old = "VERSION 1\n\n6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a12:Props:Props\n"
     shared.write_text(old, encoding="utf-8")

@@ -34,7 +34,7 @@ def add_mesh(points, name="Take"):
 
 
 def performer(path, change=lambda points: points):
-    """An object whose shape keys repeat the performance, with one key per frame."""
+    """An object whose shape keys repeat the motion of `wanted`, with one key per frame."""
     rest = change(wanted(path, 1))
     item = add_mesh(rest)
     item.shape_key_add(name="Basis")

@@ -153,7 +153,7 @@ def frame_of(place):
 
 
 def jaw_of(action):
-    """The jaw curve of a newly made voice with the sounds of the list."""
+    """The jaw curve of a newly made voice with the same sounds as the action."""
     said = [*action.risorius_spoken.sounds]
     ends = [sound.begin for sound in said[1:]] + [frame_of(len(SAID))]
     phones = [

@@ -53,7 +53,7 @@ def test_they_stand_on_a_head_that_is_turned_and_scaled(head, package):
         wanted = head.matrix_world @ head.data.vertices[0].co.__class__(to_blender(place))
         np.testing.assert_allclose(world(head, name), wanted, atol=1e-5)
         item = shown(head)[name].item
-        assert (item.type, item.name, item.show_name) == ("EMPTY", name, True)
+        assert (item.type, item.name, item.show_name) == ("EMPTY", name, False)
         (group,) = item.users_collection
         assert group.name == "Egg Landmarks"
     head.location.x += 1.0
@@ -74,6 +74,30 @@ def test_what_is_moved_by_hand_stays_and_is_told_to_the_package(head, package):
     np.testing.assert_allclose(package.heads[-1].fixed["eye_inner_L"], [3.0, 3.0, 9.0], atol=1e-4)
     np.testing.assert_allclose(world(head, "eye_inner_L"), [0.03, -0.09, 0.03], atol=1e-6)
     np.testing.assert_allclose(world(head, "eye_inner_R"), [-0.02, -0.09, 0.033], atol=1e-6)
+
+
+def test_dots_have_the_color_of_the_state_and_selected_ones_a_name(head, package):
+    dots = scene.submodule("ui.anyhead.overlay").dots
+    assert dots(bpy.context) == []
+    risorius.find_landmarks()
+    moved, hidden = (shown(head)[name].item for name in ("eye_inner_L", "eye_inner_R"))
+    moved.location.x += 0.01
+    hidden.hide_viewport = True
+    moved.select_set(True)
+    bpy.context.view_layer.update()
+    drawn_dots = dots(bpy.context)
+    assert len(drawn_dots) == len(PLACES) - 1
+    (named,) = [dot for dot in drawn_dots if dot.label]
+    assert named.label == "the inner corner of the left eye"
+    place, color, radius = named.mark
+    np.testing.assert_allclose(place, world(head, "eye_inner_L"))
+    assert color[0] > color[1] > color[2]  # orange: moved by hand
+    others = [dot.mark for dot in drawn_dots if not dot.label]
+    assert all(c[1] > c[0] and r < radius for _place, c, r in others)  # green: found
+    head.select_set(False)
+    moved.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    assert dots(bpy.context) == []
 
 
 def test_what_is_missing_is_asked_for_by_name(head, package, capfd):
@@ -103,6 +127,8 @@ def test_they_are_saved_with_the_scene_and_as_a_file(head, package, tmp_path):
     head = bpy.data.objects["Egg"]
     before = {name: point.place for name, point in shown(head).items()}
     assert set(before) == set(PLACES)
+    assert risorius.landmark_names(enable=True) == {"FINISHED"}
+    assert all(point.item.show_name for point in shown(head).values())
     assert risorius.landmark_names(enable=False) == {"FINISHED"}
     assert not any(point.item.show_name for point in shown(head).values())
     assert risorius.clear_landmarks() == {"FINISHED"}

@@ -39,7 +39,7 @@ def _frame():
 
 @pytest.fixture
 def probes():
-    """For each event a session entry with content."""
+    """Event -> an empty list, which is a session entry that this event empties."""
     session = _session()
     kept = {word: session.keep(f"probe.{word}", list, (word,)) for word in WORDS}
     yield kept
@@ -84,7 +84,7 @@ def _fill(dna_file):
     return rig
 
 
-# Entries that loading a file did not empty before the registry existed.
+# Entries that must be emptied when a file is loaded.
 MISSED = (
     "caches.late",
     "controls_ahead.edited",

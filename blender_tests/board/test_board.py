@@ -90,7 +90,7 @@ def lead(rig):
 
 
 def shown(rig):
-    """The values of the face according to the add-on, by short names, without zeros."""
+    """Short name of a control -> its value according to the add-on; controls at 0 are left out."""
     values = scene.submodule("scene.character.sides").values_of(rig)
     return {name.rpartition(".")[2]: round(v, 5) for name, v in values.items() if v}
 
@@ -202,7 +202,7 @@ def test_switching_keeps_the_pose_and_says_what_is_lost(board_file):
     assert "risorius_lead" not in scene.controls(rig)
     assert len(scene.controls(rig).pose.bones) == 6  # a board is only made on request
     scene.add_board()
-    # Up and down at the same time share a handle; the larger value stays.
+    # One handle drives eyeLookUpL and eyeLookDownL, so only the larger of both values stays.
     expected = {"jawOpen": 0.4, "mouthCornerPullL": 0.6, "eyeLookUpL": 0.5}
     assert shown(rig) == expected
     keys = scene.submodule("scene.animation.board_keys")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sliders, bones of the control armature, names, keys."""
+"""Tests of a face's sliders and control bones: names, keys and effects."""
 
 import math
 
@@ -101,8 +101,8 @@ def test_head_bone_turns_the_head_joint_on_top(mode, dna_file):
 
 @pytest.mark.parametrize("degrees", [5.0, 12.0, 20.0])
 def test_eye_bone_turns_the_eye_by_its_own_angle(dna_file, degrees):
-    # The eye's neutral pose is oblique, so its look controls rotate it by their own measured
-    # response.
+    # The look control's value is the wanted yaw divided by the yaw that was measured at value 1,
+    # because the eye's neutral pose is oblique.
     rig = scene.load(dna_file)
     runtime = scene.submodule("scene.character.runtime").of(rig)
     bone = scene.controls(rig).pose.bones["eye_L"]

@@ -44,7 +44,7 @@ def _armature_turn(dna, joint, local):
 
 
 def _own_turn(dna, joint, turn):
-    """The inverse: x, y, z, w about the joint's axes, with w at least 0."""
+    """The inverse of _armature_turn: x, y, z, w about the joint's axes, with w at least 0."""
     basis = _axes(dna) @ _rest(dna, joint)
     local = basis.T @ np.array(turn.to_matrix(), np.float64) @ basis
     w, x, y, z = Matrix(local.tolist()).to_quaternion()

@@ -107,7 +107,10 @@ def rig_name(path):
 
 
 def test_a_copy_that_is_deleted_leaves_the_outlines_to_the_face(rig, tmp_path):
-    """Shift-D shares the outlines, and a save removes the remains of a deleted face."""
+    """A copy made by Shift-D shares the outlines; deleting it does not remove them.
+
+    A save removes the outlines of a face that was deleted.
+    """
     held = [b.custom_shape for b in scene.controls(rig).pose.bones]
     for item in bpy.context.view_layer.objects:
         item.select_set(True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Both shape modes and the switch between them, with all edits of keys; the test of a channel."""
+"""Switching between shape modes keeps the face and all edits of keys; a channel can be tested."""
 
 import bpy
 import numpy as np

@@ -23,7 +23,7 @@ GOLDEN = ROOT / "tests" / "data" / "golden"
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
+    """The mode of the face: Direct mode, or posed bones with one live key or with real keys."""
     return request.param
 
 

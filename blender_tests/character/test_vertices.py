@@ -10,7 +10,7 @@ from support.faces import CONTROLS, small_face
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or one live key or real keys on posed bones."""
+    """The mode of the face: Direct mode, or posed bones with one live key or with real keys."""
     return request.param
 
 

@@ -204,7 +204,7 @@ def test_selected_handles_go_together(man):
     starts = [place(rig, vertex, mesh) for mesh, vertex in (one, other)]
 
     def share(number, point):
-        """The part of the drag that a handle has followed."""
+        """How far a handle has followed the drag: 0 not at all, 1 completely."""
         way = place(rig, point[1], point[0]) - starts[number]
         return way @ offset / (offset @ offset)
 
@@ -458,7 +458,10 @@ def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
 
 
 def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
-    """Tests the moving sliders on the sample man, whose sides differ."""
+    """On the sample man, a dragged brow moves no look control.
+
+    A symmetric drag sets both sides equally, although the two sides of his face differ.
+    """
     rig, corner = man
     stroke = scene.submodule("scene.drag.stroke")
     rest = rest_of(scene.meshes(rig)[HEAD])

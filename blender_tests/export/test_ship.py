@@ -23,7 +23,7 @@ NEAR = {
     "ALEMBIC": 5e-6,  # stores vertices: float32 at 1.6 m rounds by 6e-7 of the head's width
     "GLTF": 2e-5,  # float32 joints per frame, weights normalised again, axes rotated
     "FBX": 2e-5,  # the same, with rotations as Euler angles in degrees
-    # Joint scales are half floats: 2**-11 of the distance to the joint, for two successive joints.
+    # Joint scales are half floats: an error of 2**-11 at each of two successive joints.
     "USD": 1e-3,
 }
 
@@ -79,7 +79,10 @@ def _partner(points, wanted):
 
 
 def _error(film, wanted):
-    """The largest distance as a share of the head's size; matched at the first frame."""
+    """The largest coordinate difference of two films, as a share of the head's size.
+
+    Imported vertices are matched to the wanted ones at the first frame.
+    """
     size = max(np.ptp(p, axis=0).max() for p in wanted[0])
     points = [np.concatenate(meshes) for meshes in film]
     target = [np.concatenate(meshes) for meshes in wanted]

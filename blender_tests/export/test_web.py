@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export Web Page: the face with edits, animation and sound, or one sentence."""
+"""Export Web Page writes the face with edits, animation and sound, or reports one sentence."""
 
 import base64
 import gzip

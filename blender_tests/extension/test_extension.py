@@ -35,7 +35,8 @@ def home(tmp_path_factory):
 
 def _run(home, *command):
     settings = os.environ | {"BLENDER_USER_RESOURCES": str(home)}
-    # PYTHONPATH may lead to Blender's own module (Windows, in Wine), but not to our package.
+    # PYTHONPATH may lead to the bpy module (on Windows, in Wine). Folders with `risorius` are
+    # removed from it, so that the test uses the package of the extension.
     paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     kept = (path for path in paths if path and not (Path(path) / "risorius").is_dir())
     settings["PYTHONPATH"] = os.pathsep.join(kept)

@@ -54,7 +54,10 @@ def test_untouched_files_of_every_version(mode, tmp_path):
 
 
 def test_untouched_golden_files(tmp_path):
-    """Files of another program; files without a face are refused on import."""
+    """Unedited DNA files of another program are exported byte for byte.
+
+    Files without a face are skipped: they are refused on import.
+    """
     seen = 0
     for source in sorted(GOLDEN.glob("*.dna")):
         try:

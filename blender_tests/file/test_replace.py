@@ -258,7 +258,7 @@ def test_an_untouched_mesh_leaves_no_copy(mode, dna_file, tmp_path):
 
 
 def test_edits_lie_on_top_of_the_new_file(dna_file, tmp_path):
-    """Differences of an edited key and an edited neutral are added to the new file's."""
+    """The user's offsets of a shape key and of the basis are added to the new file's vertices."""
     dna = other_face()
     dna.meshes[0].positions = dna.meshes[0].positions * np.float32(1.02)
     for target in dna.meshes[0].blend_shape_targets:

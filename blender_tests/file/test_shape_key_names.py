@@ -14,7 +14,7 @@ PREFIX = "CTRL_expressions."
 
 @pytest.fixture
 def head():
-    """The egg with two keys of unknown names."""
+    """An egg-shaped head; no vocabulary knows the names of two of its shape keys."""
     item = egg.egg()
     keys = item.data.shape_keys.key_blocks
     keys["jawOpen"].name, keys["mouthSmileLeft"].name = "Key 7", "Key 8"

@@ -17,7 +17,7 @@ NOISELESS = 1.01 / 255
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or real shape keys on posed bones."""
+    """The mode of the face: Direct mode, or posed bones with real keys."""
     return request.param
 
 
@@ -116,7 +116,7 @@ def test_direct_and_live_render_the_same_pixels(motion_blur, dna_file, tmp_path)
     bpy.ops.risorius.set_shape_mode(mode="LIVE")
     live = _render_animation(setup, tmp_path)
     assert not any("risorius_finished" in item for item in scene.meshes(rig).values())
-    # Positions differ in the last bits, so a ray may hit the other side of an edge.
+    # Vertices differ in the last bits, so a few rays hit the other side of an edge.
     for frame in FRAMES:
         apart = np.abs(direct[frame] - live[frame]).max(axis=2)
         assert (apart > NOISELESS).mean() < 0.002, frame
@@ -140,7 +140,7 @@ def test_two_processes_render_the_same_pixels(mode, dna_file, tmp_path):
 )
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "blurred"])
 def test_a_frame_has_the_same_pixels_in_eevee(motion_blur, dna_file, tmp_path):
-    # Plain grey, because compiling materials takes long in software rendering.
+    # The face is plain grey, because compiling materials takes long in software rendering.
     animate(scene.load(dna_file, "LIVE", use_materials=False))
     setup = _set_up(motion_blur, False)
     setup.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"

@@ -50,9 +50,9 @@ def haired(tmp_path):
 
 
 def points_of(thing):
-    """Points of the rendered curves in world space, float64[n, 3].
+    """Read the rendered curves.
 
-    Also the index of each curve's first point.
+    Returns: their points in world space, float64[n, 3], and the index of each curve's first point.
     """
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
@@ -77,7 +77,6 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-# How far a strand strays: in cards' widths, in rows of two centimetres; metres, by which tips part
 # How far a strand may leave its card: in widths of a card, in rows of 2 cm, and the distance in
 # metres by which tips separate along each axis.
 ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
@@ -126,7 +125,7 @@ def test_roots_stand_between_the_cards_too(haired):
     # Strands use the texture's colour at transparent places between hairs, too.
     pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
     assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
-    # If each strand were in a tuft as wide as its card, there would be gaps of a quarter.
+    # The gaps between cards are a quarter of a card wide; roots fill these gaps too.
     assert np.diff(side).max() < 0.2
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
@@ -167,7 +166,7 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks p
 
 @pytest.fixture
 def curly(tmp_path):
-    """Returns a function that makes a face like `haired` with coiled hair, from metadata."""
+    """Returns a function that makes a face like `haired` whose metadata ask for coiled hair."""
 
     def made(words):
         dna = small_face()
@@ -183,7 +182,7 @@ def curly(tmp_path):
 
 
 def strands_of(face):
-    """Points of a face's strands, indices of first points, and corners of the cards."""
+    """Points of a face's strands, index of each strand's first point, and corners of the cards."""
     corners = scene.evaluated(scene.meshes(face)[1]).reshape(CARDS, ROWS, 2, 3).astype(float)
     before = set(bpy.data.objects)
     bpy.ops.risorius.set_strands()
@@ -205,8 +204,8 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis is straight, like the card; its inclination and parting are smaller than the
-        # coil.
+        # The axis of a coil is straight, like the card; its inclination and its distance from other
+        # axes are smaller than the coil.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000
         assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS

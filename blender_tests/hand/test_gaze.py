@@ -71,7 +71,7 @@ def eye(rig, side):
     """Centre and direction of an eye in world space, from the bone that deforms the skin."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # The direction that is -y at rest.
+    # The eye's direction is -y at rest.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (
@@ -316,7 +316,10 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
 
 
 def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
-    """The active object, or a selected one (an empty first), or the camera."""
+    """The active object is proposed; if it is the face, a selected object; else the camera.
+
+    Of several selected objects, an empty is proposed first.
+    """
     operators = scene.submodule("ui.hand.gaze")
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     empty = bpy.data.objects.new("empty", None)

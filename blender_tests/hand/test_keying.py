@@ -130,7 +130,7 @@ HANDS = {
     ),
 }
 
-# Operators that move the rest of the face to rest.
+# Operators that set all other sliders to rest.
 WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 
 # Reason -> operators that move no slider and no control bone, or handle keys themselves.

@@ -18,7 +18,7 @@ def path_of(name):
 
 @pytest.fixture
 def rig(dna_file):
-    """A face with keys of the jaw at 1, 15 and 40 of all kinds, and a tweak from 10 to 30."""
+    """A face with jaw keys of all kinds at frames 1, 15 and 40, and a tweak of frames 10 to 30."""
     rig = scene.load(dna_file)
     for frame, value in ((1, 0.2), (15, 0.3), (40, 0.6)):
         scene.face(rig)[PREFIX + JAW] = value
@@ -65,7 +65,7 @@ def shown(rig, frame=None, name=JAW):
 
 
 def press_i(rig, name=JAW, frame=20):
-    """Insert a key like I over a slider; auto-key does the same after a move."""
+    """Insert a key on a slider, as the key I and auto-key do."""
     scene.controls(rig).keyframe_insert(path_of(name), frame=frame)
     bpy.context.view_layer.update()
 
@@ -242,7 +242,7 @@ def turn(rig, name):
 
 @pytest.fixture
 def turning(dna_file):
-    """Head keys at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
+    """A face with head keys at frames 1 and 40, a neck in Euler angles, and a tweak of 10 to 30."""
     rig = scene.load(dna_file)
     pose_bone(rig, "neck").rotation_mode = "XYZ"
     for frame, angle in ((1, 0.1), (40, 0.3)):
@@ -255,7 +255,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """Keyed by I or auto-key, or unkeyed when the frame changes; the bake has them too."""
+    """Rotations are keyed by I or auto-key, or not before the frame changes; a bake has them."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)

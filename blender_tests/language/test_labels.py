@@ -123,7 +123,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 
 
 def test_all_sections_are_seen_at_once_on_a_laptop(rig, monkeypatch):
-    """1366 x 768: in a new window the tab has 688 - 84 pixels of the 3D view."""
+    """On a screen of 1366 x 768 pixels, the tab of a new window is 688 - 84 pixels high."""
     face, panel = scene.face(rig), ui("face.controls_panel")
     labels = [*STANDARD.read_text().split(), "spine_04.qx"]
     for name in labels:

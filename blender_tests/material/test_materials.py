@@ -89,7 +89,7 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
 def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
     """The height of the weave is rendered as light.
 
-    It is visible from 30 cm, and even from 3 m, where a thread is smaller than a pixel.
+    The weave is visible from 30 cm. From 3 m, where a thread is smaller than a pixel, it is flat.
     """
     face = small_face()
     skin = face.meshes[0]
@@ -121,7 +121,7 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
         shader = looks.principled(_materials(scene.load(_save(tmp_path, small_face())))["head"])
         # The weight depends on the distance from an open border.
         assert shader.inputs["Subsurface Weight"].is_linked
-        # The distance in the palest skin; it is smaller if the colour is dark.
+        # How far light scatters in the palest skin; in dark skin it is less.
         far = shader.inputs["Subsurface Scale"].links[0].from_node
         scales.append(far.inputs[1].default_value)
     assert scales[1] == pytest.approx(3 * scales[0], rel=1e-4)
@@ -196,8 +196,8 @@ def test_a_mask_of_the_metadata_limits_its_map(tmp_path):
     assert changed[solid & (x > 0.15 * width)].max() <= 2 / 255
 
 
-# A wrinkle map with complete normals or colours, and with differences around 0.5: left half, right
-# half.
+# Colours of the left and right half of a wrinkle map: complete normals or colours in WHOLE,
+# differences around 0.5 in OFFSETS.
 WHOLE = ((0.85, 0.5, 0.85), (0.85, 0.5, 0.85))
 OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 
@@ -490,7 +490,7 @@ for image in bpy.data.images:
 
 @pytest.mark.parametrize("data", ["Utility - Raw", "ACES - Linear"])
 def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
-    """A configuration like ACES has neither `sRGB` nor `Non-Color`, and once no data role."""
+    """Colour configurations like ACES have no `sRGB` and `Non-Color`; one has no data role."""
     path = _save(tmp_path, _mapped("head_wm1_normal.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
     config = tmp_path / "config.ocio"

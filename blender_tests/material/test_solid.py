@@ -63,7 +63,7 @@ def test_the_iris_has_a_slot_of_the_same_surface(tmp_path):
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.ptp(points[:, 2]) / 2
     away = np.hypot(*(middles - middle)[:, [0, 2]].T) / radius
-    # The same edge as in the shader, within half a polygon.
+    # The iris has the same edge as in the shader, within half a polygon.
     assert (slots[away < 0.43] == 1).all()
     assert (slots[away > 0.51] == 0).all()
     assert max(iris.diffuse_color[:3]) < 0.1

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved files have the form of Live mode; undo, copies and Blender's own files are restored."""
+"""Saved files have the form of Live mode.
+
+Faces return to Direct mode after undo, after copying, and in files that Blender writes by itself.
+"""
 
 import addon_utils
 import bpy
@@ -114,7 +117,7 @@ def test_a_save_between_undo_and_the_next_update(pair, tmp_path):
 
 
 def test_a_file_that_blender_writes_by_itself(pair, tmp_path):
-    """Such a file has finished positions and disabled modifiers; the add-on restores it."""
+    """A partial file has finished positions and disabled modifiers; the add-on restores them."""
     shown = scene.snapshot(pair.direct)
     blend = tmp_path / "copied.blend"
     bpy.data.libraries.write(str(blend), {bpy.context.scene})

@@ -37,7 +37,7 @@ def _smooth(head, place):
 
 
 def before(_rig, head):
-    """Enable a modifier before ours."""
+    """Add a modifier above the face's armature modifier."""
     return _smooth(head, 0)
 
 
@@ -48,7 +48,7 @@ def before_in_renders(_rig, head):
 
 
 def moved_down(_rig, head):
-    """Move our modifier below another one."""
+    """Move the face's armature modifier below another modifier."""
     modifier = head.modifiers.new("Mirror", "MIRROR")
     head.modifiers.move(0, 1)
 
@@ -85,7 +85,7 @@ def removed(rig, head):
 
 
 def of_another(rig, head):
-    """Assign another armature to our modifier."""
+    """Assign another armature to the face's armature modifier."""
     modifier = _armature(head)
     modifier.object = rig["risorius_controls"]
 
@@ -356,7 +356,7 @@ def live_deleted(_rig, head):
 
 
 def enabled(_rig, head):
-    """Enable our modifier, which Direct mode has disabled."""
+    """Enable the face's armature modifier, which Direct mode has disabled."""
     _armature(head).show_viewport = True
 
 
@@ -433,7 +433,7 @@ def test_a_deleted_live_key(pair):
 
 
 def test_another_object_with_the_same_data_keeps_the_rest_form(pair):
-    """The face's mesh gets its own data, as in Live mode."""
+    """If another object shares the mesh data, the face's mesh gets a copy, as in Live mode."""
     others = []
 
     def share(_rig, head):
@@ -544,7 +544,7 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """Neither Automatic nor a save enables a modifier that the user disabled in Live mode."""
+    """Neither the mode Automatic nor a save enables a modifier that the user disabled before."""
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

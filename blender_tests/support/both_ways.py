@@ -15,7 +15,7 @@ def plan(rig):
 
 
 def is_direct(rig, *numbers):
-    """Whether some or all meshes of a face have finished positions and disabled modifiers."""
+    """Whether meshes of a face, by default all, have finished positions and disabled modifiers."""
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
     off = all(not m.modifiers[0].show_viewport for m in wanted)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes an egg-shaped head with shape keys and without a rig, as input of a joint rig."""
+"""Makes an egg-shaped head with shape keys and without a rig, from which tests make a joint rig."""
 
 import importlib.util
 from pathlib import Path
@@ -16,7 +16,7 @@ _METRES = 0.01
 
 
 def egg():
-    """Add the head as active object; it faces -y and has keys of face_shapes.expressions."""
+    """Add the head as active object. It faces -y, with a key per expression of face_shapes."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new("Egg")
     mesh.from_pydata(_to_blender(positions).tolist(), [], faces.tolist())

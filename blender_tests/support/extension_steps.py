@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """The add-on's handlers, classes, operators, properties and menus in this process."""
+    """The add-on's handlers, classes, operators, properties and menus that this process has."""
     handlers = [
         name
         for name in dir(bpy.app.handlers)
@@ -47,7 +47,7 @@ def _list(value):
 
 
 def _manager():
-    """Enable Blender's installer of extensions, which the bpy module does not enable."""
+    """Enable Blender's installer of extensions, which is not enabled in the bpy module."""
     import addon_utils
 
     if "bl_pkg" not in bpy.context.preferences.addons:
@@ -55,8 +55,10 @@ def _manager():
 
 
 def _read_preferences(step):
-    """Read the user's preferences, because bpy starts with factory settings. bpy before 4.5 crashes
-    while reading them; there, the extension is enabled directly."""
+    """Read the user's preferences, because bpy starts with factory settings.
+
+    bpy before 4.5 crashes while reading them, so that the extension is enabled directly.
+    """
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
     elif step in ("use", "add", "disable", "remove"):
@@ -67,7 +69,7 @@ def _read_preferences(step):
 
 
 def install(package):
-    """Install the package and enable it, as by Preferences > Install from Disk."""
+    """Install a package file and enable it, as Preferences > Install from Disk does."""
     _manager()
     bpy.ops.extensions.package_install_files(
         filepath=package, repo="user_default", enable_on_install=True
@@ -77,13 +79,13 @@ def install(package):
 
 
 def _vertices(item):
-    """The evaluated vertices of a mesh."""
+    """Places of the evaluated vertices of a mesh."""
     graph = bpy.context.evaluated_depsgraph_get()
     return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
 
 
 def use(path):
-    """Import a face, move it, and save the scene in the folder of the DNA file."""
+    """Import a face, open its jaw, and save the scene in the folder of the DNA file."""
     assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     bone = rig["risorius_controls"].pose.bones["face"]
@@ -99,7 +101,7 @@ def use(path):
 
 
 def add(_nothing=""):
-    """Add the sample face by Add > Face; fail if that starts another program."""
+    """Add the sample face by Add > Face; fail if this starts a program or uses the network."""
 
     def forbidden(*_arguments, **_options):
         raise AssertionError("the sample face needs another program")
@@ -124,14 +126,14 @@ def add(_nothing=""):
 
 
 def disable(_nothing=""):
-    """Disable the add-on, as by the check box in the preferences."""
+    """Disable the add-on, as the check box in the preferences does."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     bpy.ops.wm.save_userpref()
     return of_ours()
 
 
 def look(blend):
-    """Open a scene with a face and play it, without the add-on."""
+    """Open a scene with a face without the add-on, and change the frame."""
     bpy.ops.wm.open_mainfile(filepath=blend)
     bpy.context.scene.frame_set(3)
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
@@ -139,7 +141,7 @@ def look(blend):
 
 
 def remove(_nothing=""):
-    """Uninstall the extension, as by Uninstall in the preferences."""
+    """Uninstall the extension, as Uninstall in the preferences does."""
     _manager()
     names = [r.module for r in bpy.context.preferences.extensions.repos]
     bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")

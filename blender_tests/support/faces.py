@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes small DNAs for tests: two meshes, LODs, joints, channels, maps and odd names."""
+"""Makes small DNAs for tests: three meshes, two LODs, joints, channels, maps and odd names."""
 
 import numpy as np
 import risorius
@@ -25,7 +25,7 @@ UNOWNED = 5
 
 
 def _grid(columns, rows, radius, center):
-    """Positions and quads of a patch of a sphere that faces the file's front (+z)."""
+    """Positions, normals, UVs and quads of a patch of a sphere that faces the file's front (+z)."""
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
@@ -77,7 +77,7 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A DNA with every kind of data that the add-on imports; equal at every call."""
+    """A Dna with every kind of data that the add-on imports; it is the same in every call."""
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0
@@ -123,7 +123,7 @@ def small_face(
 
 
 def _behave(dna, random, angle):
-    """Add joint groups of a jaw (nine attributes) and an eye, a corrective, channels and maps."""
+    """Add joint groups of the jaw (nine attributes) and an eye, a corrective, channels, maps."""
     count = len(CONTROLS)
     jaw = random.uniform(-1, 1, (9, 3)).astype(np.float32)
     jaw[3:6] *= 25 * angle
@@ -171,8 +171,9 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
     Args:
         dna: a small_face.
-        joints, controls, channels, maps: the new order: old indices, or names of new items. Omitted
-            items are removed with their data. None: no change.
+        joints, controls, channels, maps: the new order, as old indices and names of new items.
+            Items
+            that are not in it are removed with their data. None: no change.
 
     Returns:
         The same Dna.
@@ -193,7 +194,7 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
 
 def _order(names, order):
-    """New names, and the new index of each old one (-1: removed)."""
+    """The new names, and for each old name its new index (-1: removed)."""
     where = np.full(len(names), -1)
     for new, old in enumerate(order):
         if not isinstance(old, str):
@@ -234,7 +235,7 @@ def _renumber_channels(dna, order):
 
 
 def _renumber_controls(dna, order):
-    """Reorder controls; only browDownL and later ones may be removed: no part reads them."""
+    """Reorder controls; controls that joints, correctives or GUI controls use must remain."""
     count = len(dna.raw_control_names)
     dna.raw_control_names, where = _order(dna.raw_control_names, order)
     where = np.append(where, len(order))  # the corrective has the index after the controls
@@ -253,7 +254,7 @@ def _renumber_controls(dna, order):
 
 
 def _renumber_joints(dna, order):
-    """New joints are children of the first one; joints with skin weights or motion must stay."""
+    """Reorder joints; new ones become children of the first joint, used joints must remain."""
     offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
     parents = dna.joint_parents
     dna.joint_names, where = _order(dna.joint_names, order)
@@ -274,7 +275,7 @@ def _renumber_joints(dna, order):
 
 
 def other_face(**options):
-    """A newer version of the small face: other indices, with removed and new elements."""
+    """The small face as in a later version: with other indices, removed items and new items."""
     dna = renumbered(
         small_face(**options),
         joints=[0, "new_joint", 1, 2, 5, 4, 3],
@@ -290,7 +291,7 @@ def other_face(**options):
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
 UP, SIDE = 1, 2  # poses of neck_face
-# Quaternions of neck_01 and head for each pose, relative to rest, in their own axes.
+# Quaternions x y z w of neck_01 and then head in each pose, relative to rest, in the joints' axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),
     (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),
@@ -299,11 +300,11 @@ NECK_POSES = (
 
 
 def neck_face(**options):
-    """The small face with a solver that deforms it when neck and head turn.
+    """The small face with an RBF solver that deforms it when neck and head rotate.
 
-    The raw controls of TURNING store rotations of joints. The solver poses NECK_POSES drive
-    channels 4 and 5. The pose UP together with the open jaw fires a corrective, which drives
-    channel 2.
+    The raw controls of TURNING are rotations of joints. The solver's poses UP and SIDE of
+    NECK_POSES drive channels 4 and 5. UP together with the open jaw makes a corrective active,
+    which drives channel 2.
     """
     dna = small_face(**options)
     count = len(CONTROLS)

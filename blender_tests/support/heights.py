@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts the lines of a panel, for tests that a click does not move the lines below it."""
+"""Counts the lines of a panel; tests use it to check that a click moves no line below."""
 
 from types import SimpleNamespace
 
@@ -10,14 +10,14 @@ _LEAVES += ("operator_menu_enum", "template_list", "prop_enum")
 
 
 class Lines:
-    """A fake UILayout that counts lines: a row is as high as its highest part."""
+    """A fake UILayout that counts lines. A row is as high as its highest part."""
 
     def __init__(self, beside=False):
         object.__setattr__(self, "_beside", beside)
         object.__setattr__(self, "_parts", [])
 
     def __setattr__(self, _name, _value):
-        """Ignore options of a layout or of an operator button."""
+        """Ignore options that a panel sets on a layout or on an operator's button."""
 
     @property
     def count(self):
@@ -29,7 +29,7 @@ class Lines:
         return part
 
     def panel(self, *_arguments, **_options):
-        """Header and body of an open subpanel."""
+        """Header and body of a subpanel, which is always open."""
         return self._part(Lines(beside=True)), self._part(Lines())
 
     def __getattr__(self, name):
@@ -40,7 +40,7 @@ class Lines:
 
 
 def lines_of(panel):
-    """The number of lines of a panel with all its sections open."""
+    """The number of lines that a panel draws with all its subpanels open."""
     layout = Lines()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout.count

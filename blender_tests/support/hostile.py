@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes broken DNA files, and valid files with odd content.
+"""Makes broken DNA files, and valid files with unusual content.
 
 Broken files have indices out of range, cycles of joints or huge counts. The library refuses to
-write them, so they are made by editing bytes.
+write them, so that they are made by changing bytes.
 """
 
 from pathlib import Path
@@ -15,12 +15,12 @@ DATA = Path(__file__).resolve().parents[2] / "tests" / "data"
 
 
 def found_by_fuzzing():
-    """Paths of the stored .dna and .json files that the project's fuzzers found."""
+    """Paths of the stored .dna and .json files that the project's fuzzers have found."""
     return [p for p in sorted((DATA / "fuzz").iterdir()) if p.suffix in {".dna", ".json"}]
 
 
 def broken_on_purpose():
-    """The files of tests/data/malformed: (name, bytes, whether it must be refused).
+    """Yields (name, bytes, whether it must be refused) of the files of tests/data/malformed.
 
     A line of edits.txt: name, base, outcome, and edits `offset:removed bytes:inserted bytes`.
     """
@@ -38,14 +38,16 @@ def broken_on_purpose():
 
 
 def cut_short(content, count):
-    """Yield up to `count` prefixes of a file, from no byte to all but one."""
+    """Yield up to `count` beginnings of a file, from no byte to all bytes except one."""
     for length in np.unique(np.linspace(0, len(content) - 1, count).astype(int)):
         yield content[:length]
 
 
 def with_flipped_bytes(content, count, seed):
-    """Yield `count` copies with one to eight random changes, mostly at the beginning, because the
-    counts and offsets are there."""
+    """Yield `count` copies of a file, each with one to eight randomly changed bytes.
+
+    Most of them are near the beginning, where counts and offsets are.
+    """
     random = np.random.default_rng(seed)
     for _ in range(count):
         changed = bytearray(content)
@@ -62,7 +64,7 @@ def _with(array, value, where=slice(None)):
 
 
 def _set(face, mesh=None, **values):
-    """Change attributes of a face or of one of its meshes."""
+    """Set attributes of a face, or of its mesh with the index `mesh`."""
     meshes = list(face.meshes)
     for name, value in values.items():
         setattr(face if mesh is None else meshes[mesh], name, value)
@@ -70,7 +72,7 @@ def _set(face, mesh=None, **values):
 
 
 def _numbers(face, value):
-    """Set some numbers of every kind in the geometry to the same value."""
+    """Set some numbers of each list of the meshes to the same value."""
     meshes = list(face.meshes)
     for mesh in meshes:
         mesh.positions = _with(mesh.positions, value, np.s_[::5])
@@ -85,7 +87,7 @@ def _numbers(face, value):
 
 
 def _surface(face, value):
-    """Set numbers that affect only shading, such as normals and texture coordinates."""
+    """Set some normals and texture coordinates, which affect only shading, to a value."""
     for mesh in range(len(face.meshes)):
         normals, uvs = face.meshes[mesh].normals, face.meshes[mesh].texture_coordinates
         _set(
@@ -105,7 +107,7 @@ def _neutral(face, value):
 
 
 def _named(face, text):
-    """Give all elements the same name."""
+    """Give all elements of a face the same name."""
     face.name = text
     face.joint_names = [text] * len(JOINTS)
     face.raw_control_names = [text] * len(CONTROLS)
@@ -116,7 +118,7 @@ def _named(face, text):
 
 
 def _flat_faces(face):
-    """Use polygons with one corner, with two, and with one vertex at all corners."""
+    """Replace polygons by ones with one or two corners, or with one vertex at several corners."""
     layouts = np.array([0, 1, 2, 5, 5, 5, 5, 6, 7, 6], np.uint32)
     for mesh in range(len(face.meshes)):
         _set(face, mesh, face_layouts=layouts, face_offsets=np.array([0, 1, 3, 7, 10], np.uint32))
@@ -159,7 +161,7 @@ def _no_skin(face):
 
 
 def _many_joints(face, count=5000):
-    """Add a long chain of joints, each 0.01 mm from its parent."""
+    """Add a long chain of joints, each of which is 0.01 mm from its parent."""
     more = count - len(JOINTS)
     face.joint_names = [*JOINTS, *(f"tiny_{i}" for i in range(more))]
     face.joint_parents = np.array(
@@ -180,7 +182,7 @@ def _matrix(face, value):
     face.joint_groups = groups
 
 
-# name -> change of the small face; every result can be written and parsed
+# name -> function that changes a small face; each result can be written and parsed
 ODD = {
     "nan everywhere": lambda f: _numbers(f, np.nan),
     "infinite numbers": lambda f: _numbers(f, np.inf),
@@ -218,7 +220,7 @@ ODD = {
 
 
 def odd_face(name):
-    """The bytes of a small face with one change of ODD."""
+    """Bytes of a DNA file: a small face with the change ODD[name]."""
     face = small_face()
     ODD[name](face)
     return face.to_bytes()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fake UILayout that records a panel, because tests have no window."""
+"""A fake UILayout that records the drawing of a panel, because tests have no window."""
 
 from operator import attrgetter
 from types import SimpleNamespace
@@ -10,10 +10,10 @@ ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum
 
 
 class Recorder:
-    """Accepts every call of a panel and looks up properties and operators as Blender does.
+    """Accepts every call of a panel, and looks up properties and operators as Blender does.
 
-    `labels` has the drawn text including buttons, `operators` the operators of buttons,
-    `properties` the paths of editable properties.
+    `labels` are the drawn texts, with texts of buttons; `operators` the names of the buttons'
+    operators; `properties` the paths of the properties that the panel shows.
     """
 
     def __init__(self, top=None):
@@ -24,7 +24,7 @@ class Recorder:
         object.__setattr__(self, "_top", top)
 
     def __setattr__(self, _name, _value):
-        """Ignore options of a layout or of an operator button."""
+        """Ignore options that a panel sets on a layout or on an operator's button."""
 
     def label(self, text="", icon="NONE", **_options):
         assert icon in ICONS, icon
@@ -57,12 +57,12 @@ class Recorder:
         return lambda *_a, **_o: Recorder(self._top)
 
     def text(self, between=" "):
-        """All drawn labels, joined."""
+        """All drawn texts, joined by `between`."""
         return between.join(self.labels)
 
 
 def drawn(panel):
-    """Draw a panel into a Recorder, which is returned."""
+    """Let a panel draw into a new Recorder, and return the Recorder."""
     layout = Recorder()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout

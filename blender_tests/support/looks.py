@@ -23,7 +23,7 @@ KINDS = {
 
 
 def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
-    """A shifted and scaled copy of a mesh without shapes; offset in the file's axes and units."""
+    """A mesh's shifted and scaled copy without shapes. offset: in the file's axes and units."""
     middle = mesh.positions.mean(axis=0)
     moved = (mesh.positions - middle) * scale + middle + np.array(offset, np.float32)
     names = ("normals", "texture_coordinates", "layout_positions", "layout_normals")
@@ -34,7 +34,7 @@ def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
 
 
 def set_meshes(dna, meshes):
-    """Replace the meshes of a face by {name: Mesh}, with one LOD."""
+    """Replace the meshes of a face by {name: Mesh}; afterwards it has one LOD."""
     dna.mesh_names, dna.meshes = list(meshes), list(meshes.values())
     dna.lod_count = 1
     dna.lod_mesh_mapping = [list(range(len(meshes)))]
@@ -54,7 +54,7 @@ def set_meshes(dna, meshes):
 
 
 def every_kind():
-    """A face with one mesh of each kind that MetaHumans have."""
+    """A face with one mesh of each kind in KINDS, which MetaHumans have."""
     dna = small_face()
     patch = dna.meshes[1]
     meshes = {"head_lod0_mesh": dna.meshes[0]}
@@ -65,7 +65,7 @@ def every_kind():
 
 
 def write_image(path, pixels):
-    """Write float[H, W, 3 or 4] as a PNG without colour conversion."""
+    """Write float[H, W, 3 or 4] as a PNG; values are not converted between colour spaces."""
     height, width, channels = pixels.shape
     image = bpy.data.images.new(path.stem, width, height, alpha=channels == 4)
     image.colorspace_settings.is_data = True
@@ -79,7 +79,7 @@ def write_image(path, pixels):
 
 
 def halves(left, right, size=16):
-    """float32[size, size, n]: colour left for u < 0.5, colour right for the rest."""
+    """float32[size, size, n]: pixels with the colour `left` for u < 0.5 and `right` elsewhere."""
     pixels = np.empty((size, size, len(left)), np.float32)
     pixels[:, : size // 2], pixels[:, size // 2 :] = left, right
     return pixels
@@ -125,7 +125,7 @@ def stage(items, size=32, engine="CYCLES", samples=4):
 
 
 def render(setup, path):
-    """Render a still; returns its pixels float32[size, size, 4], row 0 at the bottom."""
+    """Render a still to a file. Returns pixels float32[size, size, 4], row 0 at the bottom."""
     setup.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path), check_existing=False)
@@ -137,7 +137,7 @@ def render(setup, path):
 
 
 def upstream(socket):
-    """All nodes that are connected to an input, directly or through others."""
+    """All nodes that are connected to an input socket, directly or through other nodes."""
     seen, todo = set(), [link.from_node for link in socket.links]
     while todo:
         node = todo.pop()

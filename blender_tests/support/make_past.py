@@ -3,8 +3,8 @@
 
     python blender_tests/support/make_past.py ZIP FOLDER [--record]
 
-Run by a Python with bpy. With --record ZIP plays the existing files of FOLDER and writes their
-values to FOLDER/values.npz.
+Run by a Python with bpy. With --record, the build ZIP plays the existing files of FOLDER, and their
+values are written to FOLDER/values.npz.
 """
 
 import argparse
@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve()
 
 
 def _start(package):
-    """Install the extension in a temporary user folder of this process."""
+    """Install an extension's package in a temporary user folder, for this process."""
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-past-")
     import bpy
 
@@ -31,7 +31,7 @@ def _start(package):
 
 
 def main():
-    """Make the files and record their animation."""
+    """Make the files, unless --record is given, and record their animation."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("zip", type=Path)
     parser.add_argument("folder", type=Path)
@@ -40,7 +40,7 @@ def main():
     _start(options.zip)
     from support import past, past_scenes
 
-    # A .blend stores its path, so save it at a neutral one.
+    # A .blend contains its path, so that files are saved in a folder with a neutral name.
     work = Path(tempfile.gettempdir()) / "risorius-past"
     shutil.rmtree(work, ignore_errors=True)
     if options.record:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A simulated layout that finds texts which Blender would cut off.
+"""A fake UILayout that finds texts which Blender would cut off.
 
-It repeats the widths of Blender's layouts at an interface scale of 1 with Blender's font: a column
-gives each part its width, a row divides it by the needs of its parts, a split by its factor, and
-with use_property_split names use the left two fifths.
+It calculates the widths of Blender's layouts at an interface scale of 1 with Blender's font: in a
+column each part has the column's width, a row divides its width by the requests of its parts, a
+split by its factor, and with use_property_split names use the left two fifths.
 """
 
 from types import SimpleNamespace
@@ -21,9 +21,9 @@ _ASKED = 30  # pixels that a button requests from a row in addition to its text
 _NUMBER = 60  # the same for a number field
 _NAMES = 0.4
 _VALUE = "0.000"
-# Heights measured in a window of Blender 4.3, where they are larger than in 5.2.
+# Heights in pixels, measured in a window of Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
-# English -> translation; replaces Blender's lookup, which the bpy module lacks.
+# English -> translation. Replaces Blender's translations, which the bpy module does not have.
 LOCAL = {}
 
 
@@ -35,12 +35,12 @@ def width_of(text):
 
 
 def local(text):
-    """The translation of a label in LOCAL, or the label."""
+    """The translation of a label by LOCAL, or the label itself."""
     return LOCAL.get(text, text)
 
 
 class Part:
-    """A row, a column or a split.
+    """A row, a column, a grid or a split.
 
     Its children are Parts and (text, pixels to show it fully, pixels that it requests from a row).
     """
@@ -98,7 +98,7 @@ class Part:
         self.children.append((text, pixels, asked))
 
     def _named(self, text):
-        """Add a line that is split into a name at the left and a value."""
+        """Add a line with a name at its left and room for a value at its right."""
         part = self._inner("split", _NAMES)
         part._leaf(text, width_of(text) + _MARGIN)
         part._leaf("", 0)
@@ -179,14 +179,14 @@ class Part:
         return sum(asked) if self.kind == "row" else max(asked, default=0)
 
     def height(self):
-        """Height in pixels."""
+        """The height of this part in pixels."""
         if self.is_header:
             return SUB_HEADER
         tall = [c.height() if isinstance(c, Part) else _LINE for c in self.children]
         return max(tall, default=0) if self.kind in ("row", "split") else sum(tall)
 
     def cut(self, width):
-        """Texts that are cut off at a width in pixels, with needed and available pixels."""
+        """(text, needed pixels, available pixels) of each text that is cut off at this width."""
         found = []
         for child, room in zip(self.children, self._rooms(width), strict=True):
             if isinstance(child, Part):
@@ -215,7 +215,7 @@ def _property(data, name):
 
 
 class Operator:
-    """A fake operator instance for draw(), with given or default property values."""
+    """A fake instance of an operator for its draw(), with given or default property values."""
 
     def __init__(self, kind, **given):
         self._kind = kind
@@ -240,7 +240,7 @@ class Operator:
 
 
 def drawn(kind, context, **given):
-    """The Part that a panel or a line of a list draws."""
+    """The Part that a panel or list draws. given: further attributes of the fake panel."""
     layout = Part()
     kind.draw(SimpleNamespace(layout=layout, **given), context)
     return layout

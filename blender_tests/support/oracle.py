@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skinning and morphing in float64, written only from the description of the format.
+"""Computes skinning and morphing in float64 from the description of the format alone.
 
 It uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and metres.
 """
@@ -13,7 +13,7 @@ _AXES = {
 
 
 def _rotation(dna, angles):
-    """Rotation matrix for column vectors; the first axis of the sequence acts first."""
+    """Rotation matrix for column vectors; the first axis of the rotation sequence acts first."""
     if dna.rotation_unit == "degrees":
         angles = np.radians(angles)
     matrix = np.eye(3)
@@ -31,7 +31,7 @@ def _rotation(dna, angles):
 
 
 def _world(dna, deltas, turns=None):
-    """World matrices of joints in the file's axes and units; turns: see `vertices`."""
+    """World matrices of joints in the file's axes and units. turns: as in `vertices`."""
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -48,14 +48,14 @@ def _world(dna, deltas, turns=None):
 
 
 def to_blender(dna, points, unit_scale=1.0):
-    """Convert points from the file's axes and unit to Blender's."""
+    """Convert points from the file's axes and unit to Blender's axes and units."""
     axes = np.array([_AXES[w] for w in dna.coordinate_system], np.float64).T
     metres = 0.01 if dna.translation_unit == "cm" else 1.0
     return points @ axes.T * metres / unit_scale
 
 
 def vertices(dna, mesh_index, pose, unit_scale=1.0, turns=None):
-    """Deformed vertices of a mesh, float64[V, 3] in Blender units.
+    """Deformed vertices of a mesh, float64[V, 3], in Blender's axes and units.
 
     Args:
         dna: the face.

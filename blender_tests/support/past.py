@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens .blend files of old versions in several ways and records their animation."""
+"""Opens .blend files of old versions in several ways, and records how their faces move."""
 
 import json
 import os
@@ -13,7 +13,8 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "past"
 FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
 AS_SAVED = "as saved"
 LIVE_AGAIN = "live again"
-# File -> ways to play it: as saved, unbaked (LIVE_AGAIN), or with the named action assigned.
+# File -> ways to play it: as saved, after undoing a bake (LIVE_AGAIN), or with an action of this
+# name assigned.
 PLAYS = {
     "layers": (AS_SAVED, "Other"),
     "meta": (AS_SAVED,),
@@ -31,7 +32,7 @@ PLAYS = {
 
 @contextmanager
 def scalar():
-    """Context manager: faces use the scalar kernels, whose results are equal on every processor."""
+    """A context in which faces use the scalar kernels, which give equal results on all CPUs."""
     before = os.environ.get("RISORIUS_SIMD")
     os.environ["RISORIUS_SIMD"] = "scalar"
     try:
@@ -44,18 +45,18 @@ def scalar():
 
 
 def rigs():
-    """The deforming armatures of the scene, including linked ones, sorted by name."""
+    """The scene's deforming armatures of faces, also linked ones, sorted by name."""
     found = [o for o in bpy.context.scene.objects if "risorius_controls" in o]
     return sorted(found, key=lambda o: o.name)
 
 
 def controls():
-    """The control armatures of the scene's faces."""
+    """The control armatures of the scene's faces, in the same order."""
     return [rig["risorius_controls"] for rig in rigs()]
 
 
 def open_it(path, _folder):
-    """Open the file; ignore the error of Blender 5.2 when it repairs override roots of 4.2."""
+    """Open a file; ignore the error of Blender 5.2 when it repairs override roots from 4.2."""
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path))
     except RuntimeError as error:
@@ -64,13 +65,13 @@ def open_it(path, _folder):
 
 
 def _open_if_needed(path, folder):
-    """Open the file unless it is open and unchanged, because opening takes most of the time."""
+    """Open a file unless it is open and unchanged, because opening takes most of the time."""
     if bpy.data.filepath != str(path) or "touched" in bpy.context.scene:
         open_it(path, folder)
 
 
 def save_and_open(path, folder):
-    """Open the file, save it under another name, and open the copy."""
+    """Open a file, save it under another name, and open the saved copy."""
     _open_if_needed(path, folder)
     again = folder / f"again_{path.name}"
     bpy.ops.wm.save_as_mainfile(filepath=str(again))
@@ -78,7 +79,7 @@ def save_and_open(path, folder):
 
 
 def append(path, _folder):
-    """Append its characters and actions to an empty file."""
+    """Append the characters and actions of a .blend to an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path)) as (there, _here):
         collections, actions = list(there.collections), list(there.actions)
@@ -91,7 +92,7 @@ def append(path, _folder):
 
 
 def link(path, _folder):
-    """Link its characters and actions into an empty file."""
+    """Link the characters and actions of a .blend into an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path), link=True) as (there, here):
         collections = list(there.collections)
@@ -102,7 +103,7 @@ def link(path, _folder):
 
 
 def override(path, folder):
-    """Link its characters and make library overrides of them."""
+    """Link the characters of a .blend and make library overrides of them."""
     link(path, folder)
     for rig in rigs():
         bpy.context.view_layer.objects.active = rig["risorius_controls"]
@@ -111,7 +112,7 @@ def override(path, folder):
 
 
 def undo(path, folder):
-    """Open the file, change it, and undo the change."""
+    """Open a file, change its sliders and layers, and undo the change."""
     bpy.context.preferences.edit.use_global_undo = True
     _open_if_needed(path, folder)
     bpy.ops.ed.undo_push(message="as it was")
@@ -134,18 +135,18 @@ ROUTES = {
     "link": link,
     "override": override,
 }
-# Routes that are skipped for files that already contain library overrides.
+# Routes that are not used for files that contain library overrides.
 NOT_OVERRIDDEN = ("append", "link", "override")
 
 
 def routes_of(name):
-    """The names in ROUTES by which a file is opened."""
+    """The keys of ROUTES that are used for a file."""
     skipped = NOT_OVERRIDDEN if name.startswith("overridden") else ()
     return [route for route in ROUTES if route not in skipped]
 
 
 def show(mode):
-    """Show all faces without overrides in Direct mode ("AUTO") or with posed bones ("LIVE")."""
+    """Show all faces except overrides in Direct mode ("AUTO") or with posed bones ("LIVE")."""
     for rig in rigs():
         if rig.library is None and rig.override_library is None:
             rig["risorius_skinning"] = mode
@@ -154,7 +155,7 @@ def show(mode):
 
 
 def prepare(play):
-    """Prepare the open file for playing, with posed bones as in files of the past."""
+    """Prepare the open file for playing, with posed bones as when the files were made."""
     show("LIVE")
     if play != AS_SAVED:
         bpy.context.scene["touched"] = True
@@ -174,9 +175,9 @@ def prepare(play):
 
 
 def _choose_slot(item):
-    """Choose the slot of an action without one.
+    """Choose the first slot of an object's action if no slot is chosen.
 
-    Blender 5.0 does not choose one for an override's action that comes from 4.2.
+    Blender 5.0 chooses none for an override's action that comes from 4.2.
     """
     data = item.animation_data
     if data is not None and data.action is not None and hasattr(data, "action_slot"):
@@ -188,7 +189,7 @@ def film(frames=FRAMES, read=None):
 
     Args:
         frames: frames to play, in this order.
-        read: reads values of a face in a depsgraph; None: bones, keys, channels and maps.
+        read: reader of a face's values in a depsgraph; None: bones, keys, channels and maps.
     """
     found = {}
     for frame in frames:
@@ -202,7 +203,7 @@ def film(frames=FRAMES, read=None):
 
 
 def _read(rig, depsgraph):
-    """Evaluated values of bones, shape keys, channels and maps."""
+    """Evaluated values of a face's bones, shape keys, channels and maps."""
     seen = rig.evaluated_get(depsgraph)
     bones = seen.pose.bones
     found = {
@@ -228,7 +229,7 @@ def _read(rig, depsgraph):
 
 
 def vertices(rig, depsgraph):
-    """The vertices of each mesh in world space, as a reader for `film`."""
+    """A reader for `film`: the vertices of each mesh of a face in world space."""
     found = {}
     for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
         seen = rig[key].evaluated_get(depsgraph)
@@ -240,7 +241,7 @@ def vertices(rig, depsgraph):
 
 
 def direct_rigs():
-    """The faces in Direct mode, which have at least one mesh with finished positions."""
+    """The faces in Direct mode: at least one of their meshes has computed positions."""
     return [
         rig
         for rig in rigs()
@@ -256,7 +257,7 @@ def _numbers(bone):
 
 
 def films(folder, name, work, routes=None):
-    """Play a file by each route.
+    """Open a file by each route, and play it in each way.
 
     Args:
         folder: folder of the files.
@@ -275,7 +276,7 @@ def films(folder, name, work, routes=None):
 
 
 def record(folder):
-    """Write the films of a folder's files to its values.npz; equal films are stored once."""
+    """Write the films of a folder's files to its values.npz; equal films are written once."""
     index, kept = {}, []
     for name in PLAYS:
         for key, found in films(folder, name, Path(bpy.app.tempdir)):
@@ -290,7 +291,7 @@ def record(folder):
 
 
 def recorded(folder):
-    """Read the result of `record`: "name/route/play" -> film."""
+    """The films that `record` wrote for a folder: "name/route/play" -> film."""
     with np.load(folder / "values.npz") as held:
         films_of = {}
         for key, entry in json.loads(str(held["index"])).items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the scenes of past.py's files: one for each way of animating a face."""
+"""Makes the files that past.py plays: one for each way of animating a face."""
 
 import bpy
 
@@ -11,7 +11,7 @@ EYES = ("eyeBlinkL", "eyeBlinkR", "eyeSquintInnerL")
 
 
 def make_all(folder):
-    """Make every scene in an empty file and save it under its name."""
+    """Make every scene in an empty file, and save it in a folder under the function's name."""
     dna = folder / "face.dna"
     face = small_face(head_grid=(5, 6))
     names = [PREFIX + n for n in EYES]
@@ -44,14 +44,14 @@ def _empty():
 
 
 def save(path):
-    """Save the open file, compressed, at frame 9, at which the animations differ from rest."""
+    """Save the open file, compressed, at frame 9, at which faces are not at rest."""
     bpy.context.scene.frame_set(9)
     bpy.context.view_layer.update()
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
 
 
 def _empty_action(item, name):
-    """Assign a new, empty action to the control armature."""
+    """Assign a new, empty action to the control armature, and return it."""
     data = item.animation_data_create()
     data.action = bpy.data.actions.new(name)
     data.action.use_fake_user = True
@@ -59,7 +59,7 @@ def _empty_action(item, name):
 
 
 def _key_sliders(item, **curves):
-    """Key sliders in the assigned action: control -> {frame: value}."""
+    """Set keys of sliders in the assigned action. curves: control -> {frame: value}."""
     bone = item.pose.bones["face"]
     for short, keys in curves.items():
         for frame, value in keys.items():
@@ -69,14 +69,14 @@ def _key_sliders(item, **curves):
 
 
 def _key_weight(item, place, keys):
-    """Key a layer's weight by its index, as versions up to commit 38364e4 did."""
+    """Set keys of a layer's weight by its index, as versions up to commit 38364e4 did."""
     for frame, value in keys.items():
         item.risorius_layers[place].weight = value
         item.keyframe_insert(f"risorius_layers[{place}].weight", frame=frame)
 
 
 def _three_layers(rig):
-    """Add layers of an action, an expression and idle life to sliders without keys."""
+    """Add layers of an action, an expression and idle life, without keys of sliders."""
     item, layers_module = scene.controls(rig), scene.submodule("scene.animation.layers")
     item.risorius_layer_rules = False
     wave = _empty_action(item, f"Wave of {rig.name}")
@@ -89,7 +89,7 @@ def _three_layers(rig):
 
 
 def layers(dna, _folder):
-    """Key layer weights in the assigned and in an unassigned action, and add a driver."""
+    """Layer weights have keys in the assigned and in another action; one has a driver."""
     item = _three_layers(scene.load(dna, "LIVE"))
     other = _empty_action(item, "Other")
     _key_weight(item, 0, {1: 0.2, 20: 0.9})
@@ -105,7 +105,7 @@ def layers(dna, _folder):
 
 
 def meta(dna, _folder):
-    """Key layer weights in an action inside a meta strip."""
+    """Layer weights have keys in an action inside a meta strip."""
     item = _three_layers(scene.load(dna, "LIVE"))
     action = _empty_action(item, "In a meta strip")
     _key_weight(item, 1, {1: 0.0, 20: 1.0})
@@ -115,7 +115,7 @@ def meta(dna, _folder):
 
 
 def _strip(item, action, name="", **settings):
-    """Add a strip of the action to a new NLA track, at the frames of its keys."""
+    """Add a strip of an action to a new NLA track, at the frames of its keys."""
     data = item.animation_data
     slot = getattr(data, "action_slot", None)
     data.action = None
@@ -134,7 +134,7 @@ def _strip(item, action, name="", **settings):
 
 
 def make_meta(item, strip):
-    """Put a strip into a meta strip, which needs an NLA editor."""
+    """Put a strip into a meta strip; Blender does this only in an NLA editor."""
     bpy.context.view_layer.objects.active = item
     item.select_set(True)
     for track in item.animation_data.nla_tracks:
@@ -150,7 +150,7 @@ def make_meta(item, strip):
 
 
 def linked_action(dna, folder):
-    """Key layer weights in an action that is linked from another file."""
+    """Layer weights have keys in an action that is linked from another file."""
     item = _three_layers(scene.load(dna, "LIVE"))
     _empty_action(item, "Of a library")
     _key_weight(item, 0, {1: 0.3, 16: 0.9})
@@ -175,7 +175,7 @@ def _assign(item, action):
 
 
 def shared_action(dna, _folder):
-    """One action for two characters whose layers have different orders."""
+    """Two characters, whose layers have different orders, use one action."""
     one = _three_layers(scene.load(dna, "LIVE"))
     two = _three_layers(scene.load(dna, "KEYS"))
     two.risorius_layers.move(0, 2)
@@ -188,7 +188,7 @@ def shared_action(dna, _folder):
 
 
 def nla(dna, _folder):
-    """Strips that replace, are added, fade and are muted; the active action adds to them."""
+    """NLA strips replace, add, fade or are muted; the active action adds to them."""
     item = _three_layers(scene.load(dna, "LIVE"))
     _strips(item)
     _empty_action(item, "On top")
@@ -212,7 +212,7 @@ def _strips(item):
 
 
 def baked_result(dna, _folder):
-    """A baked face: strips of bones, keys and maps above muted tracks."""
+    """The face is baked into strips of bones, keys and maps above muted tracks."""
     rig = scene.load(dna, "LIVE")
     item = _three_layers(rig)
     _strips(item)
@@ -221,7 +221,7 @@ def baked_result(dna, _folder):
 
 
 def _own_joint(rig):
-    """Add two tracks to the deforming armature: one muted, one that plays."""
+    """Add two tracks for a user's bone to the deforming armature: one is muted, one plays."""
     bone = rig.pose.bones["user_joint"]
     bone.rotation_mode = "XYZ"
     for name, angle in (("Turn", 0.7), ("Back", -0.4)):
@@ -234,7 +234,7 @@ def _own_joint(rig):
 
 
 def baked_controls(dna, _folder):
-    """Bake controls into a strip above a muted track and a solo track."""
+    """The controls are baked into a strip above a muted track and a solo track."""
     item = _three_layers(scene.load(dna, "KEYS"))
     _strips(item)
     item.animation_data.nla_tracks["Low"].is_solo = True
@@ -250,7 +250,7 @@ def _bake(item, kind):
 
 
 def shape_modes(dna, _folder):
-    """A face with live shape keys, and a face with real keys, one of them edited."""
+    """One face has live shape keys, the other one real keys; each has a key of the user."""
     for mode in ("LIVE", "KEYS"):
         rig = scene.load(dna, mode)
         item = scene.controls(rig)
@@ -267,7 +267,7 @@ def shape_modes(dna, _folder):
 
 
 def bones(dna, _folder):
-    """An action with keys of head, neck and eye bones, and of the sliders that these drive."""
+    """An action has keys of head, neck and eye bones, and of a slider that the eyes drive."""
     rig = scene.load(dna, "LIVE")
     item = _three_layers(rig)
     _empty_action(item, "Bones")
@@ -285,12 +285,12 @@ def bones(dna, _folder):
 
 
 def overridden_live(dna, folder):
-    """An override of a linked face in Live mode with local meshes, a layer and keys."""
+    """The face is an override of a linked face in Live mode, with layers and keys."""
     _overridden(dna, folder, "LIVE")
 
 
 def overridden_keys(dna, folder):
-    """An override of a linked face whose real shape keys stay linked."""
+    """The face is an override of a linked face with real shape keys, with layers and keys."""
     _overridden(dna, folder, "KEYS")
 
 

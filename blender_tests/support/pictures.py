@@ -6,7 +6,7 @@ import numpy as np
 
 
 def small_render(camera, size=32):
-    """Set up a Cycles render with one sample, no denoising and a sun. Returns the scene."""
+    """Set up a small Cycles render with one sample, no denoising and a sun. Returns the scene."""
     setup = bpy.context.scene
     setup.render.engine = "CYCLES"
     setup.cycles.samples, setup.cycles.device = 1, "CPU"
@@ -21,7 +21,7 @@ def small_render(camera, size=32):
 
 
 def pixels(path):
-    """RGBA values of an image file, flat."""
+    """RGBA values of all pixels of an image file, in one flat array."""
     image = bpy.data.images.load(str(path))
     values = np.array(image.pixels[:])
     bpy.data.images.remove(image)
@@ -29,7 +29,7 @@ def pixels(path):
 
 
 def render(path):
-    """Render the current frame to a file. Returns its pixels."""
+    """Render the current frame to a file, and return its pixels."""
     bpy.context.scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     return pixels(path)

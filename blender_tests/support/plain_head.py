@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions, and fakes of the risorius functions that work on it."""
+"""A head without expressions, and fake functions of risorius that process heads."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,8 @@ from . import scene
 from .egg import face_shapes
 
 METRES = 0.01
-# Landmarks of the head of face_shapes, in cm with y up; the chin is missing on purpose.
+# Landmarks of the head of face_shapes that the fake search finds, in cm with y up. The chin is
+# missing intentionally.
 PLACES = {
     "eye_inner_L": (2.0, 3.0, 9.0),
     "eye_inner_R": (-2.0, 3.0, 9.0),
@@ -31,7 +32,7 @@ def to_blender(points):
 
 
 def plain_head(name="Egg"):
-    """Add the head of face_shapes without shape keys as active object."""
+    """Add the head of face_shapes, without shape keys, as the active object."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(to_blender(positions).tolist(), [], faces.tolist())
@@ -43,11 +44,11 @@ def plain_head(name="Egg"):
 
 
 class Package:
-    """Replaces the functions of risorius that find landmarks and register heads.
+    """Replaces the functions of risorius that search landmarks on heads.
 
     Attributes:
-        places: name -> landmark that the fake finds, in centimetres.
-        heads: the finding.Head of each call.
+        places: name -> landmark that the fake search finds, in centimetres.
+        heads: the finding.Head of each search.
     """
 
     def __init__(self, monkeypatch):
@@ -70,7 +71,7 @@ def opened(positions):
 
 
 class Onto(Package):
-    """Also replaces the transfer, with one expression, and records its arguments.
+    """Also replaces the transfer, which gives one expression, and conform.
 
     Attributes:
         asked: arguments of each call.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A render engine that draws nothing and records the vertices given to it."""
+"""A render engine that draws nothing, and records the vertices that Blender gives it."""
 
 from contextlib import contextmanager
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Probe(bpy.types.RenderEngine):
-    """Reads the depsgraph of a render, also between frames as for motion blur."""
+    """Records vertices from the depsgraph of a render, also between frames as for motion blur."""
 
     bl_idname = "RISORIUS_TEST_PROBE"
     bl_label = "Probe"
@@ -46,7 +46,7 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Make a scene render with the probe. Returns: its records, which grow with each render."""
+    """Let a scene render with the probe, in a context. Yields its records, which grow."""
     bpy.utils.register_class(Probe)
     before = setup.render.engine
     Probe.seen = {}

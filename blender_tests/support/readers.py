@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads exported files without Blender: trimesh, Assimp, OpenUSD and Alembic's own library.
 
-readers.py KIND FILE prints one JSON object. It runs in a process of its own, because Blender's and
+readers.py KIND FILE prints one JSON object. It runs in a separate process, because Blender's and
 the package's copies of OpenUSD or Alembic may conflict in one process.
 
     meshes       name -> points [V][3] at rest, material, colors [V][4] if it has a texture
@@ -23,7 +23,7 @@ import numpy as np
 
 
 def _colors(picture, uvs):
-    """float[V, 4] colours of a picture at UV coordinates; v increases upwards."""
+    """Colours of a picture at UV coordinates, [V][4] in 0 to 1; v increases upwards."""
     from PIL import Image
 
     with Image.open(picture) as image:
@@ -66,7 +66,7 @@ def gltf(path):
 
 
 def _tree(content):
-    """The JSON of a .glb file."""
+    """The JSON object of a .glb file's bytes."""
     return json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
 
 

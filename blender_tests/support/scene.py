@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Short functions with which tests edit and read a scene."""
+"""Short functions for tests that edit and read a scene."""
 
 import sys
 
@@ -14,7 +14,7 @@ TOLERANCE = 1e-4  # relative to the head's size, for float32 and bone axes store
 
 
 def submodule(name):
-    """A module of the enabled add-on."""
+    """A module of the enabled add-on, such as "scene.lod.lods"."""
     return sys.modules[f"{MODULE}.{name}"]
 
 
@@ -34,17 +34,17 @@ def add_board(kind="COMPLETE"):
 
 
 def controls(rig):
-    """The control armature of a deforming armature."""
+    """The control armature of a face, given its deforming armature."""
     return rig["risorius_controls"]
 
 
 def face(rig):
-    """The pose bone whose custom properties are the sliders."""
+    """The pose bone of a face whose custom properties are the sliders."""
     return controls(rig).pose.bones["face"]
 
 
 def meshes(rig):
-    """DNA mesh index -> mesh object."""
+    """DNA mesh index -> mesh object of a face."""
     found = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
     return {o["dna_mesh"]: o for o in found}
 
@@ -57,7 +57,7 @@ def update(*items):
 
 
 def set_controls(rig, **values):
-    """Set sliders, named by the ends of their names, and evaluate the scene."""
+    """Set sliders of a face and evaluate the scene. values: end of a slider's name -> value."""
     bone = face(rig)
     for end, value in values.items():
         name = next(k for k in bone.keys() if k.endswith(end))  # noqa: SIM118
@@ -77,15 +77,15 @@ def evaluated(item):
 
 
 def raw_of(rig, path):
-    """float32[R]: the raw control values of the sliders."""
+    """Raw control values of a face's sliders, float32[R]. path: its DNA file."""
     labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
 
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
-    """Largest distance between Blender's vertices and the oracle's, relative to the mesh's size.
+    """Largest coordinate difference between Blender's and the oracle's vertices of a face.
 
-    The transform of the armature may be arbitrary.
+    It is relative to the mesh's size. The armature may have any transform.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))
@@ -101,7 +101,7 @@ def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
 
 
 def curves(item):
-    """The F-curves of an object's own action, in Blender with slots and without."""
+    """The F-curves of an object's assigned action, in Blender with or without action slots."""
     data = item.animation_data
     if hasattr(data, "action_slot"):
         bags = (s.channelbag(data.action_slot) for s in data.action.layers[0].strips)
@@ -116,12 +116,12 @@ def pose_bones(rig):
 
 
 def snapshot(rig):
-    """Vertices of all meshes of a character, joined."""
+    """Vertices of all meshes of a character, concatenated, float64[V, 3]."""
     return np.concatenate([evaluated(m) for _, m in sorted(meshes(rig).items())])
 
 
 def counts():
-    """Kind of datablock -> number in the file."""
+    """Type of datablock -> number of its datablocks in the file."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
@@ -130,7 +130,7 @@ def counts():
 
 
 def invalid_drivers():
-    """Data paths of invalid drivers in the file, and the number of all drivers."""
+    """(object name, data path) of invalid drivers in the file, and the number of all drivers."""
     owners = [
         *bpy.data.objects,
         *bpy.data.shape_keys,

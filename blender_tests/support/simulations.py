@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a moving face with cloth or simulation nodes, and records vertices."""
+"""Makes a moving face with cloth or simulation nodes, and records its vertices."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ FREE = 2e-3  # tolerance relative to the mesh's size if some cloth is free
 
 
 def film(item, frames=FRAMES):
-    """Frame -> evaluated vertices of a mesh at this frame."""
+    """A film: frame -> evaluated vertices of a mesh at this frame."""
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
@@ -22,13 +22,13 @@ def film(item, frames=FRAMES):
 
 
 def apart(film, wanted):
-    """The largest coordinate difference of two films over all frames, over the mesh's size."""
+    """The largest coordinate difference between two films, as a share of the mesh's size."""
     size = np.ptp(wanted[min(wanted)], axis=0).max()
     return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
 
 
 def moving(dna_file, mode, far=0.2):
-    """(armature, head mesh) of a face with a keyed jaw, head and location."""
+    """(armature, meshes[0]) of a face with keys on jaw, head bone and location of the controls."""
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):
@@ -40,7 +40,7 @@ def moving(dna_file, mode, far=0.2):
 
 
 def cloth(item, pinned=1.0):
-    """Add a cloth modifier; the uppermost fraction `pinned` of the vertices is pinned."""
+    """Add a cloth modifier; the uppermost fraction `pinned` of the vertices cannot move."""
     group = item.vertex_groups.new(name="pins")
     height = np.array([v.co.z for v in item.data.vertices])
     held = np.flatnonzero(height >= np.quantile(height, 1.0 - pinned))
@@ -54,7 +54,7 @@ def cloth(item, pinned=1.0):
 
 
 def mean_places(places):
-    """Frame -> expected result of `trail`. Args: places: a film of the input."""
+    """Film that `trail` should give. Args: places  film of the vertices before the modifier."""
     found, state = {}, None
     for frame in sorted(places):
         state = places[frame] if state is None else (state + places[frame]) / 2
@@ -63,7 +63,7 @@ def mean_places(places):
 
 
 def trail(item):
-    """Add simulation nodes whose vertices move halfway to the input at each step."""
+    """Add simulation nodes; in each step, their vertices move halfway to the modifier's input."""
     tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -99,7 +99,7 @@ def trail(item):
 
 
 def scarf(item, kind):
-    """A sheet attached to a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
+    """A sheet that follows a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
     points = np.array([v.co for v in item.data.vertices]) @ np.array(item.matrix_world)[:3, :3].T
     points += np.array(item.matrix_world)[:3, 3]
     low, high = points.min(axis=0), points.max(axis=0)

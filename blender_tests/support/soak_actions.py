@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random user actions on faces, and the checks after each action."""
+"""Random actions of a user on faces, and the checks after each action."""
 
 import hashlib
 import random
@@ -41,7 +41,7 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """Save a library with a character, then an undoable file with the first characters."""
+        """Save a library with a character, then a file with characters and an undo step."""
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
@@ -66,7 +66,7 @@ class World:
 
     @staticmethod
     def rigs():
-        """Local deforming armatures of the scene, sorted by name."""
+        """The scene's own (not linked) armatures of faces, sorted by name."""
         inside = bpy.context.scene.objects
         found = [o for o in inside if o.library is None and o.get("risorius_controls")]
         return sorted(found, key=lambda o: o.name)
@@ -143,7 +143,7 @@ class World:
         bpy.ops.risorius.set_lod_by_distance(enable=self.random.random() < 0.5)
 
     def place(self):
-        """Move, rotate and scale the control armature."""
+        """Move, rotate and scale the control armature at random."""
         controls = self._rig()["risorius_controls"]
         controls.location = [self.random.uniform(-1, 1) for _ in range(3)]
         controls.rotation_euler = [self.random.uniform(-1, 1) for _ in range(3)]
@@ -151,7 +151,7 @@ class World:
         scene.update(controls)
 
     def attach(self):
-        """Attach a face to a body or detach it, then move the body."""
+        """Attach a face to a body, or detach it, and then move the body."""
         rig = self._rig()
         self._activate(rig)
         body = bpy.context.scene.objects.get("body") or self._body()
@@ -175,7 +175,7 @@ class World:
         return body
 
     def test_channel(self):
-        """Test a shape, then end the test by the operator or by a change of the frame."""
+        """Test a shape channel, and end the test by the operator or by a change of the frame."""
         self._activate(self._rig())
         bpy.ops.risorius.test_channel(channel="1", value=self.random.random())
         if self.random.random() < 0.5:
@@ -260,15 +260,15 @@ class World:
             self._delete(self._rig())
 
     def _delete(self, rig):
-        """Delete a rig: by the operator, with its data, or with its override's collection."""
+        """Delete a rig: by Blender's operator, with its data, or with its override's collection."""
         objects = self._objects(rig)
         controls = rig["risorius_controls"]
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
             objects.remove(controls)
         if rig.override_library:
-            # Blender recreates objects that an override's collection has lost.
+            # Blender creates objects of an override again if its collection remains.
             root = rig.override_library.hierarchy_root
-            # A copy of an override has the same root and lies outside of it.
+            # A copy of an override has the same root collection, but is not inside of it.
             whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
             bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
@@ -279,7 +279,7 @@ class World:
         bpy.context.view_layer.update()
 
     def delete_part(self):
-        """Delete an object of a rig, change the frame, and undo."""
+        """Delete one object of a rig, change the frame, and undo the deletion."""
         self._push("whole")
         item = self.random.choice(self._objects(self._rig()))
         bpy.data.objects.remove(item)
@@ -308,7 +308,7 @@ class World:
             bpy.ops.risorius.reload()
 
     def replace(self):
-        """Replace the DNA of a rig by the same file, or by one with other axes and shapes."""
+        """Replace a rig's DNA by the same file, or by a file with other axes and shapes."""
         rig = self._rig()
         if not rig.override_library:
             self._activate(rig)
@@ -373,7 +373,7 @@ class World:
         bpy.ops.outliner.orphans_purge(do_recursive=True)
 
     def other_scene(self):
-        """Visit another scene, either empty or with the same characters."""
+        """Visit another scene, which is empty or has the same characters."""
         here = bpy.context.window.scene
         there = bpy.data.scenes.new("there")
         if self.random.random() < 0.5:
@@ -415,7 +415,7 @@ class World:
     # -- conditions that must hold ----------------------------------------------------------
 
     def check(self):
-        """Compare every face of the scene with the oracle, and check all drivers.
+        """Compare all faces of the scene with the oracle, and check all drivers.
 
         Returns:
             The largest error, relative to the mesh's size.
@@ -433,7 +433,8 @@ class World:
         for rig in rigs:
             error, where = self._error(rig)
             if not error < scene.TOLERANCE and scene.submodule("scene.frame.evaluate").refused(rig):
-                # Blender has locked an override; the panel reports it and has a button.
+                # Blender has locked an override. The panel says so and has a button, which this
+                # calls.
                 self._activate(rig)
                 bpy.ops.risorius.make_override()
                 self.repaired += 1
@@ -444,7 +445,7 @@ class World:
         return worst
 
     def _error(self, rig):
-        """The largest distance from the oracle as a share of a mesh's size, and its name."""
+        """(largest difference from the oracle as a share of the mesh's size, the mesh's name)."""
         dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
         depsgraph = bpy.context.evaluated_depsgraph_get()
         bone = rig["risorius_controls"].evaluated_get(depsgraph).pose.bones["face"]
@@ -465,7 +466,7 @@ class World:
         return worst
 
     def calm(self):
-        """Restore the initial number of characters, save and reload, before a memory sample."""
+        """Before a sample of memory: restore the first number of characters, save and reload."""
         while len(self.rigs()) > self.characters:
             self._delete(self.rigs()[-1])
         while len(self.rigs()) < self.characters:
@@ -477,7 +478,7 @@ class World:
         self.save_and_load()
 
     def leftovers(self):
-        """Datablocks left after deleting every character; their number must not grow.
+        """Type of data -> number of datablocks after all characters were deleted; it must not grow.
 
         Opens the file again afterwards.
         """
@@ -486,14 +487,15 @@ class World:
         self.purge_all()
         bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops unused data
         self.purge_all()
-        # Linked data is not counted: parts that point to each other stay until the file is loaded.
+        # Linked data do not count, because parts that refer to each other stay until a file is
+        # opened.
         kinds = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
         local = {
             p.identifier: [i for i in getattr(bpy.data, p.identifier) if not i.library]
             for p in kinds
             if p.identifier != "libraries"
         }
-        # Reports are Texts that stay for the user.
+        # Texts with reports of the add-on stay for the user, and do not count.
         local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
         counts = {name: len(found) for name, found in local.items()}
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))
@@ -502,12 +504,12 @@ class World:
         return counts
 
     def purge_all(self):
-        """Remove empty collections and unused data."""
+        """Remove empty collections, and data without users."""
         bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
         self.purge()
 
 
-# Action -> relative frequency; actions that change the file are undo steps.
+# Action -> its frequency relative to others.
 WEIGHTS = {
     "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,

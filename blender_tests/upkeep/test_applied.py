@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply, Set Origin and similar steps on any part of a face keep its form and place."""
+"""Tests Apply, Set Origin and similar steps on parts of a face: form and place stay."""
 
 import bpy
 import numpy as np
@@ -45,7 +45,7 @@ OPERATIONS = {
     "origin to the centre of volume": lambda: ORIGIN(type="ORIGIN_CENTER_OF_VOLUME"),
 }
 SELECTIONS = ("controls", "rig", "one mesh", "all")
-# Steps that Blender itself refuses on library data.
+# Steps that Blender refuses on library data.
 REFUSED_ON_LINKED_DATA = ("apply all", "geometry to origin", "origin to the cursor")
 
 
@@ -73,7 +73,7 @@ def _objects(rig):
 
 
 def _parts(rig):
-    """All values that these steps of Blender may change, by name."""
+    """(object, kind) -> value, for all values that these steps of Blender may change."""
     found = {}
     for item in _objects(rig):
         found[item.name, "matrix"] = np.array(item.matrix_basis)
@@ -95,7 +95,7 @@ def _update():
 
 
 def _hang(parent, bone=""):
-    """Add an empty of the user that is parented to an object or a bone of the face."""
+    """Add an empty, as a user would, whose parent is an object or a bone of the face."""
     hat = bpy.data.objects.new("Hat", None)
     bpy.context.scene.collection.objects.link(hat)
     hat.parent, hat.parent_type, hat.parent_bone = parent, "BONE" if bone else "OBJECT", bone
@@ -104,7 +104,7 @@ def _hang(parent, bone=""):
 
 
 def _put(rig, jaw):
-    """Move the jaw and update, so that all delayed work is done."""
+    """Move the jaw and update, so that delayed work of the add-on is done."""
     scene.set_controls(rig, jawOpen=jaw)
     scene.update(scene.controls(rig))
 
@@ -114,7 +114,7 @@ def _far(before, now):
 
 
 def _try(rigs, hats, steps):
-    """Do steps on the first face; afterwards all faces must move as before."""
+    """Do steps on the first face; after each, all faces and hats must be as before."""
     first = rigs[0]
     wanted, whole = {}, {}
     for jaw in (0.2, 0.7):
@@ -138,7 +138,7 @@ def _try(rigs, hats, steps):
 
 
 def _replaced(rig, tmp_path):
-    """Replace the file of a face that went through the steps, and check it against that file."""
+    """Replace the DNA file of a face after the steps, and compare the face with the new file."""
     path = tmp_path / "other.dna"
     other_face(head_grid=(6, 7)).save(str(path))
     bpy.context.view_layer.objects.active = scene.controls(rig)
@@ -180,7 +180,7 @@ def test_the_main_steps_on_a_face_on_a_body_with_keys_of_its_own(small_file, tmp
 
 
 def _on_a_body(path):
-    """A face with real keys, attached to the only bone of a rotated body."""
+    """(armature, controls) of a face with real shape keys on the only bone of a rotated body."""
     rig = scene.load(path, "KEYS")
     controls = scene.controls(rig)
     controls.scale = (1.5, 1.5, 1.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linked characters keep their saved pose, and move when overridden."""
+"""Tests that linked characters show their saved pose, and move after an override."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ JAW = "CTRL_expressions.jawOpen"
 
 @pytest.fixture
 def library(dna_file, tmp_path, mode):
-    """A .blend with a posed character in collection `Small`; the open file is empty."""
+    """(path of a .blend with a posed character, its vertices); the open file is empty."""
     rig = scene.load(dna_file, mode)
     scene.set_controls(rig, jawOpen=0.8, mouthCornerPullL=0.5, browDownL=1.0)
     path = tmp_path / f"library_{mode}.blend"
@@ -23,7 +23,7 @@ def library(dna_file, tmp_path, mode):
 
 
 def _link(path, instance=True):
-    """Link the collection. Returns the new active object: the instance or the controls."""
+    """Link the collection. Returns the new active object: the instance, or the controls."""
     bpy.ops.wm.link(
         directory=f"{path}/Collection/", filename="Small", instance_collections=instance
     )
@@ -134,7 +134,7 @@ def test_override_moves_and_survives_save(library, dna_file, tmp_path, instance,
 
 
 def _edit_library(path):
-    """Open the library, change the colour of its skin, save it, and return to the file."""
+    """Open the library, change colours of two materials, save it, and open the file again."""
     here = bpy.data.filepath
     bpy.ops.wm.open_mainfile(filepath=str(path))
     bpy.data.materials["Small_head"].diffuse_color = (0.1, 0.9, 0.2, 1.0)
@@ -221,7 +221,7 @@ def test_override_stands_where_the_instance_stood(library, dna_file):
 
 
 def _system_override(path, editable):
-    """An override made by Blender alone, in which only some parts are editable."""
+    """An override made by Blender without the add-on; only if `editable` all parts are editable."""
     item = _link(path)
     item.instance_collection.override_hierarchy_create(
         bpy.context.scene, bpy.context.view_layer, reference=item, do_fully_editable=editable
@@ -245,7 +245,7 @@ def test_system_override_is_noticed_and_repaired(library, dna_file):
 
 
 def test_refused_live_key_is_noticed_and_repaired(library, dna_file, mode):
-    """Blender's own menu makes only armatures editable."""
+    """Overrides made by Blender's own menu have editable armatures and read-only meshes."""
     rig = _system_override(library[0], editable=False)
     for item in (rig, scene.controls(rig)):
         item.override_library.is_system_override = False

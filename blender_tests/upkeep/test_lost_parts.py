@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deleted parts cause no exception, the panel names the missing part, undo restores it."""
+"""Tests deleted parts: no exception, the panel names the part, undo restores it."""
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from support.layout import drawn
 
 @pytest.fixture
 def rig(dna_file, mode):
-    """A posed character, with an undo step."""
+    """A posed character, and an undo step with it."""
     bpy.context.preferences.edit.use_global_undo = True
     made = scene.load(dna_file, mode)
     scene.set_controls(made, jawOpen=0.8, mouthCornerPullL=0.5)
@@ -30,7 +30,7 @@ def _said(active):
 
 
 def _use(active):
-    """Play frames and call every operator of a face whose poll succeeds."""
+    """Play frames, and call every operator that can be used on a face."""
     bpy.context.view_layer.update()
     for frame in (2, 3):
         bpy.context.scene.frame_set(frame)
@@ -115,7 +115,7 @@ def _delete(objects):
 
 
 def test_deleted_parts_are_brought_back(rig, dna_file):
-    """Blender's Delete removes a part from the scene only; other parts still refer to it."""
+    """Blender's Delete removes a part only from the scene, while other parts still refer to it."""
     _delete([scene.controls(rig)])
     _use(rig)
     assert "still in the file" in _said(rig)
@@ -181,7 +181,7 @@ def _writer(rig):
 
 
 def test_a_step_of_a_slider_is_no_edit_of_the_bones(rig, dna_file):
-    """The sidebar tags the armature too, but the cached data of its bones stay valid."""
+    """The sidebar tags the armature for an update too, but cached data of bones remain valid."""
     controls = scene.controls(rig)
     bpy.context.view_layer.update()
     scene.set_controls(rig, jawOpen=0.1)

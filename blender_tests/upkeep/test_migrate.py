@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters of older files are updated to the current form; newer ones are not changed."""
+"""Tests that characters of older files are updated to the present form, newer ones not."""
 
 import bpy
 import numpy as np
@@ -114,7 +114,7 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
 
 
 def test_an_old_bake_whose_tracks_are_gone_is_brought_up(capsys):
-    """The animation data were deleted, but the stored tracks remained."""
+    """Animation data were deleted after an old version had stored the names of their tracks."""
     with bpy.data.libraries.load(str(FOLDER / "baked_controls.blend")) as (there, into):
         into.objects = [name for name in there.objects if name.endswith("_controls")]
     controls = into.objects[0]

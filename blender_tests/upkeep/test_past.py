@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of older versions play the same values bit for bit.
+"""Tests that files of older versions play the same values bit for bit.
 
-Bones and keys are compared in Live mode, whose form these files have; Direct mode shows the same.
+Bones and keys are compared in Live mode, in which these files were saved; Direct mode must show
+the same vertices.
 """
 
 import shutil
@@ -12,7 +13,8 @@ import pytest
 from support import past
 
 NEAR = 1e-5  # tolerance as a share of a mesh's size
-# Files whose first face is never in Direct mode: keyed joints, real shape keys, or an override.
+# Files whose first face is never in Direct mode, because of keyed joints, real shape keys, or an
+# override.
 ORDINARY = ("baked_result", "baked_controls", "overridden_live", "overridden_keys")
 
 MAKERS = sorted(p.name for p in past.DATA.iterdir() if p.is_dir())
@@ -25,7 +27,7 @@ def _same_on_every_processor():
 
 
 def folder_of(maker, tmp_path):
-    """A copy of the files that a version of Blender saved; skipped if this Blender is older."""
+    """A copy of the files of a Blender version; the test is skipped if this Blender is older."""
     made_by = tuple(int(n) for n in maker.split("."))
     if made_by[0] > bpy.app.version[0]:
         pytest.skip(
@@ -35,7 +37,7 @@ def folder_of(maker, tmp_path):
 
 
 def assert_same(found, wanted, where):
-    """Compare two films bit for bit."""
+    """Check that two films are equal bit for bit."""
     assert found.keys() == wanted.keys(), where
     for name, values in wanted.items():
         flat = np.ascontiguousarray(found[name]).ravel()
@@ -44,7 +46,7 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Play a film in both modes and compare the vertices; afterwards the mode is Live."""
+    """Compare the vertices of films in Direct and in Live mode; Live mode remains set."""
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")
     films = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names are labels only: after any renaming, the face finds its parts."""
+"""Tests that names are only labels: after any renaming, the face finds its parts."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters in several scenes, in hidden and excluded collections, in instances and renders."""
+"""Tests characters in several scenes, hidden or excluded collections, instances, renders."""
 
 import bpy
 import numpy as np
@@ -65,7 +65,7 @@ def _small_render(setup):
 
 
 def _rendered(rig, folder, setup):
-    """Frame -> rendered vertices, read when each frame is written."""
+    """Frame -> values of the shape channels, read while the frames are rendered."""
     found = {}
     meshes = [m for _, m in sorted(scene.meshes(rig).items())]
 
@@ -112,7 +112,7 @@ def test_render_of_a_scene_that_is_not_open(rig, tmp_path):
 
 
 def test_saved_with_another_scene_open(rig, dna_file, tmp_path):
-    """A character of a closed scene is not updated; it is right when its scene is opened."""
+    """A character in a scene that is not open is not updated, but is right once it is opened."""
     wanted = _play(rig, 1, 10)
     bpy.context.window.scene = bpy.data.scenes.new("A other")
     bpy.context.view_layer.update()

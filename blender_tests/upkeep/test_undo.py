@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hundred mixed steps are undone and redone one by one; every state is restored."""
+"""Tests undo and redo of a hundred mixed steps, one by one; every state is restored."""
 
 import random
 
@@ -17,7 +17,7 @@ def _rigs():
 
 
 def _state():
-    """Character -> evaluated vertices at the current frame."""
+    """Character -> its evaluated vertices at the current frame."""
     bpy.context.view_layer.update()
     found = {}
     for rig in _rigs():
@@ -31,7 +31,7 @@ def _activate(rig):
 
 
 def _slide(chance, rig):
-    """Move a slider other than the jaw, because Blender resets unkeyed changes of keyed values."""
+    """Move a slider other than jawOpen, which has keys: Blender would reset such a change."""
     name = chance.choice(("mouthCornerPullL", "mouthCornerPullR", "browDownL", "eyeLookUpL"))
     scene.set_controls(rig, **{name: chance.random()})
 

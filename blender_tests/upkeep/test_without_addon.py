@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender without the add-on shows the last pose and loses nothing.
+"""Tests that a Blender without the add-on shows the last pose and loses nothing.
 
-Edits made there take effect when the add-on is back.
+Changes that are made there take effect when the add-on is enabled again.
 """
 
 import os
@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from support import scene
 
-# Runs in a Blender with factory settings: records the vertices, changes a slider, saves the file.
+# Code that runs in a Blender with factory settings: it stores the vertices, changes a slider, and
+# saves the file.
 _OTHER = """
 import sys, os
 import bpy, numpy as np
@@ -40,7 +41,7 @@ os._exit(0)
 
 
 def _in_another_blender(blend, folder):
-    """Open and save a file in a Blender without the add-on. Returns the shown vertices."""
+    """Open, change and save a file in a Blender without the add-on. Returns its vertices."""
     script, out = folder / "other.py", folder / "shown.npy"
     script.write_text(_OTHER, encoding="utf-8")
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "nobody"))

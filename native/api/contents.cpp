@@ -105,7 +105,7 @@ risorius_status risorius_lod_items(const risorius_face* face, risorius_list list
   if (mapping == nullptr) return api::refuse("list", "a list that LODs differ in was expected");
   const std::uint32_t lods = face->face->rig.lod_count;
   if (lod >= lods) return api::refuse_index("lod", lod, lods);
-  // A list without an entry for the LOD is empty.
+  // A LOD without a row in the mapping has no items of this list.
   const bool is_listed = lod < mapping->lods.size() && mapping->lods[lod] < mapping->rows.size();
   const core::Array<std::uint16_t> none;
   const auto& row = is_listed ? mapping->rows[mapping->lods[lod]] : none;

@@ -21,7 +21,8 @@ risorius_status remember(const core::Error& error, std::string_view file = {}) n
 ///     message   the expected and the found value
 risorius_status refuse(std::string_view argument, std::string_view message) noexcept;
 
-/// Remembers an unexpected exception, with constant texts.
+/// Remember a lack of memory and an unexpected exception. Their texts are constants, because
+/// allocating memory could fail again.
 risorius_status out_of_memory() noexcept;
 risorius_status internal() noexcept;
 

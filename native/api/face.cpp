@@ -79,7 +79,8 @@ compile::CompileOptions compile_options(const risorius_options& options) {
   return out;
 }
 
-// The parser skips LODs that do not exist, as the format's own filter does; here it is an error.
+// Fails if the caller asks for a LOD that the file does not have. The parser only skips such LODs,
+// as the DNA format's own filter does.
 Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
   std::vector<std::uint16_t> asked(options.lods, options.lods + options.lod_count);
   const std::size_t found = dna.descriptor.lod_count;
@@ -89,7 +90,7 @@ Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
               "LODs of the file were expected, found " + std::to_string(asked[found]));
 }
 
-// Drops the geometry of meshes that are not named.
+// Drops the geometry of meshes that the options do not name. If they name no mesh, keeps all.
 Status keep_meshes(const risorius_options& options, dna::Dna& dna) {
   if (options.mesh_count == 0) return ok();
   const std::vector<std::string>& names = dna.definition.mesh_names;
@@ -109,7 +110,7 @@ Status keep_meshes(const risorius_options& options, dna::Dna& dna) {
   return ok();
 }
 
-// Drops the layers that only compile needs.
+// Drops the layers of the DNA file that are needed only to compile the rig.
 void drop_behavior(dna::Dna& dna) {
   dna.behavior = {};
   dna.machine_learned_behavior = {};

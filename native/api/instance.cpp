@@ -34,7 +34,8 @@ struct risorius_instance {
   rig::Workspace work;
   rig::Pose pose;                       // settled
   std::optional<rig::Instance> latent;  // with a pose of its own
-  // One of the two poses; before the first evaluation the settled one.
+  // Points to the pose of the most recent evaluation: `pose` (settled) or the pose inside `latent`.
+  // Null before the first evaluation: the values are then read from `pose`.
   const rig::Pose* evaluated = nullptr;
 };
 
@@ -59,7 +60,7 @@ const std::vector<float>* values_of(const risorius_instance& instance, risorius_
   }
 }
 
-// Sets the raw controls that the table of GUI controls writes, and keeps the others.
+// Sets the raw controls that the table of GUI controls writes. Other raw controls do not change.
 void apply_table(risorius_instance& instance) {
   rig::gui_to_raw(instance.face->rig, instance.gui.data(), instance.from_gui.data());
   for (std::size_t i = 0; i < instance.raw.size(); ++i) {

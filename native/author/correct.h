@@ -36,7 +36,7 @@ struct SkinPose {
   std::vector<std::vector<Vector3>> solids;  // [solids][vertices]
 };
 
-/// Faults of a pose. Faults that two poses have in common are the worse of each entry.
+/// The faults of a pose. To merge the faults of two poses, take the worse value of each entry.
 struct SkinFaults {
   std::vector<float> depth;    // [V] mm inside a solid or the skin itself; 0: outside
   std::vector<float> stretch;  // [F] area divided by the neutral area
@@ -64,6 +64,7 @@ class SkinChecker {
   static constexpr float kFold = -0.2f;    // cosine below which two faces lie on each other
   static constexpr double kAround = 10.0;  // mm around a fault in which vertices may move
 
+  /// Checks a skin and prepares it for the search for faults.
   /// Fails: kInvalidIndex (a corner), kInvalidLength (offsets), kInvalidValue (not finite)
   static core::Result<SkinChecker> make(Skin skin);
   ~SkinChecker();
@@ -78,8 +79,8 @@ class SkinChecker {
   };
   /// The nearest points of the neutral skin.
   /// In: points   in the skin's unit
-  ///     normals  of the points: only triangles that face the same way are taken, so that the upper
-  ///              lip is not mistaken for the lower one; empty: any triangle
+  ///     normals  of the points: only triangles with a similar normal are searched, so that the
+  ///              upper lip is not mistaken for the lower one; empty: all triangles are searched
   /// Fails: kInvalidValue (not finite), kInvalidLength (normals)
   core::Result<std::vector<Place>> nearest(const std::vector<Vector3>& points,
                                            const std::vector<Vector3>& normals = {}) const;
@@ -89,17 +90,20 @@ class SkinChecker {
   /// Fails: kInvalidLength, kInvalidValue (a pose that does not fit, or is not finite)
   core::Result<SkinFaults> look(const SkinPose& pose) const;
   /// Sums the faults beyond the allowed ones.
-  /// In: allowed  of the same skin; an entry that is no worse is not a fault
-  /// Fails: kInvalidLength (of another skin)
+  /// In: allowed  faults of the same skin; an entry of `faults` that is no worse than the allowed
+  ///              entry does not count
+  /// Fails: kInvalidLength (faults of another skin)
   core::Result<FaultSums> sum(const SkinFaults& faults, const SkinFaults& allowed) const;
-  /// A displacement after which the pose has no faults beyond `allowed`, or fewer. No sum becomes
-  /// worse. The deepest vertex becomes at most 0.1 mm deeper and the widest face at most 1 % wider,
-  /// allowed faults included.
+  /// A displacement of the vertices that removes all faults beyond `allowed`, or as many as
+  /// possible. No sum of faults becomes worse. The deepest vertex becomes at most 0.1 mm deeper and
+  /// the most stretched face at most 1 % wider, allowed faults included.
   ///
-  /// Only vertices within kAround of a fault move. There parts of the pose are undone, beginning
-  /// with the parts that do least; the remaining faults are pushed out softly. Vertices without a
-  /// fault keep nine tenths of their motion, unless that would cause a fault.
-  /// In: without  [parts][V] the positions of the skin without each part of the pose
+  /// Only vertices within kAround of a fault move. There the motion of single parts of the pose is
+  /// taken back, beginning with the parts that move the vertices least. A least squares solve
+  /// removes the remaining faults. Vertices without a fault keep nine tenths of their motion,
+  /// unless that would cause a fault.
+  /// In: without  [parts][V] the positions of the skin without each part of the pose, such as one
+  ///              of its expressions
   /// Fails: as look
   core::Result<Repair> repair(const SkinPose& pose, const SkinFaults& allowed,
                               const std::vector<std::vector<Vector3>>& without) const;

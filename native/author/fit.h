@@ -24,8 +24,8 @@ struct JointMotion {
   Vector3 translation{};
 };
 
-/// A joint that the rig has already, such as a jaw, an eye or the head. It may get weights; its
-/// motions stay.
+/// A joint that the rig has already, such as a jaw, an eye or the head. The fit may give it
+/// weights, but does not change its motions.
 struct GivenJoint {
   Vector3 position{};
   std::vector<JointMotion> motions;  // [expressions]; empty: no expression moves it
@@ -37,7 +37,7 @@ struct GivenJoint {
 
 /// A point about which the vertices of some expressions turn, such as the centre of an eye for its
 /// lids or the hinge of a jaw. A joint that moves mostly in these expressions is placed there,
-/// because its vertices then follow an arc between 0 and 1.
+/// because its vertices then follow an arc while the expression goes from 0 to 1.
 struct Pivot {
   Vector3 position{};
   std::vector<std::uint32_t> expressions;
@@ -50,11 +50,11 @@ struct FitOptions {
   bool symmetric = true;       // mirrored joints and weights, if the mesh is symmetric
   /// How much the largest error counts at the cost of the mean error; 0: least squares.
   double emphasis = 3.0;
-  /// A joint takes no part in an expression in which it moves every vertex by less, in the shapes'
-  /// unit; the other joints take over. 0: all joints take part in all expressions.
+  /// A joint takes no part in an expression in which it moves every vertex by less than this, in
+  /// the shapes' unit; the other joints take over. 0: all joints take part in all expressions.
   double least_effect = 0.0;
-  /// The result is the round with the smallest largest error: of the last four rounds, or with
-  /// bound of the second half of the rounds.
+  /// The result is the round whose largest error is the smallest. false: only the last four rounds
+  /// are compared; true: the whole second half of the rounds is compared.
   bool bound = false;
   std::size_t rounds = 40;  // of weights and motions, after all joints are placed
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
@@ -81,7 +81,7 @@ using Progress = std::function<bool(double)>;
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
-/// Initial weights: rows as in Fit, with any sum above 0.
+/// Initial weights: rows as in Fit. The weights of a vertex may have any sum above 0.
 struct StartWeights {
   std::size_t influences = 0;
   std::vector<std::uint16_t> joints;  // [V][influences]
@@ -104,7 +104,8 @@ inline constexpr std::uint32_t kInTheMiddle = 0xffffffffu;
 /// Weights of another mesh, such as a coarser level of detail, on joints with given motions.
 /// In: joints   with their motions in each expression of the shapes
 ///     options  influences, smoothness, threads
-///     start    such as the weights of the finer mesh; empty: all on a joint that rests
+///     start    initial weights, such as the finer mesh's; empty: all weight is on a joint that
+///              does not move
 /// Out: a Fit with the given joints alone
 /// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (start)
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,

@@ -17,8 +17,8 @@ using core::ErrorCode;
 constexpr std::size_t kLargestStride = 256;
 constexpr std::uint32_t kMostVertices = 1u << 30;  // differences between two corners have 30 bits
 constexpr std::size_t kMostCount = std::size_t{1} << 31;
-// The smallest packed sizes: a byte for 4 bytes of a row in a block of 256 rows; a byte for a
-// triangle.
+// Bytes that one packed byte may stand for at most. Rows: a byte for 4 bytes of each row in a block
+// of 256 rows. Triangles: a byte for a triangle.
 constexpr std::size_t kMostRowBytesPerByte = 1024;
 constexpr std::size_t kMostTriangleBytesPerByte = 12;
 
@@ -92,7 +92,8 @@ void take_filter_off(std::uint8_t* rows, const Packing& packing) {
   }
 }
 
-/// The corners as uint32, the input type of the library. In: rows  of 2 or 4 bytes
+/// The corners as uint32, the input type of meshoptimizer. In: rows  little-endian corners of
+/// `stride` bytes, 2 or 4
 std::vector<std::uint32_t> corners_of(std::span<const std::uint8_t> rows, std::size_t stride) {
   std::vector<std::uint32_t> out(rows.size() / stride);
   for (std::size_t i = 0; i < out.size(); ++i) {

@@ -11,14 +11,14 @@
 
 namespace risorius::author {
 
-/// Attributes of vertices, corners of triangles, or single corners.
+/// The content of a buffer: attributes of vertices, corners of triangles, or single corners.
 enum class PackedMode { kAttributes, kTriangles, kIndices };
 
 /// How attributes were changed before packing: not at all, unit vectors (rows of 4 int8 or int16),
 /// unit quaternions (rows of 4 int16), or floats as 2^E * M.
 enum class PackedFilter { kNone, kOctahedral, kQuaternion, kExponential };
 
-/// The fields of a buffer view in the extension.
+/// The fields that EXT_meshopt_compression adds to a buffer view.
 struct Packing {
   std::size_t count = 0;
   std::size_t stride = 0;  // bytes of a row: 4, 8 .. 256 for attributes, 2 or 4 for corners
@@ -26,18 +26,20 @@ struct Packing {
   PackedFilter filter = PackedFilter::kNone;
 };
 
-/// Unpacks count * stride bytes. Corners may be any number; check them against the vertices.
+/// Unpacks count * stride bytes. An unpacked corner may be any number: the caller must check that
+/// its vertex exists.
 /// Fails: kInvalidArgument (a stride, count or filter that the mode does not have),
 ///        kLimitExceeded (a count that the packed bytes cannot hold; found before memory is taken),
-///        kInvalidValue (bytes of another kind, or damaged ones)
+///        kInvalidValue (bytes of another mode, or damaged bytes)
 core::Result<std::vector<std::uint8_t>> unpack(std::span<const std::uint8_t> packed,
                                                const Packing& packing);
 
-/// Packs rows so that `unpack` and every reader of the extension return them; the corners of a
-/// triangle may be rotated. With a filter the rows are the result of `filtered`.
+/// Packs rows so that `unpack` and every reader of the extension return them. Only the order of a
+/// triangle's corners may be rotated. If the packing has a filter, the rows must come from
+/// `filtered`.
 /// In: rows  count * stride bytes
 /// Fails: kInvalidArgument as unpack, kInvalidLength (rows), kInvalidValue (a corner of 2^30 or
-/// more)
+///        more)
 core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
                                              const Packing& packing);
 
@@ -46,7 +48,7 @@ core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
 ///             numbers for floats
 ///     bits    of a component: 1 to 16 for vectors (8 if the stride is 4), 4 to 16 for quaternions,
 ///             1 to 24 for floats
-/// Fails: kInvalidArgument (a packing without filter, a stride or bits it does not have),
+/// Fails: kInvalidArgument (a packing without filter; a stride or bits that the filter rejects),
 ///        kInvalidLength (values), kInvalidValue (a value that is not finite)
 core::Result<std::vector<std::uint8_t>> filtered(std::span<const float> values,
                                                  const Packing& packing, int bits);

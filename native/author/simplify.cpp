@@ -53,7 +53,8 @@ core::Status check(const Surface& surface) {
 using Point = std::array<double, 3>;
 
 constexpr int kPasses = 8;
-// Area divided by the squared longest edge; an equilateral triangle has 0.43.
+// A triangle is a sliver if its area divided by its squared longest edge is below this; an
+// equilateral triangle has 0.43.
 constexpr double kSliver = 0.06;
 constexpr double kBetter = 1.5;     // factor by which the worse of two triangles has to improve
 constexpr double kAsOneFace = 0.8;  // cosine between a triangle's normal and the common one
@@ -66,8 +67,8 @@ Point cross(const Point& a, const Point& b) {
 double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
-/// Turns the common edge of two triangles if one is a sliver and both lie flat. No corner moves,
-/// and the surface keeps its place.
+/// Flips the common edge of two triangles if one is a sliver and both lie in nearly one plane. No
+/// corner moves.
 class Slivers {
  public:
   Slivers(const Surface& surface, std::vector<Triangle>& triangles)
@@ -109,7 +110,8 @@ class Slivers {
   }
 
   bool turn_some() {
-    // By corners: the two sides of a seam do not share an edge.
+    // Edges by their corners, so that the triangles on the two sides of a seam do not share an
+    // edge.
     std::map<Edge, std::vector<Side>> sides;
     std::map<Edge, int> edges;
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {

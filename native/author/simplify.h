@@ -13,8 +13,8 @@ namespace risorius::author {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Triangles over corners. A vertex on a seam of the texture has one corner for each side, at equal
-/// positions.
+/// Triangles over corners. A vertex on a seam of the texture has two corners at the same position,
+/// one for each side.
 struct Surface {
   std::vector<std::array<float, 3>> positions;  // [corners], in any one unit
   /// [corners][attributes]: values to preserve like the positions (texture coordinates, motion). A
@@ -30,8 +30,8 @@ struct Simplified {
 };
 
 /// A surface with at most `triangles` triangles if possible. Edges are collapsed where that changes
-/// the surface least; corners are never moved. Seams and borders stay in place, so that the result
-/// may have more triangles. The common edge of two flat triangles is turned if one of them is a
+/// the surface least; corners are never moved. Seams and borders are preserved, so that the result
+/// may have more triangles. The common edge of two flat triangles is flipped if one of them is a
 /// sliver.
 /// Fails: kInvalidLength (attributes), kInvalidIndex (a triangle's corner),
 ///        kInvalidValue (a number that is not finite), kInvalidArgument (more than 32 attributes)

@@ -131,7 +131,7 @@ author::FitOptions with_given(author::FitOptions options, const author::Shapes& 
   return options;
 }
 
-/// Runs `work` without the GIL. Raises its error or returns its fit.
+/// Runs the fit `work` without the GIL. Returns its Fit, or raises its error.
 template <class Work>
 Fit fitted(const Work& work) {
   auto result = [&] {
@@ -166,7 +166,7 @@ Fit fit_motions(const author::Shapes& shapes, const GivenJoints& given,
   return fitted([&] { return author::fit_motions(shapes, all, weights, at); });
 }
 
-/// float64[expressions, joints, 3]: the rotations or the translations of the motions.
+/// float64[expressions, joints, 3]: the rotations or the translations of the fit's joint motions.
 Doubles motions(const Fit& fit, author::Vector3 author::JointMotion::* half) {
   const std::size_t joints = fit.joints.size(), count = fit.motions.size() / joints;
   Doubles out({static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(joints), py::ssize_t{3}});
@@ -286,7 +286,7 @@ void bind_fits(py::module_& m) {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The value with a name. Raises ValueError if the name is unknown.
+/// The value that belongs to a name. Raises ValueError if the name is unknown.
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {

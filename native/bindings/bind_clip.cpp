@@ -78,7 +78,8 @@ void write_clip(const std::filesystem::path& path, const py::bytes& bytes) {
   taken(std::move(written));
 }
 
-// A clip file for Python. A mutex lets one thread read at a time, because a Reader caches a block.
+// A clip file for Python. A mutex lets only one thread read at a time, because a Reader caches one
+// decoded block.
 class ClipFile {
  public:
   ClipFile(const py::object& source, bool recover) {

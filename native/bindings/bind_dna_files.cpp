@@ -128,7 +128,7 @@ void bind_writing(DnaClass& c) {
       py::arg("text"), py::arg("limits") = dna::Limits{}, "Reads the output of to_json.");
 }
 
-// "1.0" as two 16-bit halves.
+// Converts a text like "1.0" to a number: major version in the upper 16 bits, minor in the lower.
 std::uint32_t layer_version(const std::string& text) {
   std::uint16_t major = 0, minor = 0;
   const char *begin = text.data(), *end = begin + text.size();
@@ -190,7 +190,8 @@ void bind_layers(DnaClass& c) {
       "Ids of the file's layers in its order.");
 }
 
-// A word of the format. "#17", which a property may show for an unknown number, is not accepted.
+// The number of a word of the DNA format. A word like "#17", by which properties show a number that
+// the format does not define, is rejected.
 template <class Number, std::size_t kCount>
 std::optional<Number> choice_argument(const std::array<const char*, kCount>& words,
                                       const std::optional<std::string>& text, const char* name) {
@@ -282,7 +283,7 @@ std::shared_ptr<Dna> parse(bytes::Source& source, const dna::ParseOptions& optio
   return std::make_shared<Dna>(unwrap(unlocked([&] { return dna::parse(source, options); }), file));
 }
 
-// (is_error, code, where, offset or None, message)
+// The findings of a check, as tuples (is_error, code, where, offset or None, message).
 py::list findings(bytes::Source& source, const dna::Limits& limits) {
   py::list out;
   for (const dna::Finding& f : unlocked([&] { return dna::check(source, limits); })) {

@@ -9,7 +9,7 @@ namespace risorius::bindings {
 namespace {
 
 [[noreturn]] void throw_os_error(const std::filesystem::path& path, const std::error_code& reason) {
-  // OSError chooses its subclass by the number, e.g. PermissionError.
+  // Python's OSError chooses a subclass such as PermissionError by the error number.
   const py::tuple about =
       py::make_tuple(reason.default_error_condition().value(),
                      to_python(bytes::write_trouble(reason)), py::str(py::cast(path)));
@@ -17,7 +17,7 @@ namespace {
   throw py::error_already_set();
 }
 
-// Replaces a file atomically as write_file_atomically does, but Python writes the content.
+// Replaces a file atomically as write_file_atomically does, except that Python writes the content.
 class FileReplacement {
  public:
   FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {

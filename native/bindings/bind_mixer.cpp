@@ -9,16 +9,17 @@ namespace {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 using CurvesPtr = std::shared_ptr<const clip::LayerCurves>;
-// Holds an object that pybind11 cannot keep as const.
+// Wraps the curves, because pybind11 cannot hold a pointer to a const object.
 struct PyLayerCurves {
   CurvesPtr curves;
 };
-// Arguments of a part: controls, weights, delay, attack, hold, release.
+// Arguments of a part of a reaction: controls, weights, delay, attack, hold, release.
 using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, double>;
-// Arguments of a yield: by, of, measure, amount.
+// Arguments of the mixer's rule Yield: by, of, measure, amount.
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
-// Errors of a mixer are plain ValueErrors, because no file is involved.
+// Returns the value, or raises the error as a ValueError: no file is involved that a more specific
+// error could name.
 template <class T>
 T value_or_throw(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());
@@ -165,7 +166,8 @@ FloatArray mix(clip::Mixer& mixer, double time, const py::object& base, const py
   return result;
 }
 
-// In: base  [controls] a frame for all times, or [times, controls]
+// Mixes the layers at several times.
+// In: base  [controls] one base frame for all times, or [times, controls]
 FloatArray mix_batch(clip::Mixer& mixer, const DoubleArray& times, const py::object& base) {
   if (times.ndim() != 1) shape_error("times", "(n,)", times);
   const auto count = static_cast<py::ssize_t>(mixer.control_count());

@@ -30,7 +30,7 @@ FloatArray matrix_argument(const py::object& object, const char* name, py::ssize
   return array;
 }
 
-// The caller's array, checked, or a new one. Raises ValueError if the array overlaps `base`.
+// Checks the caller's array, or makes a new one. Raises ValueError if the array overlaps `base`.
 py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
   if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
   const py::array_t<float> out = written_argument(object, "out", rows);

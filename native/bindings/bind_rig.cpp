@@ -85,8 +85,7 @@ std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& preci
   return std::make_shared<rig::Rig>(unwrap(compile::compile(dna, options)));
 }
 
-// Keeps a Python buffer alive. The last owner may release it only without holding the interpreter
-// lock.
+// Keeps a Python buffer alive. Its last owner may release it without the interpreter lock.
 std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) {
   auto* held = new py::buffer_info(buffer.request());
   return {address, [held](const void*) {
@@ -120,7 +119,7 @@ std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
       unwrap(rig::open_rig({data, size}, std::move(owner), check, kernels_argument(simd))));
 }
 
-// A buffer that keeps its Rig alive.
+// The bytes of a rig. The memoryview keeps its Rig alive.
 py::memoryview block_of(const py::object& self) {
   const auto& block = self.cast<const rig::Rig&>().block();
   py::array_t<std::uint8_t> view({static_cast<py::ssize_t>(block.size())}, {py::ssize_t{1}},
@@ -150,7 +149,8 @@ std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optio
   return std::make_shared<rig::Rig>(unwrap(open()));
 }
 
-// Converts frames of raw controls: float32[R] or float32[N, R]. Raises ValueError for others.
+// Converts raw controls of one or several frames: float32[R] or float32[N, R]. Raises ValueError
+// for another shape.
 FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
   FloatArray in = FloatArray::ensure(raw);
   if (!in) throw py::value_error("raw: an array of numbers was expected");
@@ -174,7 +174,8 @@ py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
   return out;
 }
 
-// Returns (float64[poses], float32[poses]): distances and weights of a solver's poses.
+// Returns (float64[poses], float32[poses]): the distances of the controls from a solver's poses,
+// and the poses' weights.
 py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::object& controls) {
   if (index >= rig.rbf_solvers.size()) {
     throw py::index_error("index: a solver below " + std::to_string(rig.rbf_solvers.size()) +

@@ -34,7 +34,7 @@ py::array_t<double> made(std::size_t rows, std::size_t columns) {
   return py::array_t<double>({static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(columns)});
 }
 
-/// Points of a surface with the most recent Jacobian.
+/// Some points of a surface, and the Jacobian of the most recent linearise().
 class PyProbe {
  public:
   PyProbe(SurfacePtr surface, const Indices& points)

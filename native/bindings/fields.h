@@ -38,7 +38,7 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, 
 // In: name  of the property
 //     get   function from an object to a reference to its field
 
-/// Numbers: a NumPy array, float32[n, 3] or [n, 2] for planes of coordinates.
+/// A property of numbers: a NumPy array; float32[n, 3] or [n, 2] for coordinates.
 template <class Class, class Get>
 void numbers(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -65,7 +65,7 @@ void text(Class& c, const char* name, Get get) {
       [get, name](Owner& self, const py::object& v) { get(self) = text_from_python(v, name); });
 }
 
-/// A list of texts.
+/// A property that is a list of texts.
 template <class Class, class Get>
 void texts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -93,7 +93,7 @@ void number(Class& c, const char* name, Get get) {
       [get](Owner& self, Number value) { get(self) = value; });
 }
 
-/// A nested struct; the Python object of the inner one keeps the outer one alive.
+/// A property that is a struct; its Python object keeps the outer object alive.
 template <class Class, class Get>
 void part(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -106,7 +106,7 @@ void part(Class& c, const char* name, Get get) {
       [get](Owner& self, const Field& value) { get(self) = value; });
 }
 
-/// A list of structs, as a tuple whose elements are mutable.
+/// A property that is a list of structs, shown as a tuple. Its elements can be changed.
 template <class Class, class Get>
 void parts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -126,7 +126,8 @@ void parts(Class& c, const char* name, Get get) {
       });
 }
 
-// The words for units, axes and orders of a file.
+// The words that Python uses for units, axis directions, rotation sequences and winding orders of a
+// DNA file.
 inline constexpr std::array<const char*, 2> kTranslationUnits{"cm", "m"};
 inline constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
 inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
@@ -153,7 +154,7 @@ Number value_of_word(const std::array<const char*, kCount>& words, const std::st
   throw py::value_error(std::string(name) + ": one of " + known + " was expected, found " + text);
 }
 
-/// An enumeration, as a word.
+/// A property that is an enumeration, shown as a word.
 template <class Class, std::size_t kCount, class Get>
 void choice(Class& c, const char* name, const std::array<const char*, kCount>& words, Get get) {
   using Owner = typename Class::type;
@@ -165,7 +166,7 @@ void choice(Class& c, const char* name, const std::array<const char*, kCount>& w
       });
 }
 
-/// A LodMapping, or a list with a list of indices for each LOD.
+/// Converts a LodMapping, or a list that has a list of indices for each LOD.
 inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   if (py::isinstance<dna::LodMapping>(value)) return value.cast<dna::LodMapping>();
   dna::LodMapping mapping;
@@ -179,7 +180,7 @@ inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   return mapping;
 }
 
-/// A LodMapping; may be set to a list with a list of indices for each LOD.
+/// A property that is a LodMapping. It also accepts a list that has a list of indices for each LOD.
 template <class Class, class Get>
 void lod_mapping(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;

@@ -18,22 +18,22 @@ namespace risorius::bindings {
 
 namespace py = pybind11;
 
-/// Raises an error as its Python class.
+/// Raises an error as a Python exception.
 /// In: file  the file that the error is about, or ""
-///     type  the class; nullptr: the class of the error's code
+///     type  the exception class; nullptr: the class that belongs to the error's code
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
-/// Makes an error class derived from risorius.base.errors.RisoriusError; the caller keeps it for
-/// ever.
+/// Makes an error class derived from risorius.base.errors.RisoriusError. The caller must never
+/// release it.
 PyObject* new_error_type(const char* name, const char* doc);
 
-/// The value of a result; raises its error. In: file  as in throw_error
+/// Returns the value of a result, or raises its error. In: file  as in throw_error
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);
   return std::move(result).value();
 }
 
-/// The same for an invalid argument: raises ValueError.
+/// Returns the value of a result, or raises its error as a ValueError, for invalid arguments.
 template <class T>
 T unwrap_argument(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());
@@ -57,7 +57,7 @@ py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> 
   return view;
 }
 
-/// Views without a copy: T[n], and float32[n, planes].
+/// Read-only views without a copy: T[n] of an array, and float32[n, planes] of planes.
 template <class T>
 py::array to_numpy(const core::Array<T>& values) {
   return read_only_view(values, {static_cast<py::ssize_t>(values.size())},
@@ -72,7 +72,8 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
       {static_cast<py::ssize_t>(sizeof(float)), n * static_cast<py::ssize_t>(sizeof(float))});
 }
 
-/// Raises ValueError. In: wanted  the shape in words, e.g. "(n, 3)"
+/// Raises ValueError for an array of another shape. In: wanted  the expected shape in words, e.g.
+/// "(n, 3)"
 [[noreturn]] inline void shape_error(const std::string& name, const std::string& wanted,
                                      const py::array& given) {
   throw py::value_error(name + ": an array of shape " + wanted + " was expected, the shape is " +
@@ -91,8 +92,8 @@ inline FloatArray vector_argument(const py::object& object, const char* name, st
   return array;
 }
 
-/// Converts numbers to a float32 array of that shape; NaN and infinity are accepted. Raises
-/// ValueError for other objects or another shape.
+/// Converts numbers to a float32 array; NaN and infinity are accepted. Raises ValueError for other
+/// objects, or if they do not have the shape `shape`.
 inline FloatArray shaped_argument(const py::object& object, const char* name,
                                   const std::vector<py::ssize_t>& shape) {
   FloatArray array = FloatArray::ensure(object);
@@ -146,7 +147,7 @@ core::Array<T> from_python(const py::object& object, const char* name) {
   return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
 }
 
-/// Copies float[n, planes] to planes. Raises ValueError as from_python.
+/// Copies float[n, planes] to planes. Raises ValueError for other objects or shapes.
 template <std::size_t kPlanes>
 core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
   auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);

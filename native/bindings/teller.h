@@ -8,8 +8,9 @@
 
 namespace risorius::bindings {
 
-/// Calls the Python function `told` with the progress, under the GIL. An exception of the function
-/// stops the work and is kept in `raised`, to be thrown again by the caller.
+/// Calls the Python function `told` with the share of the work that is done, under the GIL. The
+/// work stops if it returns False. An exception also stops the work and is kept in `raised`, so
+/// that the caller can throw it again.
 struct Teller {
   pybind11::object told;
   std::exception_ptr raised;

@@ -45,7 +45,8 @@ void ByteReader::clear_error() {
   bound();
 }
 
-// After a failure no byte is ready, so that the fast paths need no check for it.
+// Finds the end of the bytes that may be read at once. After a failure there are none, so that fast
+// paths need no check for it.
 void ByteReader::bound() {
   const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
   ready_ = failed() ? at_ : at_ + std::min(loaded, left());
@@ -87,7 +88,8 @@ bool ByteReader::check_left(std::uint64_t bytes) {
 
 bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
 
-// Makes n bytes ready, and of the `wanted` ones as many as the window holds. In: wanted <= left()
+// Reads more of the file into the window: at least n bytes, and more of the `wanted` bytes that
+// will be read soon, if the window has room. In: wanted <= left()
 bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   if (window_.size() == 0) window_.resize(kWindowBytes);
   const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of an incomplete number

@@ -25,7 +25,7 @@ namespace risorius::bytes {
 class ByteReader {
  public:
   /// In: source   must outlive the reader
-  ///     kernels  its byte swaps are used; by default RISORIUS_SIMD or the CPU decides
+  ///     kernels  swap the bytes of lists; by default RISORIUS_SIMD or the CPU decides
   explicit ByteReader(Source& source, const simd::Kernels& kernels = simd::usual_kernels());
 
   /// The name of the kernels, as in Rig.simd.
@@ -44,9 +44,9 @@ class ByteReader {
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
   /// Clears the error, so that enter() can continue elsewhere.
   void clear_error();
-  /// The largest number of elements of a list, even if more bytes are left.
+  /// Sets the largest accepted number of elements of a list, even if more bytes are left.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
-  /// Remembers an error, unless there is one already. The field is the present where().
+  /// Remembers an error, unless there is one already. The error's field is where().
   /// In: offset  the wrong byte in the file
   void fail_at(std::uint64_t offset, core::ErrorCode code, std::string message);
 
@@ -61,7 +61,7 @@ class ByteReader {
   std::uint16_t u16() { return number<std::uint16_t>(); }
   std::uint32_t u32() { return number<std::uint32_t>(); }
   float f32() { return std::bit_cast<float>(u32()); }
-  /// A count is accepted only if count * element_size bytes are left.
+  /// Reads the count of a list. It fails unless count * element_size bytes are left.
   std::uint32_t count(std::uint32_t element_size) {
     if (ready_ - at_ >= 4) {
       const std::uint32_t n = load<std::uint32_t>(at_);
@@ -75,21 +75,21 @@ class ByteReader {
   /// The number at offset, if it lies between the present position and end(). Does not move the
   /// position.
   std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
-  /// A count, then that number of bytes of text.
+  /// Reads a count, then that number of bytes of text.
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
-  /// A count, then that number of values.
+  /// Reads a count, then that number of values.
   /// Out: all_finite   set to false if a value is infinite or NaN; never set to true
   core::Array<float> f32_list(bool* all_finite = nullptr);
   core::Array<std::uint16_t> u16_list();
-  /// A count, then that number of values.
+  /// Reads a count, then that number of values.
   /// Out: largest      raised to the largest value
   core::Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
   /// Reads n values without a count, straight into out. In: n already checked by count(). After a
   /// failure the content of out is undefined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
-  /// The same; largest as in u32_list.
+  /// Reads n integers without a count, as read_f32 does. `largest` is raised as in u32_list.
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 
@@ -118,7 +118,8 @@ class ByteReader {
     return v;
   }
   std::uint32_t count_slowly(std::uint32_t element_size);
-  /// Calls take(at, n) for all values, in runs as long as the window allows.
+  /// Calls take(at, n) for runs of n values at address `at` until all values are taken. A run ends
+  /// with the loaded bytes.
   template <std::size_t kSize, class Take>
   bool for_runs(std::size_t n, const Take& take);
   bool check_left(std::uint64_t bytes);
@@ -131,8 +132,9 @@ class ByteReader {
   Source* source_;
   std::uint64_t end_ = 0;
   std::uint32_t max_count_ = 0xFFFFFFFF;
-  // [first_, loaded_) are the bytes from window_begin_ on: the window's, or all bytes of a source
-  // in memory. [at_, ready_) may be read: it lies inside the region, and nothing has failed.
+  // [first_, loaded_) are the loaded bytes, from offset window_begin_ of the source on: the
+  // window's, or all bytes of a source in memory. [at_, ready_) are the bytes that may be read at
+  // once: they lie inside the region of enter(), and there are none after a failure.
   std::uint64_t window_begin_ = 0;
   const std::uint8_t* first_ = nullptr;
   const std::uint8_t* at_ = nullptr;
@@ -144,7 +146,8 @@ class ByteReader {
   std::optional<core::Error> error_;
 };
 
-/// Names the field while it is in scope: Field f(reader, "joint_groups", i);
+/// Names the field that is being read, while this object exists: Field f(reader, "joint_groups",
+/// i);
 class Field {
  public:
   Field(ByteReader& reader, const char* name, std::int64_t index = -1) : reader_(reader) {

@@ -29,18 +29,18 @@ class ByteWriter {
   void raw(std::span<const std::uint8_t> bytes) {
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
-  /// The length in bytes, then the bytes.
+  /// Writes the length in bytes, then the bytes.
   void str(std::string_view text) {
     u32(static_cast<std::uint32_t>(text.size()));
     bytes_.insert(bytes_.end(), text.begin(), text.end());
   }
-  /// The count, then the numbers, of 2 or 4 bytes each.
+  /// Writes the count, then the numbers, of 2 or 4 bytes each.
   template <class T>
   void list(std::span<const T> values) {
     u32(static_cast<std::uint32_t>(values.size()));
     items(values);
   }
-  /// The numbers without a count.
+  /// Writes the numbers without a count.
   template <class T>
   void items(std::span<const T> values) {
     for (const T v : values) {

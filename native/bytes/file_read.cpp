@@ -64,7 +64,7 @@ class Descriptor {
   int number_;
 };
 
-// Null if the system refuses.
+// Maps a file into memory. Null if the system refuses.
 std::shared_ptr<const void> mapped(int file, std::size_t size) {
   void* memory = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
   if (memory == MAP_FAILED) return nullptr;
@@ -74,7 +74,7 @@ std::shared_ptr<const void> mapped(int file, std::size_t size) {
 }  // namespace
 
 core::Result<FileBytes> read_file(const path& name, ReadBy by) {
-  // O_NONBLOCK: opening a pipe without a writer would wait for a writer.
+  // O_NONBLOCK, because opening a pipe without this flag would wait for a writer.
   const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (file.number() < 0) return failure(core::ErrorCode::kIoOpen, "open", name, errno);
   struct stat about = {};

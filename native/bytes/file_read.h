@@ -15,20 +15,21 @@ struct FileBytes {
   std::span<const std::uint8_t> bytes;  // aligned to 64
   std::shared_ptr<const void> owner;    // keeps the bytes alive
   /// The user of this process owns the file and nobody else may write to it. Checked on the open
-  /// file, not on its name. Always false on systems without such modes (Windows).
+  /// file, not on its name. Always false on systems without access modes (Windows).
   bool is_own = false;
 };
 
 enum class ReadBy {
   kCopy,
-  /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short
-  /// the process crashes, and if it is written to the bytes change: use it only for files that are
-  /// replaced as a whole (write_file_atomically). Systems without maps get a copy.
+  /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short,
+  /// the process crashes; if the file is written to, the bytes change. So use kMap only for files
+  /// that are replaced as a whole (write_file_atomically). Systems without maps make a copy.
   kMap,
 };
 
-/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that is cut while it is
-///        is read)
+/// Reads a whole file.
+/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that becomes shorter
+///        while it is read)
 core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
 }  // namespace risorius::bytes

@@ -11,7 +11,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// These follow windows.h.
+// Headers that must be included after windows.h.
 #include <fcntl.h>
 #include <io.h>
 #else
@@ -28,7 +28,7 @@ namespace {
 using Handle = std::FILE*;
 
 Handle open_for_reading(const std::filesystem::path& path) {
-  // As on POSIX: other programs may write into the file, rename it or replace it meanwhile.
+  // As on POSIX, other programs may write into the file, rename it or replace it while it is open.
   const HANDLE handle = CreateFileW(path.c_str(), GENERIC_READ,
                                     FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
                                     OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);

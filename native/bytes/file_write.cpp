@@ -17,7 +17,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// These follow windows.h.
+// Headers that must be included after windows.h.
 #include <fcntl.h>
 #include <io.h>
 #include <process.h>
@@ -86,8 +86,8 @@ std::string machine_name() {
   return GetComputerNameA(name, &length) ? std::string(name, length) : std::string();
 }
 
-// Windows only has a read-only flag: a read-only file is not replaced, and a read-only new file
-// could not be removed.
+// Does nothing on Windows, where a file only has a read-only flag. A read-only file cannot be
+// replaced, and a read-only new file could not be removed.
 void inherit_rights(const fs::path&, const fs::path&) {}
 
 #else
@@ -115,13 +115,13 @@ int sync_folder(const fs::path& folder) {
 
 long long process_number() { return ::getpid(); }
 
-// In some containers nobody collects orphaned processes that have ended: they keep their number as
-// zombies for as long as the container runs.
+// Whether a process has ended although its number is still in use. In some containers nobody
+// collects ended orphans: they keep their number as zombies as long as the container runs.
 bool has_ended(long long process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   std::string text;
   std::getline(stat, text, '\0');
-  // End of the program's name, which may contain any character.
+  // The state of the process follows the program's name, which may contain any character.
   const std::size_t end = text.rfind(") ");
   return end != std::string::npos && end + 2 < text.size() &&
          (text[end + 2] == 'Z' || text[end + 2] == 'X');
@@ -132,7 +132,8 @@ bool is_running(long long process) {
   return !has_ended(process);
 }
 
-// Containers of one machine number their processes independently.
+// The name of the machine and of its process namespace, because containers of one machine number
+// their processes independently.
 std::string machine_name() {
   char name[256] = {};
   if (::gethostname(name, sizeof(name) - 1) != 0) return {};
@@ -142,8 +143,8 @@ std::string machine_name() {
          (length > 0 ? std::string(space, static_cast<std::size_t>(length)) : "");
 }
 
-// Keeps the group of a file that a group shares. If that is not allowed, the new group gets only
-// the rights that everybody has.
+// Gives a new file the group of the old one. If that is not allowed, the new file stays in another
+// group, and this group gets only the rights that everybody has.
 void keep_group(const fs::path& old, const fs::path& made, fs::perms& rights) {
   struct stat before = {}, now = {};
   if (::stat(old.c_str(), &before) != 0 || ::stat(made.c_str(), &now) != 0) return;
@@ -176,7 +177,7 @@ std::error_code last_error() { return {errno == 0 ? EIO : errno, std::generic_ca
 
 // ---- names
 
-// ".risorius-MACHINE-" for the processes of this machine; PROCESS-TOKEN.part follows.
+// The beginning of a hidden name, ".risorius-MACHINE-"; PROCESS-TOKEN.part follows it.
 std::string name_begin() {
   std::string machine = machine_name().substr(0, kMachineLength);
   std::replace_if(
@@ -194,7 +195,7 @@ std::string hidden_name() {
   return name_begin() + std::to_string(process_number()) + "-" + token + std::string(kEnd);
 }
 
-// The number of the process that made a file of this name; empty for other names.
+// The number of the process that made a file with this hidden name; empty for other names.
 std::optional<long long> maker_of(std::string_view name, std::string_view begin) {
   constexpr std::size_t kTail = 1 + kTokenDigits + kEnd.size();
   if (!name.starts_with(begin) || !name.ends_with(kEnd)) return {};
@@ -231,7 +232,7 @@ fs::path linked_file(const fs::path& path) {
   fs::path file = path;
   std::error_code error;
   for (int i = 0; i < kMostLinks && fs::is_symlink(file, error); ++i) {
-    // The target of a link need not exist yet.
+    // The link is followed by hand, because its target need not exist.
     const fs::path next = fs::read_symlink(file, error);
     if (error) return path;
     file = file.parent_path() / next;
@@ -343,8 +344,8 @@ std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {
 std::error_code NewFile::close() {
   if (file_ < 0) return {};
   errno = 0;
-  // A network folder may report a full disk only on close. After an interruption the descriptor is
-  // closed as well.
+  // A network folder may report a full disk only on close. A close that a signal interrupts has
+  // closed the descriptor as well.
   const bool closed = calls_->close(std::exchange(file_, -1)) == 0 || errno == EINTR;
   return closed ? std::error_code() : last_error();
 }
@@ -359,7 +360,7 @@ std::error_code NewFile::take_place_of(const fs::path& target) {
   errno = 0;
   if (calls_->rename(path_, target) != 0) return last_error();
   leftover_ = Leftover::kKeep;
-  // Some network folders do not support it, and the file is already in place.
+  // A failure is ignored: some network folders cannot be flushed, and the file is already in place.
   static_cast<void>(calls_->sync_folder(target.parent_path()));
   return {};
 }

@@ -14,9 +14,9 @@
 
 namespace risorius::bytes {
 
-/// The system calls of a file writer. Tests replace them with failing ones, because a power cut and
-/// most kinds of full disks cannot be produced otherwise. All except create return 0 or more on
-/// success, and set errno.
+/// The system calls of a file writer. Tests replace them with failing calls, because a power cut
+/// and most kinds of full disks cannot be produced otherwise. A call that fails returns a negative
+/// number and sets errno.
 struct FileCalls {
   /// The descriptor of a new file. If `is_private`, only its owner may read it; otherwise the
   /// system's default for new files applies.
@@ -32,21 +32,22 @@ const FileCalls& system_file_calls();
 /// A new file that gets its final name when it is complete.
 class NewFile {
  public:
-  /// What happens to a file that never got its final name.
+  /// Whether a file that never got its final name is removed or kept.
   enum class Leftover { kRemove, kKeep };
 
+  /// Makes an empty file.
   /// Fails: the system's reason in `error`; std::errc::file_exists if the name is taken.
   static std::optional<NewFile> create(const std::filesystem::path& path, Leftover leftover,
                                        std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
-  /// A file in the folder of `target` under a hidden name, whose length does not depend on the name
-  /// of `target`. Others can read it only after it has the rights of an old `target`. Fails: as
-  /// create; is_a_directory if `target` is a folder.
+  /// Makes a file in the folder of `target` under a hidden name, whose length does not depend on
+  /// the name of `target`. If `target` exists, only the owner can read the new file until it has
+  /// the rights of `target`. Fails: as create; is_a_directory if `target` is a folder.
   static std::optional<NewFile> beside(const std::filesystem::path& target, std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
 
-  /// A file that another writer has made on the file system of its final place; it stays where it
-  /// is until take_place_of. Fails: the system's reason.
+  /// Opens a file that another writer has made on the file system of its final place. It keeps its
+  /// name until take_place_of. Fails: the system's reason.
   static std::optional<NewFile> adopt(const std::filesystem::path& path, std::error_code& error,
                                       const FileCalls& calls = system_file_calls());
 
@@ -55,7 +56,7 @@ class NewFile {
   ~NewFile();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Fails: the system's reason; some of the bytes may have been written.
+  /// Appends bytes. Fails: the system's reason; some of the bytes may have been written.
   std::error_code write(std::span<const std::uint8_t> bytes);
   /// Flushes the file to disk, closes it, gives it the rights of an old `target` and replaces
   /// `target` with it. Other descriptors of the file must be closed before. Call it only once.
@@ -76,7 +77,7 @@ class NewFile {
   int file_;  // -1: closed
 };
 
-/// The file that `path` refers to: itself, or the target of a link.
+/// The file that `path` refers to: `path` itself, or the target of a link, which need not exist.
 std::filesystem::path linked_file(const std::filesystem::path& path);
 
 /// Makes a hidden folder in the folder of `target`, named as in NewFile::beside, for several files
@@ -85,10 +86,10 @@ std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
                                          std::error_code& error);
 
 /// Removes files and folders, named as in NewFile::beside, that ended processes of this machine
-/// left in a folder. Skips without an error those that cannot be read or removed.
+/// left in a folder. Leftovers that cannot be read or removed are skipped without an error.
 void remove_leftovers(const std::filesystem::path& folder);
 
-/// The reason why a file could not be written, in the system's words or clearer ones.
+/// The reason why a file could not be written, in the system's words or in clearer ones.
 std::string write_trouble(const std::error_code& reason);
 
 /// Writes bytes to a new file beside path, flushes it to disk and replaces path with it; a link

@@ -10,7 +10,7 @@
 
 namespace risorius::bytes::detail {
 
-// pread needs no position to be set first. It may return less than requested.
+// Unlike a seek and a read, pread is one call. It may return fewer bytes than requested.
 std::size_t read_at(int file, std::uint64_t offset, std::span<std::uint8_t> out) {
   constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS refuses 2 GiB and more
   std::size_t done = 0;

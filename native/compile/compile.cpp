@@ -26,8 +26,9 @@ using detail::KeptMatrices;
 using detail::Used;
 using rig::RigData;
 
+// Runs the steps of compile().
 // In:  finite  all numbers of the file are known to be finite
-// Out: kept  the joint matrices; `out` holds them only as joint_halves
+// Out: kept  the joint matrices; with float16 they are also in `out`, as joint_halves
 Result<RigData> compile_parts(const dna::Dna& dna, bool finite, const CompileOptions& options,
                               core::Budget& budget, KeptMatrices& kept) {
   RigData out;

@@ -25,33 +25,33 @@ struct CompileOptions {
   core::Budget* budget = nullptr;             // nullptr: budget_for(dna)
 };
 
-/// The limits for compiling a face and evaluating it once at every LOD: 1 MiB plus 64 times the
-/// face's bytes for lists and matrices, without copies of lists in the file; and 2^28 plus 256
-/// times the face's bytes for steps.
+/// The limits for compiling a face and evaluating it once at every LOD. Memory for lists and
+/// matrices: 1 MiB plus 64 times the face's bytes; copies of the file's lists do not count. Steps:
+/// 2^28 plus 256 times the face's bytes.
 core::Budget budget_for(const dna::Dna& dna);
 
 /// Compiles the behavior of a face. The result does not refer to the Dna.
 /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field, because a Dna may have been
-///        edited; kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (the
-///        format's indices, the budget)
+///        edited; kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (more
+///        controls than 16-bit indices reach, the budget)
 /// From:  dna-format 12; joint matrices are stored by columns, so that inactive columns cost
 ///        nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
 
-/// The version of the results of compile. It is raised when the poses of an existing file change;
-/// rigs compiled by another version are compiled again.
+/// The version of compile's results. It is raised when the poses of an existing file change, and
+/// rigs that another version compiled are then compiled again.
 constexpr std::uint32_t kVersion = 2;
 
-/// [joints]: true if the file's joint metadata declares the rotation a quaternion.
+/// [joints]: whether the file's joint metadata declares the joint's rotation a quaternion.
 std::vector<bool> quaternion_joints(const dna::Dna& dna);
 
-/// The columns of a joint group that turn quaternion joints, in the order in which their rotations
-/// are multiplied. It is the order of the reference, whose storage swaps columns that are empty at
-/// a LOD to the end. Columns that are sorted by the number of their LODs, largest first, keep their
-/// order.
-/// In:    quaternion_joints  of the group's file, from quaternion_joints()
+/// The columns of a joint group that rotate quaternion joints, in the order in which their
+/// rotations are multiplied. The order follows the reference evaluator, whose storage swaps columns
+/// that are empty at a LOD to the end. Columns that are sorted by the number of their LODs, largest
+/// first, keep their order.
+/// In:    quaternion_joints  for all joints of the file, from quaternion_joints()
 /// Out:   columns of the group, each at most once
-/// Cost:  proportional to the values of the rows that turn quaternion joints
+/// Cost:  proportional to the values of the rows that rotate quaternion joints
 std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
                                                    std::uint32_t lod_count,
                                                    const std::vector<bool>& quaternion_joints);

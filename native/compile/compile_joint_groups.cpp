@@ -20,15 +20,16 @@ using core::ErrorCode;
 using core::fail;
 using core::ok;
 
-// Whether four columns are adjacent in the file, which may list a group's controls in any order.
+// Whether four columns are adjacent in the group's matrix in the file. They need not be, because a
+// group may list its controls in any order.
 bool side_by_side(const KeptColumn* four) {
   bool all = true;
   for (std::uint32_t i = 1; i < 4; ++i) all = all && four[i].column == four[0].column + i;
   return all;
 }
 
-// Transposes in tiles, so that both sides are read and written by whole cache lines, four columns
-// at a time.
+// Copies columns of a matrix that is stored by rows, each column to one run of memory. The values
+// are copied in tiles, four columns at a time, so that whole cache lines are read and written.
 // In: from  [rows, stride]
 void transpose(const float* from, std::size_t rows, std::size_t stride,
                std::span<const KeptColumn> columns, float* to) {
@@ -73,7 +74,8 @@ void KeptMatrices::write(std::span<float> to) const {
 
 namespace {
 
-// The rows of a group at each LOD. Rows that no LOD uses are never evaluated and are not stored.
+// Adds the number of a group's rows at each LOD. Out: the largest number; further rows are not
+// stored, because no LOD evaluates them
 core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string& where,
                                      RigData& out) {
   if (!g.output_indices.empty()) {
@@ -111,7 +113,8 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   rig::JointGroup group;
   group.row_count = *rows;
   std::vector<std::uint16_t>& outputs = out.joint_outputs;
-  // The rows of a wide group fill whole vectors. Padding rows are not written to poses.
+  // The rows of a group with at least kWidest rows are padded to whole vectors. Padding rows are
+  // not written to poses.
   const auto fill = [&] {
     if (*rows < simd::kWidest) return;
     outputs.resize(simd::rounded_up(outputs.size()), g.output_indices[0]);
@@ -124,7 +127,8 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   return ok();
 }
 
-// The lowest row in which each column has a value: at LODs with fewer rows the column does nothing.
+// The first row in which each column has a value other than 0. At a LOD with no more rows than this
+// the column has no effect.
 std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
   const std::size_t columns = g.input_indices.size();
   std::vector<std::uint32_t> first(columns, rows), missing(columns);
@@ -149,7 +153,7 @@ struct ColumnEntry {
   std::uint32_t group, column;
 };
 
-// Sorts by control; entries of one control keep their order.
+// Sorts columns by control; columns of one control stay in order.
 std::vector<ColumnEntry> by_control(const std::vector<ColumnEntry>& entries,
                                     std::uint32_t control_count) {
   std::vector<std::size_t> next(control_count + std::size_t{1});
@@ -160,8 +164,8 @@ std::vector<ColumnEntry> by_control(const std::vector<ColumnEntry>& entries,
   return out;
 }
 
-// The columns that have any value, by control and group, so that the columns of one control lie
-// together.
+// The columns that have a value other than 0, sorted by control and then by group. Marks their
+// controls in `used`.
 std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& used) {
   std::vector<ColumnEntry> entries;
   for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
@@ -181,7 +185,7 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
   return by_control(entries, out.control_count);
 }
 
-// Lists the same columns by group and then by control.
+// Lists the columns of `entries` sorted by group and then by control.
 void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
   std::vector<std::uint32_t> next;
   std::uint32_t begin = 0;
@@ -195,7 +199,7 @@ void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// The reads of each control, and of all controls, at each LOD.
+// Counts the columns and values that each control, and all controls together, read at each LOD.
 void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   const std::size_t stride = out.control_count + std::size_t{1};
   out.control_reads.resize(out.lod_count * stride);
@@ -212,7 +216,7 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// Assigns the place of each column, by control and group.
+// Assigns each column its offset in the block, in the order of control and group.
 Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entries, RigData& out,
                      KeptMatrices& kept) {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -227,7 +231,8 @@ Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entri
     end = to;
   };
   for (const ColumnEntry& e : entries) {
-    // Wide columns begin on whole vectors; columns shorter than a vector lie side by side.
+    // Columns of at least kWidest rows begin on whole vectors; shorter columns are stored without
+    // gaps.
     const std::uint32_t rows = out.joint_groups[e.group].row_count;
     if (rows >= simd::kWidest && end % simd::kWidest != 0) leave(simd::rounded_up(end));
     const auto offset = static_cast<std::uint32_t>(end);
@@ -247,7 +252,8 @@ Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entri
   return ok();
 }
 
-// Columns without a value are not stored, but they hold only zeros.
+// Whether all values of the joint matrices are finite. Columns that are not stored need no
+// exception, because all their values are 0.
 bool all_finite(const KeptMatrices& kept) {
   return std::ranges::all_of(kept.matrices, [](const KeptMatrices::Matrix& m) {
     const std::size_t count = m.rows * m.group->input_indices.size();
@@ -262,14 +268,16 @@ Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatr
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   RISORIUS_TRY(place_columns(groups, entries, out, kept));
   list_by_group(entries, out);
-  // A resting column may be read if that costs less, but 0 times infinity is not 0.
+  // With these counts the evaluator may read the columns of a control at 0 if that costs less. All
+  // values must be finite, because 0 times infinity is not 0.
   if (finite || all_finite(kept)) count_reads(entries, out);
   return ok();
 }
 
 namespace {
 
-// The row that gives each joint attribute its value at a LOD; the last group that writes it wins.
+// The row that gives each joint attribute its value at a LOD. If several groups write an attribute,
+// the last one in the file wins.
 std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
                                              std::span<const std::uint32_t> file_order,
                                              std::uint32_t lod) {
@@ -283,7 +291,7 @@ std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
   return rows;
 }
 
-// Lists the rows that one block of attributes takes, as pieces of consecutive rows.
+// Lists the rows that one block of attributes takes its values from, as pieces of consecutive rows.
 void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData& out) {
   out.joint_pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
   simd::Piece* piece = &out.joint_pieces.back();
@@ -300,7 +308,7 @@ void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData&
   }
 }
 
-// Finds the blocks that each group's rows reach.
+// Finds the first and last block of attributes that each group's rows write.
 void find_blocks(RigData& out) {
   for (rig::JointGroup& g : out.joint_groups) {
     const auto rows = std::span(out.joint_outputs).subspan(g.rows_begin, g.row_count);

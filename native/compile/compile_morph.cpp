@@ -19,8 +19,8 @@ rig::Morph::Delta transformed(const dna::BlendShapeTarget& t, std::size_t i,
           m[6] * x + m[7] * y + m[8] * z};
 }
 
-// Sorts the deltas of each channel by vertex, so that a range of vertices is one run. The sums of a
-// vertex keep their order.
+// Sorts the deltas of each channel by vertex, so that a range of vertices is one run. Deltas of one
+// vertex stay in order, so that their sum does not change.
 void sort_deltas(rig::Morph& morph) {
   for (std::size_t c = 0; c + 1 < morph.channel_offsets.size(); ++c) {
     const auto run = std::span(morph.deltas)

@@ -25,7 +25,8 @@ using detail::StepLods;
 using rig::MlOperation;
 using rig::RigData;
 
-// For files without layer mlbe: each network gathers its inputs and scatters its outputs.
+// The graph of operations for a file without layer mlbe: each network gathers its inputs and
+// scatters its outputs.
 dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   dna::MlType type;
   type.lod_operation_mappings.assign(3, ml.lod_neural_network_mapping);
@@ -51,7 +52,7 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   return type;
 }
 
-// The mask of each network: the first region that lists it.
+// The mask of each network: the number of the first mesh region that lists it.
 std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, RigData& out) {
   std::map<std::uint16_t, std::uint32_t> masks;
   for (const auto& mesh : dna.machine_learned_behavior.region_network_indices) {
@@ -63,7 +64,7 @@ std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, Ri
   return masks;
 }
 
-// Controls that hold the w of a joint's quaternion.
+// [controls]: whether a control is the w of a joint's quaternion.
 std::vector<bool> joint_w_controls(const dna::Dna& dna, std::uint32_t controls) {
   std::vector<bool> w(controls, false);
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
@@ -134,7 +135,8 @@ class GraphCompiler {
     return ok();
   }
 
-  // Adds the values that it reads from other operations. A network that gathers reads nothing else.
+  // Adds the values that an operation reads from other operations. A network that depends on a
+  // gather reads only from gathers.
   Status add_segments(const dna::MlOperation& source, MlOperation& op, const std::string& where) {
     std::vector<const MlOperation*> others;
     bool gathers = false;
@@ -205,7 +207,7 @@ class GraphCompiler {
     return ok();
   }
 
-  // Adds a layer; operations may share a network.
+  // Adds a layer. Operations that share a network share its weights.
   Status add_layer(const dna::NeuralNetworkLayer& source, std::uint16_t network, std::size_t index,
                    const std::string& where) {
     rig::MlLayer layer;
@@ -231,7 +233,8 @@ class GraphCompiler {
     return ok();
   }
 
-  // The rows of the newest layer at each LOD: all of them, unless the operation has a table.
+  // Adds the number of rows that the newest layer computes at each LOD: all rows, unless the
+  // operation has a table of row counts.
   void add_row_counts(const dna::MlOperation& source, std::size_t layer, std::size_t layers) {
     const std::size_t lods = out_.lod_count;
     const bool table = source.parameters.size() >= 1 + layers * lods;
@@ -242,7 +245,8 @@ class GraphCompiler {
     }
   }
 
-  // An operation runs at a LOD that lists it if the operations it reads run there.
+  // Lists the operations of each LOD. An operation that a LOD lists runs there only if all
+  // operations that it reads from run there too.
   Status list_lods(const dna::MlType& type, const std::string& where) {
     for (std::uint32_t lod = 0; lod < out_.lod_count; ++lod) {
       std::vector<bool> runs_here(out_.ml_operations.size() - first_, false);  // of this type
@@ -276,13 +280,14 @@ class GraphCompiler {
   std::map<std::uint16_t, std::uint32_t> masks_;
   std::vector<bool> rests_at_one_;
   std::map<std::pair<std::uint16_t, std::size_t>, std::uint32_t> weights_;
-  // First layer of each network that has all rows at every LOD.
+  // The first layer of each network whose layers compute all rows at every LOD.
   std::map<std::uint16_t, std::uint32_t> layers_;
   std::vector<std::vector<std::uint32_t>> numbers_;
   std::uint32_t first_ = 0;  // first operation of the type
 };
 
-// Rows are the directions of the axes: 0 left 1 right 2 up 3 down 4 front 5 back.
+// Three rows, the directions of the axes x, y, z. In: axes  0 left, 1 right, 2 up, 3 down, 4 front,
+// 5 back
 std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>& axes) {
   std::array<std::array<float, 3>, 3> rows{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -292,7 +297,8 @@ std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>&
   return rows;
 }
 
-// The axes and Euler angles of the joints' values, if the file gives all of them.
+// Sets the axes and the Euler convention of the joint values that networks compute, if the file
+// gives all of them.
 void add_system(const dna::Dna& dna, RigData& out) {
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
   std::map<std::uint16_t, std::uint16_t> settings;

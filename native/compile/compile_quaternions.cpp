@@ -16,7 +16,7 @@ namespace {
 
 using rig::RigData;
 
-// The first row in which each column turns a quaternion joint; kNone: it turns none.
+// The first row in which each column rotates a quaternion joint; kNone: it rotates none.
 std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
                                               const std::vector<bool>& quaternion_joints) {
   const std::size_t columns = g.input_indices.size();
@@ -32,7 +32,7 @@ std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
   return first;
 }
 
-// Rotation rows of a joint in a group, by axis; kNone: no row.
+// The rows of a group that write a joint's rotations about x, y and z; kNone: no row.
 using RotationRows = std::array<std::uint32_t, 3>;
 
 std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, std::uint32_t rows) {
@@ -46,7 +46,8 @@ std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, st
   return out;
 }
 
-// Adds one column of a group with a term for each joint that it turns. A missing row is 0.
+// Adds one column of a group, with a term for each joint that it rotates. The angle of a missing
+// row is 0.
 void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<RotationRows>& rows,
                 std::uint32_t first_slot, RigData& out) {
   const std::size_t columns = g.input_indices.size();
@@ -67,14 +68,15 @@ void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<Rotat
   if (column.terms_end > column.terms_begin) out.quaternion_columns.push_back(column);
 }
 
-// One more than the last LOD that has the row.
+// The number of LODs up to the last one that has the row.
 std::uint32_t levels_of(std::uint32_t row, const RigData& out, std::uint32_t group) {
   std::uint32_t levels = out.lod_count;
   while (levels > 0 && out.joint_group_lods[group * out.lod_count + levels - 1] <= row) --levels;
   return levels;
 }
 
-// Counts every row, even if a later row for the same angle hides it at finer LODs.
+// Raises the number of LODs at which Euler angles rotate each joint. A row counts even if a later
+// row for the same angle overrides it at finer LODs.
 void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
                         const std::vector<bool>& flags, const RigData& out,
                         std::vector<std::uint32_t>& euler) {
@@ -85,7 +87,8 @@ void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
   }
 }
 
-// In: levels  per joint: number of LODs; 0 if no Euler angles turn it
+// Lists the joints that Euler angles rotate, sorted so that each LOD uses the first ones.
+// In: levels  [joints] number of LODs at which Euler angles rotate the joint; 0: none
 void list_euler_joints(const std::vector<std::uint32_t>& levels, RigData& out) {
   for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
     if (levels[j] > 0) out.euler_joints.push_back(static_cast<std::uint16_t>(j));
@@ -162,7 +165,7 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
 void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
   const std::vector<bool> flags = quaternion_joints(dna);
   std::vector<std::uint32_t> euler(flags.size(), 0);
-  // In the order of the file: the last group that turns a joint wins.
+  // Groups in the order of the file, because the last group that rotates a joint wins.
   std::vector<std::uint32_t> file_order(groups.size());
   std::iota(file_order.begin(), file_order.end(), 0u);
   std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });

@@ -20,7 +20,7 @@ using detail::count_of;
 using detail::is_corrective;
 using rig::RigData;
 
-// The distance between two targets.
+// The distance between the targets of two poses of a solver.
 double distance(const RigData& r, const rig::RbfSolver& s, std::uint32_t a, std::uint32_t b) {
   const double* targets = r.rbf_targets.data() + s.targets_begin;
   return rig::rbf_distance(s.distance, targets + std::size_t{a} * s.input_count,
@@ -36,7 +36,8 @@ double mean_distance(const RigData& r, const rig::RbfSolver& s) {
   return pairs == 0 ? 0.0 : sum / pairs;
 }
 
-// Gauss-Jordan elimination with the largest pivot of each column. Out: the smallest pivot
+// Inverts a matrix by Gauss-Jordan elimination with the largest pivot of each column.
+// Out: the smallest pivot, at most 1; 0 if the matrix is singular
 double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   double smallest = 1.0;
   out.assign(n * n, 0.0);
@@ -66,8 +67,9 @@ double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   return smallest;
 }
 
-// Inverts the matrix of kernels between targets. Targets that differ only by rounding make it
-// singular: such poses then share their weight, whereas the reference gives it to any one of them.
+// Inverts the matrix of kernel values between all targets. Targets that differ only by rounding
+// make it singular. Their poses then share the weight, whereas the reference evaluator gives it to
+// any one of them.
 void add_inverse(rig::RbfSolver& s, RigData& out) {
   constexpr double kSingular = 1e-10, kRidge = 1e-8;
   const std::size_t n = s.pose_count;
@@ -151,7 +153,8 @@ Status check_solver(const dna::RbfSolver& s, const std::string& where) {
                   " controls, but a distance of rotations needs four for each");
 }
 
-// Counts the distances between all poses, and the matrix of an interpolative solver.
+// Charges the budget for the distances between all poses, and for the matrix of an interpolative
+// solver.
 Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::Budget& budget) {
   const std::uint64_t n = s.pose_indices.size();
   const std::uint64_t inputs = s.raw_control_indices.size() + 1;
@@ -163,8 +166,8 @@ Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::
   return budget.take_steps(n * n * n, where);
 }
 
-// Counts the cost of evaluating the solver's poses; a pose that is listed several times counts each
-// time.
+// Adds the poses of a solver and charges the budget for evaluating them. A pose that is listed
+// several times is charged each time.
 Status add_poses(const dna::RbfSolver& source, const std::string& where, PoseLists& poses,
                  detail::Budget& budget, RigData& out) {
   std::uint64_t steps = 0;

@@ -51,7 +51,8 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
-// Whether a run adds something if its input is 0.
+// Whether a run of rows adds a value other than 0 if its input is 0. In: begin  first row of the
+// run
 bool adds_at_rest(const std::vector<rig::ConditionalRow>& rows, std::size_t begin) {
   for (std::size_t i = begin; i < rows[begin].run_end; ++i) {
     const rig::ConditionalRow& row = rows[i];
@@ -86,7 +87,7 @@ void list_shapes_of_controls(RigData& out) {
   }
 }
 
-// The bounds of a row as a sortable number: -0 counts as 0.
+// The bounds of a row as a sortable number; -0 equals 0.
 std::uint64_t bounds_key(const rig::ConditionalRow& row) {
   const auto bits = [](float v) { return std::uint64_t{std::bit_cast<std::uint32_t>(v + 0.0f)}; };
   return bits(row.from) << 32 | bits(row.to);
@@ -119,7 +120,8 @@ std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::Condition
   return first;
 }
 
-// Lists the rows of each GUI control in ranges of equal bounds, in the order of their first rows.
+// Lists the rows of each GUI control, grouped into ranges of equal bounds. Ranges are in the order
+// of their first rows.
 Status list_gui_ranges(core::Budget& budget, RigData& out) {
   std::uint64_t steps = 0;
   const std::vector<std::uint32_t> first = first_rows_of_ranges(out.gui_rows, steps);
@@ -143,8 +145,8 @@ bool is_quaternion_w(std::string_view name) {
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// Sets the w of each quaternion that solvers, setups and networks read or write to 1, all others to
-// 0.
+// The initial values of controls: 1 for the w of each quaternion that solvers, setups and networks
+// read or write, 0 for all others.
 void compile_initial_controls(const dna::Dna& dna, RigData& out) {
   out.initial_controls.assign(out.control_count, 0.0f);
   const auto& names = dna.definition.raw_control_names;

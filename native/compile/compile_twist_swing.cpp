@@ -14,7 +14,8 @@ namespace {
 using rig::RigData;
 using rig::TwistSwing;
 
-// A setup without four inputs has no rotation to distribute.
+// Adds a twist or swing setup. A setup without four inputs is skipped: it has no rotation to
+// distribute.
 void add_setup(const dna::TwistSwingSetup& source, TwistSwing::Kind kind, RigData& out) {
   if (source.input_control_indices.size() != 4) return;
   TwistSwing setup;

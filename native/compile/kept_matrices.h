@@ -12,12 +12,13 @@
 
 namespace risorius::compile::detail {
 
-// A column of a group, and its offset in the block.
+// A column of a joint group's matrix, and its offset in the rig's block, in floats.
 struct KeptColumn {
   std::uint32_t column, offset;
 };
 
-// The columns of all groups. Their values stay in the matrices of the file until the block exists.
+// The stored columns of all joint groups. Their values stay in the matrices of the file until the
+// rig's block is allocated.
 struct KeptMatrices {
   struct Matrix {
     const dna::JointGroup* group;
@@ -28,7 +29,7 @@ struct KeptMatrices {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;  // between columns: first, end
   std::size_t size = 0;                                       // total, in floats
 
-  // Out: to  [size], overwritten
+  // Writes all columns into the block. Out: to  [size], overwritten
   void write(std::span<float> to) const;
 };
 

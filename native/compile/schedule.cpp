@@ -27,10 +27,11 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
   return {r.psd_factors.data() + p.factors_begin, p.factor_count};
 }
 
-// Lists of numbers in one array.
+// Many lists of numbers, stored one after the other in one array.
 class Lists {
  public:
-  // In: each  each(add) calls add(list, number) for all entries; it is called twice
+  // In: each  each(add) must call add(list, number) for all entries. It is called twice: to count
+  //           and to fill
   template <class Each>
   static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
     Lists out;
@@ -106,7 +107,7 @@ class Graph {
   std::span<const std::uint32_t> readers(std::uint32_t control) const {
     return readers_.of(control);
   }
-  /// The nodes that must run after n even if they read nothing from it.
+  /// The nodes that must run after n although they need not read a control that it writes.
   std::span<const std::uint32_t> after(std::uint32_t n) const { return after_.of(n); }
 
  private:
@@ -115,7 +116,8 @@ class Graph {
         operations_(static_cast<std::uint32_t>(r.ml_operations.size())),
         solvers_(static_cast<std::uint32_t>(r.rbf_solvers.size())) {}
 
-  // Calls f(n, control) for the controls that each node reads or writes, once for each pair.
+  // Calls f(n, control) once for each pair of a node and a control that it reads or writes.
+  // In: each  each(n, g) calls g for the controls of node n
   template <class Each, class F>
   void for_once(Each each, F f) const {
     std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
@@ -168,8 +170,9 @@ class Graph {
     }
   }
 
-  // Nodes that write the same control run in the order of the file, and operations run after the
-  // operations whose values they read.
+  // Calls f(before, after) for pairs of nodes whose order is fixed: nodes that write the same
+  // control run in the order of the file, and operations run after the operations whose values they
+  // read.
   template <class F>
   void for_edges(F f) const {
     std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
@@ -202,11 +205,11 @@ struct Order {
   std::vector<std::uint32_t> cyclic;  // members of cycles, and the nodes that depend on them
 };
 
-// The number of nodes that each node still waits for, directly or through a control that they
-// write.
+// Counts for each node how many nodes must still run before it, directly or because they write a
+// control that it reads.
 class Waiting {
  public:
-  // In: nodes  each once; other nodes count as done
+  // In: nodes  the nodes to run, each once; all others count as having run
   Waiting(const Graph& g, const std::vector<std::uint32_t>& nodes)
       : g_(g), here_(g.size(), false), nodes_(g.size(), 0), controls_(g.control_count(), 0) {
     for (const std::uint32_t n : nodes) here_[n] = true;
@@ -221,7 +224,7 @@ class Waiting {
 
   bool is_ready(std::uint32_t n) const { return nodes_[n] == 0; }
 
-  /// Calls f(m) for each node that waited only for n.
+  /// Marks n as having run. Calls f(m) for each node that waited only for n.
   template <class F>
   void finish(std::uint32_t n, F f) {
     const auto done = [&](std::uint32_t m) {
@@ -239,7 +242,8 @@ class Waiting {
   std::vector<std::uint32_t> nodes_, controls_;
 };
 
-// In: nodes  ascending; other nodes count as done
+// Sorts nodes by their dependencies.
+// In: nodes  the nodes to run, ascending; all others count as having run
 Order order_of(const Graph& g, std::vector<std::uint32_t> nodes) {
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());  // a file may list one twice
   Waiting waiting(g, nodes);
@@ -259,7 +263,8 @@ Order order_of(const Graph& g, std::vector<std::uint32_t> nodes) {
   return order;
 }
 
-// Operations and solvers that depend on no corrective, directly or indirectly, and on no cycle.
+// The operations and solvers that can run before the correctives, because they depend on no
+// corrective, directly or indirectly, and on no cycle.
 struct Early {
   std::vector<bool> nodes;
   std::vector<bool> controls;  // true if all writers of the control are early
@@ -286,8 +291,8 @@ Early find_early(const Graph& g) {
   return early;
 }
 
-// The factor that watches each corrective; kNone if a factor may change after the watchers are
-// read.
+// The watcher of each corrective: the factor whose value decides whether the corrective is
+// evaluated. kNone if a factor may change after the watchers are read.
 std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {
@@ -334,7 +339,7 @@ void add_list(const Graph& g, const std::vector<std::uint32_t>& nodes, RigData& 
   r.step_begins.push_back(static_cast<std::uint32_t>(r.steps.size()));
 }
 
-// Sorts correctives by the order in which their watchers are read.
+// Renumbers the correctives in the order in which their watchers are read.
 void sort_correctives(RigData& r) {
   std::vector<std::uint32_t> number(r.psds.size(), rig::kNone);
   std::vector<rig::Psd> psds;
@@ -358,7 +363,7 @@ void sort_correctives(RigData& r) {
   }
 }
 
-// The cost of running each operation and solver once.
+// The cost, in steps of the budget, of running each operation and solver once.
 class Costs {
  public:
   explicit Costs(const RigData& r) : r_(r), layers_(1, 0), segments_(1, 0), poses_(1, 0) {
@@ -393,7 +398,8 @@ class Costs {
   std::vector<std::uint64_t> layers_, segments_, poses_;  // running sums
 };
 
-// Counts the steps of all LODs; a LOD may list a step any number of times.
+// Charges the budget for the operations and solvers of all LODs. If a LOD lists one several times,
+// it is charged each time.
 Status take_steps_of_lists(const RigData& r, const StepLods& lods, Budget& budget) {
   const Costs costs(r);
   std::uint64_t operations = 0, solvers = 0;

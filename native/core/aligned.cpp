@@ -14,7 +14,7 @@ std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill) {
   const std::size_t alignment = size >= kLarge ? kLarge : 64;
   void* memory = ::operator new(size, std::align_val_t(alignment));
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
-  // a hint that the system may ignore.
+  // The system may ignore this hint.
   if (alignment == kLarge) madvise(memory, size, MADV_HUGEPAGE);
 #endif
   if (fill == Fill::kZero) std::memset(memory, 0, size);

@@ -10,7 +10,7 @@
 
 namespace risorius::core {
 
-/// An allocator of std::vector; its memory begins on a multiple of kAlignment bytes.
+/// An allocator for std::vector whose memory begins on a multiple of kAlignment bytes.
 template <class T, std::size_t kAlignment = 64>
 struct AlignedAllocator {
   using value_type = T;
@@ -30,8 +30,8 @@ struct AlignedAllocator {
 
 /// The content of new memory: zeros, or undefined.
 enum class Fill { kZero, kNothing };
-/// Memory that begins on a cache line. Blocks of 2 MiB and more use large pages if the system has
-/// them, because random reads then need fewer address translations.
+/// Allocates memory that begins on a cache line. Blocks of 2 MiB and more use large pages if the
+/// system has them, because random reads then need fewer address translations.
 /// In: size in bytes
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill = Fill::kZero);
 

@@ -14,8 +14,8 @@
 
 namespace risorius::core {
 
-/// An immutable array of numbers. Copies share the buffer, which lives as long as any copy, so a
-/// NumPy view may hold one. To change a value, assign a new Array.
+/// An immutable array of numbers. Copies share the buffer, which lives as long as any copy, so that
+/// a NumPy view can keep a copy. To change a value, assign a new Array.
 template <class T>
 class Array {
  public:
@@ -70,15 +70,15 @@ struct PlanarArray {
 using Vec3Array = PlanarArray<3>;
 using Vec2Array = PlanarArray<2>;
 
-/// A list of structs with value semantics (copies are deep). Its storage is replaced as a whole and
-/// kept alive by element_ptr(), so that Python may hold an element of a list that was replaced.
+/// A list of structs. Copies are deep. Assigning a list replaces its storage; element_ptr() keeps
+/// the old storage alive, so that a Python object can still refer to an element of it.
 template <class T>
 class List {
  public:
   List() : items_(std::make_shared<std::vector<T>>()) {}
   List(std::vector<T> items) : items_(std::make_shared<std::vector<T>>(std::move(items))) {}
   List(const List& other) : List(*other.items_) {}
-  // A moved-from list is an empty list, which needs memory of its own.
+  // A moved-from list is an empty list. Its empty storage must be allocated, which may throw.
   // NOLINTNEXTLINE(bugprone-unsafe-to-allow-exceptions)
   List(List&& other) noexcept(false) : List() { items_.swap(other.items_); }
   List& operator=(List other) {

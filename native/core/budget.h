@@ -10,8 +10,8 @@
 
 namespace risorius::core {
 
-/// Passed through a stage, which asks it before any storage or work that grows faster than the
-/// input. Plain copies of the input are not counted.
+/// The limits of one stage, such as compiling. The stage charges the budget before each allocation
+/// or work that may grow faster than the input. Plain copies of the input are not charged.
 class Budget {
  public:
   static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
@@ -20,7 +20,7 @@ class Budget {
   Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)
       : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
 
-  /// Fails: kLimitExceeded with the field, the requested total, and the limit.
+  /// Charges bytes. Fails: kLimitExceeded with the field, the requested total, and the limit.
   Status take_bytes(std::uint64_t count, const std::string& where) {
     return take(count, bytes_, most_bytes_, "bytes", where);
   }

@@ -13,9 +13,9 @@
 
 namespace risorius::core {
 
-/// An array whose new elements are unset, so that its memory is touched only once, when it is
-/// filled. It becomes an Array without a copy. Growth uses std::realloc, which moves pages instead
-/// of bytes.
+/// An array whose new elements have no defined value, so that its memory is only written when the
+/// array is filled. It becomes an Array without a copy. Growth uses std::realloc, which moves pages
+/// instead of bytes.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));
@@ -29,7 +29,8 @@ class Buffer {
   T* data() { return data_.get(); }
   T& operator[](std::size_t i) { return data_.get()[i]; }
 
-  /// Keeps the elements. The first call allocates exactly n, later ones grow by half.
+  /// Changes the size and preserves the elements. The first call allocates exactly n elements;
+  /// later growth is at least by half.
   void resize(std::size_t n) {
     if (n > capacity_) allocate(capacity_ == 0 ? n : std::max(n, capacity_ + capacity_ / 2));
     size_ = n;
@@ -37,7 +38,7 @@ class Buffer {
   void reserve(std::size_t n) {
     if (n > capacity_) allocate(n);
   }
-  /// Transfers ownership of the memory, cut to size.
+  /// Shrinks the memory to the array's size and transfers the ownership of it.
   std::shared_ptr<const T> release() {
     if (size_ < capacity_) allocate(size_);
     size_ = capacity_ = 0;

@@ -27,7 +27,8 @@ inline bool all_finite(std::span<const float> values) {
   return found >> 31 == 0;
 }
 
-/// The same for doubles, which are few: times and points of lines.
+/// Like all_finite for floats, but without vectorised code, because lists of doubles are short:
+/// times and points of polylines.
 inline bool all_finite(std::span<const double> values) {
   for (const double value : values) {
     if (!std::isfinite(value)) return false;

@@ -7,7 +7,7 @@
 
 namespace risorius::core {
 
-/// XXH64 with seed 0, as specified; as fast as memory.
+/// The hash XXH64 with seed 0. It is about as fast as reading memory.
 std::uint64_t xxh64(std::span<const std::uint8_t> bytes);
 
 }  // namespace risorius::core

@@ -31,7 +31,7 @@ enum class ErrorCode {
 /// The name of a code as Python and the command line show it, e.g. "invalid_count".
 const char* to_string(ErrorCode code);
 
-/// The kind and the place of an error.
+/// An error.
 /// offset   byte offset in the file, if the error has one
 /// where    the DNA field, e.g. "behavior.joint_groups[3].values"
 /// message  one sentence with the found and the expected value

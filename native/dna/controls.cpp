@@ -117,7 +117,8 @@ class Forgetting {
   void inputs(const std::vector<bool>& keep, Array<std::uint16_t>& indices) {
     if (!keep.empty()) indices = renumbered(map_, only(indices, keep));
   }
-  // A corrective is a product: if one factor stays 0, or if it has no factors, it is 0.
+  // Removes correctives that would always be 0. A corrective is a product, so that it is 0 if one
+  // factor is a removed control.
   void psds() {
     Psds& p = dna_.behavior.psds;
     std::vector<bool> is_lost(map_.size(), false);
@@ -193,7 +194,8 @@ void drop_layer(std::string_view id, Dna& dna) {
   });
   dna.unread_controls = {};
   const ControlCounts after = control_counts(dna);
-  // Without layer rbfe each pose is a control, so that the number of pose controls may grow.
+  // The difference must not be negative: without layer rbfe each pose is a control, so that
+  // removing that layer may raise the number of pose controls.
   dna.unread_controls = {before.psd - after.psd, before.ml - after.ml,
                          before.rbf_pose - std::min(before.rbf_pose, after.rbf_pose)};
 }

@@ -26,20 +26,22 @@ std::uint16_t ml_joint_stride(const MlJoints& joints);
 
 namespace detail {
 
-/// Removes a layer. Its controls still count, as unread.
+/// Removes a layer. The controls that it provides still have their numbers, and are counted as
+/// unread.
 /// In: id  of the layer, e.g. "mlbh"
 void drop_layer(std::string_view id, Dna& dna);
 
-/// Closes the gaps of unread controls, so that the Dna can be written as a file of its own.
-/// Everything that an unread control drives is removed, because it would stay 0: columns of joint
-/// groups, entries of channels and maps, and correctives with such a factor. Out: how many were
-/// removed
+/// Removes the unread controls from the control space and renumbers the others, so that the Dna can
+/// be written as a complete file. Everything that an unread control drives is removed, because it
+/// would remain 0: columns of joint groups, entries of channels and maps, and correctives with such
+/// a factor.
+/// Out: number of removed columns, entries and correctives
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-/// The same for any controls: controls that are not kept are removed, and the others close the
-/// gaps. The caller sets the counts of the parts that lose controls.
-/// In: keep  [controls]; all raw controls are kept
+/// As forget_unread_controls, for any controls. The caller must then correct the numbers of raw,
+/// corrective, network and pose controls.
+/// In: keep  [controls] whether each control remains; true for all raw controls
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes a removed control)
 core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);
 

@@ -19,7 +19,7 @@ using core::List;
 using core::Vec2Array;
 using core::Vec3Array;
 
-/// A list of indices for each LOD; LODs may share a list. lods[lod] is a row of `rows`.
+/// A list of indices for each LOD: LOD l has the list rows[lods[l]]. LODs may share a list.
 struct LodMapping {
   Array<std::uint16_t> lods;
   std::vector<Array<std::uint16_t>> rows;
@@ -66,15 +66,16 @@ struct Definition {
   bool operator==(const Definition&) const = default;
 };
 
-/// Rows `from <= in <= to: out += slope * in + cut`; six parallel lists.
+/// Rows of a table, as six parallel lists. A row adds slope * in + cut to its output if from <= in
+/// <= to.
 struct Conditionals {
   Array<std::uint16_t> input_indices, output_indices;
   Array<float> from_values, to_values, slope_values, cut_values;
   bool operator==(const Conditionals&) const = default;
 };
 
-/// Correctives: a sparse matrix in coordinate form; row = control index of the corrective, column =
-/// control index of a factor.
+/// Correctives, as a sparse matrix in coordinate form. Each entry gives a corrective (row, its
+/// control index) a factor (column, the factor's control index).
 struct Psds {
   Array<std::uint16_t> rows, columns;
   Array<float> values;
@@ -164,9 +165,9 @@ struct MachineLearnedBehavior {
   bool operator==(const MachineLearnedBehavior&) const = default;
 };
 
-/// A node of the graph of layer mlbe. parameters: gather and scatter = control indices; MLP = the
-/// network's number, then optionally rows per layer and LOD (layer-major); weighted sum = the
-/// number of outputs, then one float's bits per dependency.
+/// A node of the graph of layer mlbe. Its parameters depend on its type. Gather and scatter:
+/// control indices. MLP: the network's number, then optionally the rows of each layer at each LOD
+/// (layer-major). Weighted sum: the number of outputs, then the bits of one float per dependency.
 struct MlOperation {
   Array<std::uint32_t> parameters;
   Array<std::uint16_t> operation_set_dependency_indices, operation_dependency_indices;
@@ -180,15 +181,15 @@ struct MlType {
   bool operator==(const MlType&) const = default;
 };
 
-/// Joints that networks move: output = joint * stride + attribute, stride 9 or, with quaternions,
-/// 10. Keys: 0 translation 1 rotation (0 Euler 1 quaternion) 2 scale type, 3 4 5 axes, 6 7 8
-/// rotation signs, 9 rotation sequence.
+/// Joints that networks move. output_indices: joint * stride + attribute; the stride is 9, or 10
+/// with quaternions. Keys: 0 type of translation, 1 type of rotation (0 Euler, 1 quaternion), 2
+/// type of scale, 3 to 5 axes, 6 to 8 rotation signs, 9 rotation sequence.
 struct MlJoints {
   Array<std::uint16_t> parameter_keys, parameter_values, input_indices, output_indices;
   bool operator==(const MlJoints&) const = default;
 };
 
-/// Layer mlbe.
+/// Layer mlbe: operations that run the networks of layer mlbh, and joints that networks move.
 struct MachineLearnedBehaviorExt {
   List<MlType> types;
   MlJoints joints;
@@ -216,7 +217,7 @@ struct RbfPose {
   bool operator==(const RbfPose&) const = default;
 };
 
-/// Layer rbfb.
+/// Layer rbfb: radial basis function solvers and their poses.
 struct RbfBehavior {
   LodMapping lod_solver_mapping;
   List<RbfSolver> solvers;
@@ -224,14 +225,15 @@ struct RbfBehavior {
   bool operator==(const RbfBehavior&) const = default;
 };
 
-/// The outputs of a pose of layer rbfb: weights times the pose's value times the input controls.
+/// The output controls of a pose of layer rbfb. Each gets its weight times the pose's value times
+/// the product of the input controls.
 struct RbfPoseControls {
   Array<std::uint16_t> input_control_indices, output_control_indices;
   Array<float> output_control_weights;
   bool operator==(const RbfPoseControls&) const = default;
 };
 
-/// Layer rbfe.
+/// Layer rbfe: the output controls of each pose of layer rbfb.
 struct RbfBehaviorExt {
   std::vector<std::string> pose_control_names;
   List<RbfPoseControls> poses;
@@ -251,7 +253,7 @@ struct JointBehaviorMetadata {
   bool operator==(const JointBehaviorMetadata&) const = default;
 };
 
-/// A twist or swing setup: spreads the rotation of four controls (x y z w) over joints.
+/// A twist or swing setup: distributes the rotation in four controls (x y z w) over joints.
 struct TwistSwingSetup {
   Array<float> blend_weights;  // one per output joint
   Array<std::uint16_t> output_joint_indices, input_control_indices;
@@ -259,7 +261,7 @@ struct TwistSwingSetup {
   bool operator==(const TwistSwingSetup&) const = default;
 };
 
-/// Layer twsw.
+/// Layer twsw: setups that distribute the twist or the swing of a rotation over joints.
 struct TwistSwingBehavior {
   List<TwistSwingSetup> twists, swings;
   bool operator==(const TwistSwingBehavior&) const = default;
@@ -303,8 +305,8 @@ struct Dna {
   TwistSwingBehavior twist_swing_behavior;
   UnreadControls unread_controls;
   std::vector<UnknownLayer> unknown_layers;
-  /// Layer ids in the order of the source file, so that a rewrite keeps it; "" stands for the next
-  /// unknown layer.
+  /// Layer ids in the order of the source file, so that a rewrite has the same order; "" stands for
+  /// the next unknown layer.
   std::vector<std::string> index_order;
   std::vector<Warning> warnings;
 };

@@ -11,7 +11,7 @@
 
 namespace risorius::dna::detail {
 
-/// Old index -> new index; kDropped for removed elements.
+/// Maps old indices to new ones; removed elements map to kDropped.
 class IndexMap {
  public:
   static constexpr std::uint32_t kDropped = 0xFFFFFFFF;
@@ -31,8 +31,9 @@ class IndexMap {
   std::size_t kept_ = 0;
 };
 
-/// Rows [0, lods[l]) are used at LOD l, so that dropping row r lowers every larger count. Each row
-/// is visited once, independent of the number of LODs.
+/// Lowers the row counts of LODs after rows were removed. LOD l uses the rows [0, lods[l]), so that
+/// removing row r lowers every count above r. Each row is visited once, independent of the number
+/// of LODs.
 template <class Keep>
 void drop_rows(const Keep& keep, core::Array<std::uint16_t>& lods) {
   std::vector<std::uint16_t> kept_before{0};

@@ -24,7 +24,7 @@ inline constexpr KnownLayer kLayers[] = {
     {"twsw", 0x10000, 4}, {"mlbe", 0x10000, 6}, {"dsce", 0x10000, 7},
 };
 
-/// A layer is known by the exact pair of id and version.
+/// The table entry of a layer, which is known only by the exact pair of id and version.
 /// In:  version  major << 16 | minor
 /// Out: nullptr if the pair is unknown
 inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
@@ -34,8 +34,8 @@ inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   return nullptr;
 }
 
-/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the table's order.
-/// dsce comes last, because its bytes depend on the file's version.
+/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the order of
+/// kLayers. dsce is last, because its bytes depend on the file's version.
 template <class D, class F>
 void for_each_layer(D& dna, F f) {
   f("desc", "descriptor", dna.descriptor);

@@ -17,8 +17,8 @@
 
 namespace risorius::dna::detail {
 
-/// A field's name in Dna (for error messages) and in the format's JSON, if that is not the same
-/// name in camelCase.
+/// The name of a field in Dna, for error messages, and its name in the format's JSON. Without a
+/// JSON name, JSON uses the field's name in camelCase.
 struct Name {
   const char* dna;
   const char* json = nullptr;
@@ -26,7 +26,7 @@ struct Name {
   Name(const char* in_dna, const char* in_json) : dna(in_dna), json(in_json) {}
 };
 
-/// The same function serves reading (T) and writing (const T).
+/// D is T or const T, so that one function serves both reading and writing.
 template <class D, class T>
 concept Of = std::is_same_v<std::remove_const_t<D>, T>;
 
@@ -59,7 +59,8 @@ void describe(V& v, D& d) {
   v.field("db_name", d.db_name);
 }
 
-/// The container handles the winding order (from 2.8 on), because it depends on the file's version.
+/// The winding order is not described here but read and written by the container, because only
+/// files from 2.8 on have it.
 template <class V, Of<DescriptorExt> D>
 void describe(V& v, D& d) {
   v.field("rotation_sequence", d.rotation_sequence);
@@ -130,7 +131,8 @@ void describe(V& v, D& d) {
   v.field("conditionals", d.conditionals);
 }
 
-// The four parts of the behavior layer; 2.1 stores each at an offset of its own.
+// The following functions describe the four parts of the behavior layer. A 2.1 file stores each
+// part at its own offset.
 template <class V, Of<Behavior> D>
 void describe_controls(V& v, D& d) {
   v.group({"", "controls"}, [&] {
@@ -303,7 +305,7 @@ void describe(V& v, D& d) {
   v.setups("swings", d.swings, false);
 }
 
-/// A twist or swing: the same bytes, with different names in JSON.
+/// Describes a twist or swing setup. The bytes are the same for both; the JSON names differ.
 template <class V, Of<TwistSwingSetup> D>
 void describe_setup(V& v, D& d, bool twist) {
   v.field({"blend_weights", twist ? "twistBlendWeights" : "swingBlendWeights"}, d.blend_weights);

@@ -8,8 +8,8 @@
 
 namespace risorius::dna {
 
-/// Bytes of its numbers and texts, with the counts of its lists, as in a file; without the
-/// container around the layers. Cost: visits each list once
+/// The size that the layers have in a file: the bytes of their numbers and texts and of the counts
+/// of their lists. Headers and the index do not count. Cost: visits each list once
 std::uint64_t size_in_bytes(const Dna& dna);
 
 }  // namespace risorius::dna

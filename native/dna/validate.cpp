@@ -29,7 +29,7 @@ T largest(const Array<T>& values) {
   return top;
 }
 
-// Collects errors and oddities, one finding per list.
+// Collects errors and oddities of a Dna, at most one finding for each list.
 class Checker {
  public:
   explicit Checker(detail::Known known) : known_(known) {}
@@ -162,7 +162,7 @@ void check_descriptor(Checker& c, const Dna& dna) {
 }
 
 void check_hierarchy(Checker& c, const Array<std::uint16_t>& parents) {
-  // Walk up from each joint to a joint that is known to reach a root.
+  // From each joint, go up to a joint that is known to reach a root.
   std::vector<std::uint8_t> good(parents.size(), 0);
   std::vector<std::size_t> path;
   for (std::size_t j = 0; j < parents.size(); ++j) {
@@ -547,7 +547,7 @@ void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_setups(c, "twist_swing_behavior.swings", dna.twist_swing_behavior.swings, dna);
 }
 
-// Fails with the first error among the findings; otherwise adds the findings to `warnings`.
+// Fails with the first error among the findings. Without errors, adds the findings to `warnings`.
 Status told(std::vector<Finding> findings, std::vector<Warning>& warnings) {
   for (Finding& f : findings) {
     if (f.is_error) return core::Unexpected{std::move(f.error)};

@@ -20,12 +20,12 @@ struct Finding {
 /// In/out: warnings  gets the oddities that can be read safely
 /// Fails: kInvalidLength, kInvalidIndex, kInvalidValue, with the field and no offset
 core::Status validate(const Dna& dna, std::vector<Warning>& warnings);
-/// The same without the geometry: everything that evaluation reads.
+/// Like validate, but without the geometry, which evaluation does not read.
 core::Status validate_behavior(const Dna& dna, std::vector<Warning>& warnings);
 
 namespace detail {
 
-/// Facts that reading the numbers established, so that they need no second check.
+/// Facts that were checked while the numbers were read, so that they need no second check.
 struct Known {
   bool finite = false;  // every element of every Array<float>
   // Vertex indices of blend shape targets are below their mesh's vertex count.

@@ -9,8 +9,8 @@
 
 namespace risorius::dna::detail {
 
-/// "geometry.meshes[3].positions[7]" as a few pointers: a check names thousands of lists and rarely
-/// makes text of one. In: names that live as long as the program
+/// A field's name such as "geometry.meshes[3].positions[7]", stored as a few pointers: a check uses
+/// thousands of names and rarely needs one as text. In: names that live as long as the program
 class Where {
  public:
   Where(const char* name) { add({name, kNone}); }

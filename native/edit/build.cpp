@@ -22,19 +22,20 @@ using Indices = std::vector<std::uint16_t>;
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 28;
 constexpr std::size_t kMost = 65535;  // rows or columns
 
-// The key of a new group. Groups are written in ascending order of keys, because later rows win.
+// The key of a new joint group. Groups are written in ascending order of keys. If two groups
+// write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // higher layers come first
-  // levels: number of LODs if rows with the same order of columns cannot share a joint group, else
-  // 0. The group of a bundle has no region.
+  // levels: number of LODs of the units if their group must not have other numbers of LODs, because
+  // their order of columns would change; else 0. The group of a bundle has no region.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };
 using Members = std::map<GroupKey, std::vector<const Unit*>>;
 
-// The columns of a group, and the place of each unit's columns among them. Columns that turn
-// quaternions come first, in the order of their product (compile::quaternion_column_order keeps
-// it).
+// The columns of a new group, and the place of each unit's columns among them. Columns that rotate
+// quaternion joints come first, in the order in which their rotations are multiplied
+// (compile::quaternion_column_order keeps it).
 class Columns {
  public:
   explicit Columns(const std::vector<const Unit*>& units) {
@@ -80,7 +81,7 @@ class Columns {
     }
   }
 
-  // Number of LODs at which each column turns a quaternion.
+  // The largest number of LODs at which each column rotates a quaternion joint.
   std::vector<std::uint32_t> levels_of(const std::vector<const Unit*>& units) const {
     std::vector<std::uint32_t> levels(controls_.size(), 0);
     for (const Unit* u : units) {
@@ -119,9 +120,9 @@ class Columns {
   bool keeps_orders_ = true;
 };
 
-// The quaternions of one group share the order of its columns, in which columns of more LODs come
-// first. If that changes the order of one of them, units with equal LODs get a group of their own:
-// there all columns have the same number of LODs.
+// All quaternion joints of a group share the order of its columns, in which columns with more LODs
+// come first. If that changes the order for one of them, the units are divided into groups of equal
+// numbers of LODs, in which no column is moved.
 Members separated(const Members& groups) {
   Members out;
   for (const auto& [key, list] : groups) {
@@ -147,7 +148,7 @@ Members list_members(const std::vector<Unit>& units, const Regions& regions) {
     if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
   }
   out = separated(out);
-  // Units that may stand in any order join a group with a fixed order, if there is one.
+  // Units whose columns may have any order join a group with a fixed order, if there is one.
   Members free;
   for (const Unit& u : units) {
     if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);
@@ -169,7 +170,7 @@ struct Placed {
   const Row& at() const { return unit->rows[row]; }
 };
 
-// Rows of more LODs come first.
+// Sorts the rows of a group: rows that more LODs use come first.
 std::vector<Placed> order_rows(const std::vector<const Unit*>& units) {
   std::vector<Placed> rows;
   for (const Unit* u : units) {

@@ -25,7 +25,8 @@ using Frames = std::vector<float>;  // [frames, raw controls]
 constexpr std::uint32_t kMostActive = 40;  // controls of a random pose
 constexpr std::size_t kFrames = 32;        // evaluated in one call
 
-// Gives the same numbers on every platform, unlike the distributions of the standard library.
+// Random numbers that are the same on every platform, unlike the distributions of the standard
+// library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -50,7 +51,7 @@ Frames random_frames(const rig::Rig& rig, std::uint32_t count, std::uint64_t see
   return out;
 }
 
-// Each raw control alone at 1, then the random poses.
+// The compared frames: each raw control alone at 1, then the random poses.
 Frames all_frames(const rig::Rig& rig, const RegroupOptions& options) {
   Frames out;
   for (std::uint32_t c = 0; c < rig.raw_count; ++c) {
@@ -63,7 +64,8 @@ Frames all_frames(const rig::Rig& rig, const RegroupOptions& options) {
   return out;
 }
 
-// Of translation, rotation, scale and position.
+// The largest difference of one kind. Worsts has one each for translation, rotation, scale and
+// position.
 struct Worst {
   double value = 0.0;
   std::size_t joint = 0, frame = 0;
@@ -79,7 +81,7 @@ double length(const Vector& a, const Vector& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-// Evaluates both rigs in blocks of frames and keeps the largest differences.
+// Evaluates two rigs in blocks of frames and records the largest differences of their poses.
 class Comparison {
  public:
   Comparison(const Skeleton& skeleton, const rig::Rig& before, const rig::Rig& after)
@@ -122,7 +124,7 @@ class Comparison {
       for (std::size_t side = 0; side < 2; ++side) {
         locals_[side][j] = skeleton_.local(j, pose[side] + 9 * j);
       }
-      // Equal bits move nothing, even if they are NaN.
+      // Equal bits are no difference, even if they are NaN.
       // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
       if (!std::memcmp(pose[0] + 9 * j, pose[1] + 9 * j, 9 * sizeof(float))) continue;
       const Local &a = locals_[0][j], &b = locals_[1][j];
@@ -166,7 +168,8 @@ void report_worst(const dna::Dna& dna, const std::vector<Worsts>& of_lods, Chang
 
 core::Status measure_changes(const dna::Dna& before, const dna::Dna& after,
                              const RegroupOptions& options, RegroupReport& report) {
-  // The scalar path adds in ascending order of controls, however they are grouped.
+  // On the scalar path, sums have the ascending order of controls, in whatever groups the controls
+  // are.
   compile::CompileOptions scalar;
   scalar.kernels = simd::find_kernels("scalar");
   const Result<rig::Rig> a = compile::compile(before, scalar), b = compile::compile(after, scalar);
@@ -194,8 +197,8 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-// The faces take turns, and each goes first equally often: the load of the machine and the cold
-// caches of the first evaluation then meet both.
+// Measures how long both faces take. They alternate, and each goes first equally often, so that the
+// load of the machine and cold caches affect both alike.
 core::Status measure_times(const dna::Dna& before, const dna::Dna& after,
                            const RegroupOptions& options, RegroupReport& report) {
   if (options.timed == 0) return core::ok();

@@ -8,7 +8,7 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Counts the uses of each watched corrective at each LOD.
+// Counts for each watched corrective and LOD how many rows, channels and maps read it.
 class Uses {
  public:
   Uses(const dna::Dna& dna, const std::vector<Unit>& units)
@@ -19,15 +19,15 @@ class Uses {
     const auto& maps = dna.behavior.animated_maps;
     count_entries(channels.lods, channels.input_indices);
     count_entries(maps.lods, maps.conditionals.input_indices);
-    // Joints of neural networks use correctives too. Not counting them only keeps more
-    // coefficients.
+    // Joints that networks move also read correctives. Leaving these uses out only means that fewer
+    // coefficients are removed.
     for (const Unit& u : units) {
       for (std::size_t v = 0; v < u.values.size(); ++v) {
         if (u.values[v] != 0.0f) add(u.columns[v % u.columns.size()], row_of(u, v), 1);
       }
     }
   }
-  /// False if that was the last use at some LOD.
+  /// Removes one use. False, without removing it, if it is the last use at some LOD.
   bool take(std::uint16_t control, const Row& row) {
     if (!watched_[control]) return true;
     for (std::uint32_t l = 0; l < lods_; ++l) {
@@ -63,7 +63,7 @@ class Uses {
   std::vector<std::int64_t> counts_;  // [controls, LODs]
 };
 
-// The number of joints of a region that each control moves.
+// How many joints of a region each control moves.
 std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
                                         std::size_t controls) {
   std::vector<std::uint32_t> counts(controls, 0), last(controls, UINT32_MAX);
@@ -77,7 +77,7 @@ std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
   return counts;
 }
 
-// In: keep  [columns] of a linear unit
+// Removes columns of a unit of one row. In: keep  [columns]
 void keep_columns(const std::vector<bool>& keep, Unit& u) {
   std::size_t n = 0;
   for (std::size_t c = 0; c < keep.size(); ++c) {
@@ -128,8 +128,9 @@ void remove_zero_rows(std::vector<Unit>& units) {
     while (i < units.size() && units[i].joint == units[begin].joint) ++i;
     const auto first = units.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = units.begin() + static_cast<std::ptrdiff_t>(i);
-    // A row of zeros may hide another row. A joint keeps at least one row, because the rig then
-    // knows that it moves.
+    // No row is removed if one of the joint's units has an overwritten layer, because a row of
+    // zeros may be the one that overwrites another. At least one row of a joint is kept, so that
+    // the rig knows that the joint may move.
     const bool layered = std::any_of(first, last, [](const Unit& u) { return u.layer > 0; });
     const auto goes = [&](const Unit& u) { return u.is_zero() && !u.is_quaternion && !layered; };
     auto kept = std::count_if(first, last, [&](const Unit& u) { return !goes(u); });

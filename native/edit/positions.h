@@ -28,14 +28,15 @@ struct Local {
 /// The angle between two rotations in degrees.
 double degrees_between(const Turn& a, const Turn& b);
 
-/// The joints of a face; places them in evaluated poses.
+/// The joints of a face. It computes their positions in evaluated poses.
 class Skeleton {
  public:
   Skeleton(const dna::Dna& dna, const rig::EulerConvention& euler);
   std::size_t joint_count() const { return parents_.size(); }
   /// In: delta  tx ty tz rx ry rz sx sy sz, the joint's attributes in a pose
   Local local(std::size_t joint, const float* delta) const;
-  /// In: locals of all joints. Out: their positions in the face, in the file's units and axes.
+  /// Computes positions in the face. In: locals  of all joints
+  /// Out: positions  [joints], in the file's units and axes
   void place(const std::vector<Local>& locals, std::vector<Vector>& positions) const;
 
  private:

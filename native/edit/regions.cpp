@@ -16,11 +16,13 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Cost of a column beside its rows, in rows. For the evaluation time it is about 50 (measured with
-// a noisy face in 1 and in 464 groups), for the file size 0. Any value from 8 to 64 gives a
+// Cost of a column in addition to its rows, in rows. Measured by evaluation time it is about 50 (a
+// noisy face in 1 and in 464 groups), by file size it is 0. Any value from 8 to 64 gives a
 // full-scale face the same groups.
 constexpr std::int64_t kColumnOverhead = 8;
-// Joints that share few controls would end in many small groups, which are slow to evaluate.
+// Clusters are merged until there are at most one for each kJointsOfGroup joints, or kFewGroups.
+// Otherwise joints that share few controls would end in many small groups, which are slow to
+// evaluate.
 constexpr std::size_t kJointsOfGroup = 14, kFewGroups = 16;
 constexpr std::int64_t kMostRows = 65535;  // the format counts rows of a LOD in 16 bits
 
@@ -43,7 +45,8 @@ std::int64_t columns_of_both(const Cluster& a, const Cluster& b) {
   return n;
 }
 
-// The gain of a merge; a smaller change is better. The distance decides between equal changes.
+// The change of cost by a merge; the smallest is the best. Of equal changes, the one with the
+// smaller distance of the clusters is better.
 struct Merge {
   std::int64_t change = 0;
   double distance = 0.0;
@@ -75,8 +78,8 @@ void join(Cluster& a, Cluster& b) {
   b = {};
 }
 
-// Merges the best pair while that lowers the total cost or there are too many groups. Each cluster
-// knows its best partner among the clusters after it.
+// Merges the best pair of clusters while that lowers the total cost or while there are too many
+// clusters. For each cluster the best partner among the clusters after it is stored.
 class Clustering {
  public:
   explicit Clustering(std::vector<Cluster>& clusters)
@@ -120,11 +123,11 @@ class Clustering {
   std::size_t count_;
 };
 
-// The strongest effect of each control on one joint.
+// The strongest effect of each control on one joint, as a share of the threshold.
 using Strengths = std::map<std::uint16_t, double>;
 
-// The strength below which a control does not count for a joint. If most of its controls are weak
-// (a faint expression, a threshold that is too high), the stronger half decides the joint's region.
+// The strength below which a control does not count for a joint. If most controls of the joint are
+// weak (a faint expression, or too high a threshold), only its stronger half counts.
 double least_strength(const Strengths& strengths, bool significant_only) {
   if (!significant_only || strengths.empty()) return 0.0;
   std::vector<double> all;
@@ -135,8 +138,8 @@ double least_strength(const Strengths& strengths, bool significant_only) {
 }
 
 std::vector<Vector> neutral_positions(const dna::Dna& dna) {
-  // Only distances of candidates with equal cost are compared: xyz angles in degrees are exact
-  // enough.
+  // The positions only decide between merges of equal cost. For that, angles in xyz order are exact
+  // enough, even if the file has another order.
   rig::EulerConvention euler;
   if (dna.descriptor.rotation_unit != 1) euler.radians_per_unit = 0.0174532925199432958f;
   const Skeleton skeleton(dna, euler);
@@ -183,7 +186,7 @@ std::vector<Cluster> list_clusters(const dna::Dna& dna, std::span<const Unit> un
   return out;
 }
 
-// Drops the bits of controls that drive none of the joints.
+// Removes the bits of controls that move no joint, which makes comparisons faster.
 void pack_controls(std::vector<Cluster>& clusters) {
   if (clusters.empty()) return;
   const std::size_t words = clusters[0].controls.size();
@@ -223,7 +226,8 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
     for (const std::uint32_t joint : cluster.joints) wanted[joint] = next;
     ++next;
   }
-  // Numbers the regions in the order of their first joints; joints that no unit moves have none.
+  // Numbers the regions in the order of their first joints. Joints that no unit moves have no
+  // region.
   Regions out{std::vector<std::uint32_t>(wanted.size(), kNoRegion), 0};
   std::vector<std::uint32_t> number(next, kNoRegion);
   for (const Unit& u : units) {

@@ -86,8 +86,8 @@ std::vector<std::vector<std::uint16_t>> list_regions(const detail::Regions& regi
   return out;
 }
 
-// Finds regions by significant coefficients, removes the small foreign ones, and repeats until none
-// is removed, so that a second regroup changes nothing.
+// Finds regions by significant coefficients and removes the small coefficients foreign to them.
+// Repeats this until none is removed, so that a second regroup changes nothing.
 detail::Regions settle(const dna::Dna& dna, const RegroupOptions& options,
                        std::vector<detail::Unit>& units, std::uint64_t& removed) {
   const detail::Effects effects(dna, options.threshold);

@@ -11,7 +11,8 @@
 
 namespace risorius::edit {
 
-/// Effects of a coefficient while its control is 1. A smaller effect counts as small; 0: none does.
+/// The effects below which a coefficient is small, measured while its control is 1. 0: no
+/// coefficient is small.
 struct Threshold {
   double translation_mm = 0.0;
   double rotation_degrees = 0.0;
@@ -23,9 +24,10 @@ struct RegroupOptions {
   /// them.
   std::vector<std::vector<std::uint16_t>> regions;
   Threshold threshold;
-  /// A column is foreign to a region if it moves at most this share of the region's joints.
+  /// A column of a region is foreign if its control moves at most this share of the region's
+  /// joints.
   double foreign_share = 0.25;
-  // Random poses that are compared, in addition to the single controls.
+  // Number of random poses that are compared, in addition to each control alone.
   std::uint32_t combinations = 200;
   std::uint64_t seed = 0;      // of the random poses
   std::uint32_t timed = 1000;  // evaluations that are timed; 0: none
@@ -37,7 +39,8 @@ struct GroupSizes {
   std::uint64_t nonzero = 0;
 };
 
-/// The largest difference of one kind between two rigs, and its place.
+/// The largest difference of one kind between two rigs, and the joint, expression and LOD at which
+/// it occurs.
 struct LargestChange {
   double value = 0.0;
   std::string joint;       // "" if nothing differs
@@ -66,16 +69,16 @@ struct Regrouped {
   RegroupReport report;
 };
 
-/// Rebuilds the joint groups of a face. Joints are put into regions; the rows of a region and the
-/// controls that move it make one dense group, in which rows of more LODs come first. Small
-/// coefficients in columns foreign to their region are removed. With a threshold of 0 the poses
-/// stay the same, except for the order of sums (on the scalar path, to the last bit). Each row is
-/// used at the same LODs as before.
+/// Rebuilds the joint groups of a face. Joints are put into regions. The rows of a region and the
+/// controls that move it make one dense group, in which rows that more LODs use come first. Small
+/// coefficients in columns foreign to their region are removed. With a threshold of 0 the poses are
+/// equal to the last bit on the scalar path; on other paths sums may have another order. Each row
+/// is used at the same LODs as before.
 ///
-/// Joints that quaternions turn keep every coefficient and the order of their product. A region
-/// gets several groups if several groups write one row, if LODs do not nest, or if columns of
-/// quaternions need different orders. A corrective that other parts of the rig read stays in use at
-/// each LOD where it is used.
+/// Joints with quaternions keep every coefficient and the order in which their rotations are
+/// multiplied. A region gets several groups if several groups write one row, if LODs do not nest,
+/// or if columns of quaternions need different orders. A corrective that other parts of the rig
+/// read remains in use at each LOD where it is used.
 ///
 /// Fails: kInvalidArgument, kInvalidIndex (regions, options), kLimitExceeded (the dense groups of a
 ///        region do not fit the format), and as validate and compile.

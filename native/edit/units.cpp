@@ -16,7 +16,7 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Number of LODs that use a row of a group: lods[l] > row.
+// Number of LODs that use a row. LOD l uses row r if lods[l] > r.
 std::uint32_t levels_of(const dna::JointGroup& g, std::uint32_t row, std::uint32_t lod_count) {
   std::uint32_t n = 0;
   for (std::uint32_t l = 0; l < lod_count && l < g.lods.size(); ++l) n += g.lods[l] > row ? 1 : 0;
@@ -25,7 +25,8 @@ std::uint32_t levels_of(const dna::JointGroup& g, std::uint32_t row, std::uint32
 
 bool rotates(std::uint16_t output) { return output % 9 >= 3 && output % 9 <= 5; }
 
-// One row with its controls in ascending order; values of a control that is named twice are added.
+// Makes a unit of one row, with its controls in ascending order. If the group names a control
+// twice, its values are added.
 void take_linear(const dna::JointGroup& g, std::uint32_t row, Unit& unit) {
   const std::size_t columns = g.input_indices.size();
   const float* from = g.values.data() + row * columns;
@@ -49,7 +50,8 @@ bool is_ascending(const std::vector<std::uint16_t>& values) {
   return std::ranges::adjacent_find(values, std::greater_equal<>()) == values.end();
 }
 
-// The rows that turn a joint, with columns in the order of their product.
+// Adds the columns and values of a quaternion joint's rotation rows, in the order in which the
+// columns' rotations are multiplied.
 void take_rotation(const dna::JointGroup& g, std::uint32_t group,
                    const std::vector<std::uint32_t>& order, Unit& unit) {
   const std::size_t columns = g.input_indices.size();
@@ -68,7 +70,7 @@ void take_rotation(const dna::JointGroup& g, std::uint32_t group,
   unit.order = is_ascending(unit.columns) ? kAscending : kOfGroup + group;
 }
 
-// In: turned  joint -> unit, of the quaternion joints of a group
+// Completes the units of the quaternion joints of a group. In: turned  joint -> number of its unit
 void take_rotations(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>& quaternions,
                     const std::map<std::uint32_t, std::size_t>& turned, std::vector<Unit>& units) {
   if (turned.empty()) return;
@@ -115,7 +117,7 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
   take_rotations(dna, index, quaternions, turned, out);
 }
 
-// Whether each LOD uses a row, finest first.
+// [LODs] whether each LOD uses a row, finest first.
 std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
   std::vector<bool> out(dna.descriptor.lod_count);
   const auto& lods = dna.behavior.joint_groups[row.group].lods;
@@ -123,8 +125,9 @@ std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
   return out;
 }
 
-// LODs nest if each row is used from LOD 0 up to some LOD. A unit whose rows skip a LOD can share a
-// group only with units whose rows skip the same LODs.
+// Puts units whose rows skip a LOD into chains. Usually each row is used from LOD 0 up to some LOD.
+// A unit whose rows skip a LOD can share a group only with units whose rows skip the same LODs, the
+// units of its chain.
 void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
   std::map<std::vector<std::vector<bool>>, std::vector<Unit*>> chains;
   for (Unit& unit : units) {
@@ -145,14 +148,14 @@ void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
   }
 }
 
-// The output of a unit: an attribute, or the rotation of a quaternion joint.
+// A number for the output of a unit: its attribute, or the rotation of its quaternion joint.
 std::uint32_t key_of(const Unit& unit) {
   const std::uint16_t output = unit.rows[0].output;
   return unit.is_quaternion && rotates(output) ? unit.joint * 9u + 3u : output;
 }
 
-// The row that decides whether a unit is written at a LOD. If an attribute stands twice among a
-// joint's rotations, the later row counts; of several attributes, the first.
+// The row that decides whether a unit is written at a LOD. If one of a joint's rotation attributes
+// has two rows, only the later row counts; among the attributes, the first row does.
 const Row& deciding_row(const Unit& unit) {
   const Row* first = nullptr;
   for (std::size_t i = 0; i < unit.rows.size(); ++i) {
@@ -164,7 +167,7 @@ const Row& deciding_row(const Unit& unit) {
   return *first;
 }
 
-// Whether a later unit overwrites this one at each LOD where it has a row.
+// Whether later units overwrite this one at each LOD where it has a row.
 bool is_hidden(const dna::Dna& dna, const Unit& unit, const std::vector<const Unit*>& later) {
   const auto& groups = dna.behavior.joint_groups;
   for (std::uint32_t l = 0; l < dna.descriptor.lod_count; ++l) {
@@ -176,8 +179,8 @@ bool is_hidden(const dna::Dna& dna, const Unit& unit, const std::vector<const Un
   return true;
 }
 
-// Removes units that later ones hide at every LOD, unless they keep a corrective in use or fix the
-// order of a bundle's columns.
+// Removes units that later ones overwrite at every LOD, unless they keep a corrective in use or
+// belong to a bundle, whose order of columns depends on all its units.
 void remove_hidden(const dna::Dna& dna, std::vector<Unit>& units) {
   const std::vector<bool> watched = watched_correctives(dna);
   std::map<std::uint32_t, std::vector<std::size_t>> writers;

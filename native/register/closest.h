@@ -16,7 +16,8 @@ namespace risorius::registering {
 using author::Triangle;
 using author::Vector3;
 
-/// A surface of triangles in a tree of boxes. It owns its points; queries may run on many threads.
+/// A surface of triangles in a search tree of boxes. It owns its points. Several threads may search
+/// at once.
 class ClosestPoints {
  public:
   static constexpr std::size_t kMostTriangles = 4'000'000;
@@ -32,6 +33,7 @@ class ClosestPoints {
     std::size_t threads = 0;  // 0: one for each core
   };
 
+  /// Builds the search tree.
   /// In: points     [V] in any unit
   ///     triangles  counter-clockwise seen from outside
   /// Fails: kInvalidValue (a point that is not finite), kInvalidIndex (a corner), kLimitExceeded
@@ -42,13 +44,15 @@ class ClosestPoints {
   ClosestPoints& operator=(ClosestPoints&&) noexcept;
 
   /// The closest point of the surface to each query.
-  /// In: normals  one for each query, of any length; empty: every triangle counts
+  /// In: normals  one for each query, of any length; triangles with too different normals are
+  ///              ignored; empty: every triangle counts
   /// Fails: kInvalidLength (normals), kInvalidValue (a query that is not finite)
   core::Result<std::vector<Hit>> nearest(const std::vector<Vector3>& queries,
                                          const std::vector<Vector3>& normals, Limits limits) const;
-  /// The first point of the surface on each ray, from either side; distance is in the unit of the
-  /// points. Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
-  /// direction)
+  /// The first point at which each ray meets the surface, from outside or inside. `distance` is in
+  /// the unit of the points.
+  /// Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
+  ///        direction)
   core::Result<std::vector<Hit>> first_hit(const std::vector<Vector3>& origins,
                                            const std::vector<Vector3>& directions,
                                            Limits limits) const;

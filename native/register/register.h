@@ -23,13 +23,13 @@ namespace risorius::registering {
 using author::Triangle;
 using author::Vector3;
 
-/// Triangles are counter-clockwise seen from outside.
+/// A surface of triangles, counter-clockwise seen from outside.
 struct Mesh {
   std::vector<Vector3> points;
   std::vector<Triangle> triangles;
 };
 
-/// A vertex of the template and the point of the target that it belongs to.
+/// A vertex of the template and the corresponding point of the target.
 struct Pair {
   std::uint32_t vertex = 0;
   Vector3 point{};
@@ -45,12 +45,13 @@ struct RegisterOptions {
   /// Millimetres per unit of the template. The target is scaled to the template's size before
   /// lengths are compared with limits in mm.
   double mm = 10.0;
-  /// [template vertices] not 0: the vertex has a counterpart on a target without holes; other
+  /// [template vertices] not 0: the vertex has a counterpart if the target has no hole there; other
   /// vertices follow their neighbours. Empty: all vertices outside cavities have a counterpart.
   std::vector<std::uint8_t> trusted;
   /// [template vertices] the mirror vertex, in the middle the vertex itself; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  /// Weight of the match of a vertex for its mirror vertex, in shares of that match's weight.
+  /// Each vertex also gets its mirror vertex's match, reflected, with this factor of its weight; 0:
+  /// no symmetry.
   double symmetry = 0.0;
   std::size_t nodes = 2000;  // number of nodes of the coarse steps
   double noise = 2.0;        // expected error of the points of pairs in mm
@@ -65,7 +66,7 @@ struct Registered {
   std::vector<std::uint8_t> trusted;   // not 0: the vertex has a counterpart on the target
 };
 
-/// Receives the finished share of the work, 0 to 1; stops the work if it returns false.
+/// Called with the share of the work that is done, 0 to 1; returning false stops the work.
 using Progress = std::function<bool(double)>;
 
 /// Registers a template onto a target.

@@ -12,7 +12,7 @@
 
 namespace risorius::registering {
 
-/// The Cholesky factors of a matrix, for many right sides.
+/// The Cholesky factors of a matrix, which solve systems with many right sides.
 class SparseCholesky {
  public:
   /// In: rows, columns, values  entries of the lower triangle; entries at the same place are
@@ -28,6 +28,7 @@ class SparseCholesky {
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   std::size_t size() const;
+  /// Solves systems with several right sides.
   /// In: right    [size][sides] right sides in row-major order
   ///     threads  0: one for each core; each solves some of the sides
   /// Returns the solutions [size][sides]. Fails: kInvalidLength (right)

@@ -32,8 +32,8 @@ namespace risorius::rig {
 struct ConditionalRow {
   std::uint16_t input = 0, output = 0;
   float from = 0, to = 0, slope = 0, cut = 0;  // from <= to
-  // Neighbouring rows with the same input and output form a run, of which at most one row counts.
-  // run_end is the first row behind the run.
+  // Neighbouring rows with the same input and output form a run. Only the first row of the run that
+  // applies counts. run_end is the first row behind the run.
   std::uint32_t run_end = 0;
 };
 
@@ -63,33 +63,34 @@ struct Watch {
 /// A joint group: a dense matrix that turns some controls into some joint attributes.
 ///
 /// The matrix is stored column by column, a column for each control, in joint_values or
-/// joint_halves. The columns of one control in all groups lie side by side, so that a control is
-/// one run of memory. Columns of kWidest rows and more begin on whole vectors; others have no
-/// padding.
+/// joint_halves. The columns of one control in all groups are stored one after the other, so that a
+/// control is one run of memory. Columns of kWidest rows and more begin on whole vectors; others
+/// have no padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
   std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
   // The first row of this group among the rows of all groups. A group of kWidest rows or more takes
-  // whole vectors of rows, so that the rest of its last vector is unused. Smaller groups lie side
-  // by side.
+  // whole vectors of rows, so that the rest of its last vector is unused. Smaller groups have no
+  // padding.
   std::uint32_t rows_begin = 0;
   std::uint32_t columns_begin = 0;  // its first column in group_columns
-  // The blocks of joint attributes that its rows reach at any LOD: see joint_pieces.
+  // The blocks of joint attributes that this group's rows write at any LOD: see joint_pieces.
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
-/// The reads that one control, or all controls together, cause in the joint groups of a LOD.
+/// Numbers of coefficients and columns that one control, or all controls together, make an
+/// evaluation read in the joint groups of a LOD.
 struct ControlReads {
   std::uint32_t values = 0;   // coefficients that an evaluation reads
   std::uint32_t columns = 0;  // the columns that hold these coefficients
 };
 
-/// One column of a joint group in the list of its control: its first value in joint_values or
-/// joint_halves, and the group, an index into joint_groups.
+/// One column of a joint group, in the list of its control: the offset of its first value in
+/// joint_values or joint_halves, and the number of the group.
 using JointColumn = simd::Addend;
 
-/// A joint whose rotation in one joint group is a product of quaternions. Each column that turns
-/// the joint gives one factor: a blend from no rotation to the column's quaternion, by the
+/// A joint whose rotation in one joint group is a product of quaternions. Each column that rotates
+/// the joint gives one factor: an interpolation from no rotation to the column's quaternion, by the
 /// control's value.
 struct QuaternionJoint {
   std::uint32_t joint = 0;
@@ -99,8 +100,9 @@ struct QuaternionJoint {
   std::uint32_t first_row = 0;
 };
 
-/// A column that turns joints by quaternions. The columns are ordered by group, and within a group
-/// as in the file: quaternions do not commute, so this order is the order of the product.
+/// A column that rotates joints by quaternions. The columns are ordered by group, and within a
+/// group as in the file. The rotations are multiplied in this order, because quaternions do not
+/// commute.
 struct QuaternionColumn {
   std::uint32_t control = 0;
   std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
@@ -124,8 +126,8 @@ struct RbfSolver {
   std::uint32_t targets_begin = 0;
   std::uint32_t inverse_begin = 0;  // the matrix [poses, poses] in rbf_inverses, if interpolative
   std::uint32_t interpolative = 0;  // 1: at the target of a pose the solver gives that pose alone
-  // The distance, the function that turns a distance into a weight, and the axis of a twist, as the
-  // numbers of the file; stages/rbf.cpp reads them.
+  // The distance, the function that turns a distance into a weight, and the axis of the twist, as
+  // numbers of the file format; stages/rbf.cpp defines them.
   std::uint32_t distance = 0, function = 0, axis = 0;
   std::uint32_t always_normalize = 0;  // 1: weights sum to 1 however small they are
 };
@@ -149,11 +151,11 @@ inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 /// memory of a Workspace (operation_values), where later operations read them.
 struct MlOperation {
   // kGather copies controls to values; kMlp runs a network (a multilayer perceptron); kWeightedSum
-  // adds up values of others; kScatter copies values to controls.
+  // adds values of other operations; kScatter copies values to controls.
   enum Kind : std::uint32_t { kGather = 1, kScatter = 2, kMlp = 3, kWeightedSum = 4 };
   std::uint32_t kind = kGather;
-  // The region whose mask switches the operation off: the region of its network, or for kScatter of
-  // the network whose values it writes. kNone: no mask.
+  // The region whose mask switches the operation off. For kMlp it is the region of its network, for
+  // kScatter the region of the network whose values it writes. kNone: no mask.
   std::uint32_t mask = kNone;
   std::uint32_t values_begin = 0, value_count = 0;      // its results, in operation_values
   std::uint32_t segments_begin = 0, segment_count = 0;  // its inputs, in ml_segments
@@ -169,8 +171,8 @@ struct MlControl {
   std::uint32_t control = 0;
   float rest = 0;  // what kScatter writes while the mask of the network is 0
 };
-/// A layer of a network: y = activation(W x + b). In ml_weights lie the `rows` values of b and then
-/// the columns of W, `rows` values each.
+/// A layer of a network: y = activation(W x + b). ml_weights has its b, `rows` values, and then the
+/// columns of W, `rows` values each.
 struct MlLayer {
   std::uint32_t weights_begin = 0, rows = 0, columns = 0;
   std::uint32_t activation = 0;  // the number that the file uses
@@ -181,17 +183,17 @@ struct MlLayer {
 struct MlJoint {
   std::uint32_t joint = 0;
   std::uint32_t is_quaternion = 0;  // 1: the rotation is a quaternion, 0: Euler angles
-  // The controls that hold tx ty tz, x y z w (Euler angles have no w) and sx sy sz; kNone: the
-  // attribute has no control.
+  // The controls with the values of tx ty tz, x y z w (Euler angles have no w) and sx sy sz; kNone:
+  // the attribute has no control.
   std::uint32_t controls[10] = {kNone, kNone, kNone, kNone, kNone,
                                 kNone, kNone, kNone, kNone, kNone};
 };
 
-/// A twist or swing setup. Four controls hold a rotation, which consists of a *twist* about an axis
-/// and a *swing* of that axis. Joints get shares of the one or the other, for example along a neck.
+/// A twist or swing setup. Four controls are a rotation, which consists of a *twist* about an axis
+/// and a *swing* of that axis. Joints get shares of one of them, for example along a neck.
 struct TwistSwing {
-  // The rotation of which joints get shares. kTwist: the twist; kUntwist: its inverse; kSwing: the
-  // inverse of the swing, and each joint also takes the whole inverse of the twist.
+  // The rotation of which joints get shares. kTwist: the twist; kUntwist: the inverse of the twist;
+  // kSwing: the inverse of the swing; in addition each joint gets the whole inverse of the twist.
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
   std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
   std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
@@ -215,49 +217,54 @@ constexpr std::uint32_t make_step(StepKind kind, std::uint32_t index) {
   return (static_cast<std::uint32_t>(kind) << 30) | index;
 }
 constexpr StepKind step_kind(std::uint32_t step) { return StepKind{step >> 30}; }
-/// An index into ml_operations, rbf_solvers or psds, by the kind of the step.
+/// The element of a step: an index into ml_operations, rbf_solvers or psds, depending on its kind.
 constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFFFu; }
 
-/// Each LOD has these lists of steps. A *settled* evaluation (settle = true) orders all steps by
-/// their dependencies; a *latent* one follows the reference, whose stages have a fixed order.
+/// Each LOD has these lists of steps. A *settled* evaluation (settle = true) sorts all steps by
+/// their dependencies. A *latent* one runs them in the fixed order of the reference evaluator's
+/// stages.
 enum StepList : std::uint32_t {
-  // Settled: networks and solvers that need no corrective. They run before all correctives.
+  // For settled evaluation: networks and solvers that need no corrective. They run before all
+  // correctives.
   kEarly,
-  // Settled: the other networks and solvers, and the correctives that are not watched (see psds),
-  // each behind the steps that it reads. Latent: its correctives.
+  // For settled evaluation: the other networks and solvers, and the correctives that are not
+  // watched (see psds), each after the steps that it reads. A latent evaluation runs only its
+  // correctives.
   kChained,
-  // Steps that depend on themselves, directly or through others, and the steps that depend on them.
-  // A settled evaluation leaves them at rest; a latent one runs their correctives.
+  // Steps that depend on themselves, directly or through others, and steps that depend on them. A
+  // settled evaluation does not run them, so that their outputs remain at rest. A latent one runs
+  // their correctives.
   kCyclic,
-  // Latent: networks and then solvers, in the order of the file.
+  // For latent evaluation: networks and then solvers, in the order of the file.
   kReference,
   kStepLists  // the number of lists
 };
 
-/// Sizes and settings: plain numbers.
+/// The sizes and settings of a compiled face.
 struct RigHeader {
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
-  // The control vector is raw | corrective | network | RBF pose. These are the lengths of the first
-  // two parts and of the whole; GUI controls are no part of it.
+  // The control vector has four parts: raw, corrective, network and RBF pose controls. raw_count
+  // and psd_count are the lengths of the first two parts, control_count is the length of the
+  // vector. GUI controls do not belong to it.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
   std::uint32_t operation_values = 0;  // floats of scratch memory that operations compute
   std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
   std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
   std::uint32_t mask_count = 0;                       // regions of networks
-  // The number of leading channels whose indices and controls are consecutive: one copy serves
-  // them.
+  // The number of channels at the beginning whose numbers and controls both are consecutive, so
+  // that one copy sets all of them.
   std::uint32_t shape_run = 0;
   std::uint32_t joint_stride = 9;  // attributes of a joint; with quaternions 10
   EulerConvention euler;
-  // Networks may move joints in axes other than the face's. Then ml_converted is 1, v * ml_basis
-  // takes a vector from the networks' axes to the face's, and ml_euler is their convention of Euler
+  // 1 if networks move joints in other axes than the face's. Then v * ml_basis converts a vector
+  // from the networks' axes to the face's, and ml_euler is the networks' convention of Euler
   // angles.
   std::uint32_t ml_converted = 0;
   EulerConvention ml_euler;
   float ml_basis[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 
-/// The arrays. A is the container of the elements: std::vector or a view.
+/// The arrays of a compiled face. A is the container of the elements: std::vector or a view.
 template <template <class> class A>
 struct RigArrays {
   // Names, back to back: raw controls, GUI controls, ignored layers. Name t ends at text_ends[t].
@@ -266,22 +273,22 @@ struct RigArrays {
 
   A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
   A<float> initial_controls;  // [controls]: the control vector at rest
-  // The table from GUI controls to raw controls, and the same rows sorted for the inverse: ranges
-  // by GUI control, in the order of their first rows.
+  // The table from GUI controls to raw controls. For the inverse, gui_ranges lists ranges of rows
+  // with equal bounds, sorted by GUI control and then by their first rows.
   A<ConditionalRow> gui_rows;
   A<GuiRange> gui_ranges;
   A<std::uint32_t> gui_range_rows;  // indices into gui_rows
 
-  // Correctives. Most rest at 0, and evaluation should not read these. A corrective is *watched* if
-  // all of its factors have their values before the first corrective is computed: it is listed at
-  // one of its factors, the one with the shortest list. While that factor is 0 the corrective is 0,
-  // and evaluation does not visit it.
+  // Correctives. Most of them are 0, and evaluation should not visit these. A corrective is
+  // *watched* if all of its factors have their values before the first corrective is computed. It
+  // is then in the list of one of its factors, the factor with the shortest list. While that factor
+  // is 0 the corrective is 0, and evaluation does not visit it.
   A<Psd> psds;                    // in the order of their watchers; no two have the same output
   A<std::uint16_t> psd_factors;   // controls
   A<std::uint32_t> watch_begins;  // [LODs, controls + 1]: where each control's list begins
   A<Watch> watched;               // the lists
-  // Correctives that are not watched, networks and solvers are steps. List l of a LOD is
-  // steps[step_begins[lod * kStepLists + l]] up to the begin of the next list.
+  // Steps: correctives that are not watched, networks and solvers. List l of a LOD begins at
+  // steps[step_begins[lod * kStepLists + l]] and ends where the next list begins.
   A<std::uint32_t> step_begins;
   A<std::uint32_t> steps;
 
@@ -293,30 +300,31 @@ struct RigArrays {
   A<float> joint_values;              // the columns as float32 ...
   A<std::uint16_t> joint_halves;      // ... or as float16; one of the two arrays is empty
   A<std::uint16_t> joint_outputs;     // [rows of all groups]: the joint attribute of each row
-  // The way from rows to joint attributes. The attributes are cut into blocks of 16. For each block
-  // of each LOD one piece tells which attributes take values and where these values begin in the
-  // rows. Attributes whose rows lie elsewhere have extra pieces.
+  // How rows are copied to joint attributes. The attributes are divided into blocks of 16. For each
+  // LOD and block one piece tells which attributes take values and at which row these values begin.
+  // Attributes whose values are not in the following rows have extra pieces.
   A<simd::Piece> joint_pieces;    // [LODs, blocks]
   A<std::uint32_t> extra_begins;  // [LODs + 1]
   A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]: where each control's columns begin
   A<JointColumn> joint_columns;          // by control, then by group
-  // The same columns by group, then by control, for frames in which most of them are active. The
-  // weight of a column is its control.
+  // The same columns sorted by group and then by control, for frames in which most columns are
+  // active. The weight of a column is the value of its control.
   A<simd::Column> group_columns;
-  // [LODs, controls + 1]: one entry for each control; the last entry is for all. Empty if a
-  // coefficient is not finite, because a column at rest must not be read then.
+  // [LODs, controls + 1]: one entry for each control; the last entry is for all controls together.
+  // Empty if a coefficient is not finite, because columns of controls at 0 must not be read then.
   A<ControlReads> control_reads;
   A<std::uint16_t> joints_written;  // joints that any group moves at any LOD, ascending
 
-  // Joints that quaternions turn.
+  // Joints that are rotated by quaternions, and the columns and terms of these rotations.
   A<QuaternionJoint> quaternion_joints;
   A<QuaternionColumn> quaternion_columns;
   A<QuaternionTerm> quaternion_terms;
   A<std::uint32_t> quaternion_column_begins;  // [controls + 1], or empty without such joints
   A<std::uint32_t> quaternion_column_list;    // indices into quaternion_columns, by control
-  // If poses hold quaternions: the joints whose Euler angles need converting. The joints of coarse
-  // LODs come first; a LOD converts the first euler_joint_lods[lod].
+  // If rotations in poses are quaternions: the joints whose Euler angles must be converted to
+  // quaternions. Joints of coarse LODs come first, so that a LOD converts the first
+  // euler_joint_lods[lod].
   A<std::uint16_t> euler_joints;
   A<std::uint32_t> euler_joint_lods;  // [LODs]
 
@@ -346,7 +354,8 @@ struct RigArrays {
   A<std::uint16_t> shape_inputs, shape_outputs;
   A<std::uint32_t> shape_lods;  // [LODs]
   // The channels of each control, as indices into shape_inputs, for frames in which most controls
-  // rest. Both are empty if two entries write one channel: then the last one counts, even at rest.
+  // are 0. Both arrays are empty if two entries write one channel: then the last entry counts, even
+  // if its control is 0.
   A<std::uint32_t> shape_begins;  // [controls + 1]
   A<std::uint16_t> shapes_of_controls;
   // The table from controls to animated maps. A LOD has the first map_lods[lod] rows.

@@ -80,8 +80,8 @@ Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
 
 }  // namespace
 
-// Delays the hash of a block that was compiled here: it takes a tenth of the time of making the
-// block, and a caller that never stores the bytes does not need it.
+// Delays the hash of a block that this process compiled. The hash takes a tenth of the time of
+// making the block, and only a caller that stores the bytes needs it.
 struct Rig::Seal {
   std::span<std::uint8_t> bytes;
   std::once_flag done;

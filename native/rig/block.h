@@ -19,16 +19,17 @@ enum class BlockCheck {
   kFull,    // also checks every index: for bytes of unknown origin, even forged ones
 };
 
-/// The joint_values of a Rig whose data has none. They are written straight into the block, because
-/// copying them would take longer than everything else.
+/// The joint_values of a Rig, if they are not in its RigData. They are written straight into the
+/// block, because copying them would take longer than all the rest.
 struct LateValues {
   std::size_t count = 0;
   std::function<void(std::span<float>)> write;  // overwrites all of them
 };
 
-/// Copies the arrays into one block and opens it.
+/// Copies the arrays into one block and opens it as a Rig.
 /// In:    data     the result of compile(); it is not checked
 ///        kernels  used in every evaluation; they must outlive the rig
+///        late     writes joint_values if `data` does not have them
 /// Fails: kLimitExceeded (an array with more elements than an index can address)
 core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
                            const LateValues& late = {});
@@ -42,10 +43,11 @@ core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
 core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,
                            BlockCheck check, const simd::Kernels& kernels);
 
-/// The version of a block; open_rig refuses other versions.
+/// The version of a block's layout; open_rig rejects blocks of other versions.
 std::uint32_t block_version();
 
-/// Puts the hash of a block's bytes into its header. In: at least a header's size.
+/// Computes the hash of a block and writes it into the block's header. In: bytes  at least as long
+/// as a header
 void seal_block(std::span<std::uint8_t> bytes);
 
 }  // namespace risorius::rig

@@ -15,7 +15,7 @@ using core::ErrorCode;
 using core::fail;
 using core::Status;
 
-// Checks the indices of one array against the size of another.
+// Checks indices of the arrays, and remembers the first array with a wrong one.
 class IndexCheck {
  public:
   template <class T, class Get>
@@ -27,7 +27,8 @@ class IndexCheck {
   void below(const char* where, View<std::uint16_t> values, std::uint64_t limit) {
     below(where, values, limit, [](std::uint16_t v) { return v; });
   }
-  /// Demands begins[0] = 0, ascending values, and a last value equal to the size of the array.
+  /// Demands that the values ascend and that the last one equals the size of the array into which
+  /// they point.
   void begins(const char* where, View<std::uint32_t> values, std::size_t size) {
     demand(where, std::ranges::is_sorted(values) && (values.empty() || values.back() == size));
   }
@@ -86,7 +87,8 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   c.below("watched", r.watched, r.control_count, [](const Watch& w) { return w.other; });
   if (!c.status()) return;
   for (const Watch& w : r.watched) c.demand("watched", r.psds[w.psd].output >= r.raw_count);
-  // A corrective is listed at most once per LOD, so that the list of candidates cannot overflow.
+  // A corrective must be in at most one list of a LOD, because the list of candidates has one place
+  // for each corrective.
   std::vector<std::uint32_t> seen(r.psds.size(), kNone);
   for (std::uint32_t l = 0; l < r.lod_count; ++l) {
     const std::uint32_t* begins = r.watch_begins.data() + std::size_t{l} * (r.control_count + 1);
@@ -100,7 +102,7 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   }
 }
 
-// Every entry is read as a column of its group.
+// Checks group_columns: each entry must be a column of its group with all its rows.
 void check_group_columns(const Rig& r, std::uint64_t values, IndexCheck& c) {
   std::size_t i = 0;
   for (const JointGroup& g : r.joint_groups) {
@@ -147,7 +149,8 @@ void check_groups(const Rig& r, IndexCheck& c) {
   c.below("live_groups", r.live_groups, r.joint_groups.size() + 1, most);
 }
 
-// A LOD may place only rows that it computes: other rows hold values of earlier frames.
+// The pieces of a LOD may only copy rows that it computes: other rows still have the values of
+// earlier frames.
 void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
   std::vector<std::uint32_t> live_before(r.joint_outputs.size() + 1);  // as a running count
   for (std::uint32_t i = 0; i < r.live_groups[lod]; ++i) {
@@ -169,7 +172,8 @@ void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
   demand("extra_pieces", r.extra_pieces.subspan(extra[0], extra[1] - extra[0]));
 }
 
-// The extra pieces of a LOD are looked up by block, so they must be sorted.
+// Whether the extra pieces of each LOD are sorted by block, because evaluation looks them up by
+// block.
 bool in_order(const Rig& r) {
   for (std::size_t l = 0; l + 1 < r.extra_begins.size(); ++l) {
     const std::uint32_t* begin = r.extra_begins.data() + l;
@@ -199,7 +203,8 @@ void check_pieces(const Rig& r, IndexCheck& c) {
   for (const simd::Piece& p : r.extra_pieces) {
     c.demand("extra_pieces", p.block < blocks && (p.block + 1u < blocks || (p.mask & ~last) == 0));
   }
-  // A block outside of the group's range would be left out while the group moves it.
+  // Each block of attributes that a group writes must be in the group's range of blocks, because
+  // evaluation skips the blocks outside of it.
   for (const JointGroup& g : r.joint_groups) {
     c.demand("joint_groups", g.blocks_begin <= g.blocks_end && g.blocks_end <= blocks);
     for (std::uint32_t row = 0; row < g.row_count && c.status(); ++row) {
@@ -234,7 +239,7 @@ void check_steps(const Rig& r, IndexCheck& c) {
         c.demand("steps", false);
     }
   }
-  // Only the lists of settled evaluation may hold correctives.
+  // Correctives may only be in the lists kChained and kCyclic.
   for (std::size_t i = 0; i + 1 < r.step_begins.size() && c.status(); ++i) {
     if (i % kStepLists != kEarly && i % kStepLists != kReference) continue;
     for (std::uint32_t s = r.step_begins[i]; s < r.step_begins[i + 1]; ++s) {

@@ -7,11 +7,12 @@
 
 namespace risorius::rig::detail {
 
-/// Whether scratch memory is at most 1 MiB plus 64 times the block. The counts of values and
-/// regions need this check because no array backs them.
+/// Whether an evaluation needs at most 1 MiB plus 64 times the block's size as scratch memory. The
+/// block only states the numbers of operation values and regions and has no array of that size, so
+/// that a forged block could demand any amount.
 bool scratch_fits(const Rig& r);
 
-/// Fails: kInvalidIndex (an index or size in the block that evaluation must not follow).
+/// Checks all indices and sizes that evaluation follows. Fails: kInvalidIndex
 core::Status check_everything(const Rig& rig);
 
 }  // namespace risorius::rig::detail

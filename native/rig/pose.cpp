@@ -5,7 +5,8 @@ namespace risorius::rig {
 
 namespace {
 
-// The rows of each group as the kernels add them: wide groups take whole vectors.
+// The rows of each group at each LOD, as the kernels add them: groups of at least kWidest rows take
+// whole vectors.
 std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   std::vector<simd::Rows> all;
   for (std::uint32_t l = 0; l < rig.lod_count; ++l) {
@@ -18,7 +19,7 @@ std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   return all;
 }
 
-// Joints that no Euler angles turn, if poses hold quaternions.
+// If rotations in poses are quaternions: the joints that no Euler angles rotate.
 std::vector<std::uint16_t> straight_joints(const Rig& rig) {
   if (rig.joint_stride != 10) return {};
   std::vector<bool> turns(rig.joint_count);
@@ -64,7 +65,7 @@ Workspace make_workspace(const Rig& rig) {
   work.solver.resize(std::size_t{rig.solver_inputs} + 2 * std::size_t{rig.solver_poses});
   work.masks.assign(rig.mask_count, 1.0f);
   work.operation_values.resize(rig.operation_values);
-  // The weight of the biases lies behind the inputs of a layer.
+  // The input of the biases, 1, is stored behind the inputs of a layer.
   for (auto& layer : work.layers) {
     layer.resize(simd::rounded_up(std::size_t{rig.widest_layer}) + 1);
     layer.back() = 1.0f;

@@ -23,7 +23,7 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
-/// The caller's memory to which a pose is written, with the lengths of Pose.
+/// Memory of the caller for a pose. Each array is as long as the Pose's list of the same name.
 struct PoseView {
   float* joints = nullptr;
   float* blend_shapes = nullptr;
@@ -43,9 +43,9 @@ enum class Traversal : std::uint8_t {
   kWhole     // all columns, in the order of group_columns, if all coefficients are finite
 };
 
-/// The active controls for which something in a workspace was computed: it stays valid while the
-/// same controls are not 0. In a film of 60 frames per second, five frames of six have the active
-/// controls of the frame before.
+/// The active controls for which a list in a workspace was computed. The list can be used again
+/// while the same controls are active. In an animation of 60 frames per second, five of six frames
+/// have the same active controls as the frame before.
 struct KeptControls {
   std::vector<std::uint16_t> controls;  // [controls]: the first `count` entries are valid
   std::size_t count = 0;
@@ -63,18 +63,19 @@ struct KeptControls {
 };
 
 /// The scratch memory of an evaluation. Threads that evaluate at the same time need one each. The
-/// alignment keeps two of them out of one cache line, where they would slow each other down. Only
-/// masks, traversal, whole_frames and added_frames concern a caller.
+/// alignment keeps two workspaces out of one cache line, where they would slow each other down. A
+/// caller may use only masks, traversal, whole_frames and added_frames.
 struct alignas(128) Workspace {
-  // Which controls are not 0.
-  // The active controls, ascending; the first active_count are valid.
+  // Active controls.
+  // The controls that are not 0, ascending; the first active_count are valid.
   std::vector<std::uint16_t> active;
   std::size_t active_count = 0;
   std::size_t raw_active = 0;  // number of raw controls among them
-  // A sum of touched values. Nothing reads it; it keeps the compiler from dropping the reads, which
-  // bring memory into the cache.
+  // A sum of values that were read only to bring their memory into the cache. Nothing reads the
+  // sum; it keeps the compiler from removing the reads.
   std::uint32_t touched = 0;
-  // In evaluate_frames: earlier frames have read most of the memory that this one needs.
+  // In evaluate_frames: earlier frames have already brought most of the needed memory into the
+  // cache.
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
@@ -86,7 +87,8 @@ struct alignas(128) Workspace {
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
   KeptControls listed_for;  // the active controls for which moves and blocks hold
-  // The traversal for which moves and blocks hold; after kAdded, columns and ends are not valid.
+  // The traversal of the frame in which moves and blocks were computed; after kAdded, columns and
+  // ends are not valid.
   Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
@@ -99,8 +101,8 @@ struct alignas(128) Workspace {
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count entries are valid
-  // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes
-  // it, so all other blocks are 0 already. Empty: the content of the pose is unknown.
+  // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes to
+  // it, so that all other blocks are 0 already. Empty: the content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
   std::vector<std::uint16_t> straight_joints;  // joints that no Euler angles turn at any LOD
@@ -112,13 +114,13 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> operation_values;  // results of operations
   core::AlignedVector<float> layers[2];         // input and output of a network layer
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
-  // For evaluate_frames, which evaluates kFrames frames together.
-  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in any frame
+  // Memory of evaluate_frames, which evaluates kFrames frames together.
+  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in some frame
   core::AlignedVector<float> frame_weights;  // [controls, kFrames]: their values; those of
                                              // correctives and networks are 0 between calls
 };
 
-/// A pose and a workspace of the sizes that the rig needs.
+/// Make a pose and a workspace of the sizes that the rig needs.
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
 /// A workspace for evaluate_frames; evaluate can use it too.

@@ -20,7 +20,7 @@ inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
 
-/// Of a 3x3 matrix in row order. Negative if the matrix mirrors.
+/// The determinant of a 3x3 matrix in row order. It is negative if the matrix mirrors.
 inline float determinant(std::span<const float, 9> m) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
          m[2] * (m[3] * m[7] - m[4] * m[6]);
@@ -35,7 +35,7 @@ struct EulerConvention {
   float radians_per_unit = 1;
 };
 
-/// The rotation of Euler angles. In: angles about x y z, in the unit of the convention
+/// Converts Euler angles to a quaternion. In: angles  about x y z, in the unit of the convention
 inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3>& angles) {
   Quaternion q;
   for (const std::uint8_t axis : c.order) {
@@ -48,11 +48,11 @@ inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3
   return q;
 }
 
-/// The inverse of from_euler. In: q of length 1. Out: angles about x y z; in gimbal lock the last
-/// angle of the order is 0
+/// Converts a quaternion to Euler angles, the inverse of from_euler. In: q  of length 1. Out:
+/// angles about x y z; in gimbal lock the last angle of the order is 0
 inline std::array<float, 3> to_euler(const EulerConvention& c, const Quaternion& q) {
   const float m[3][3] = {
-      // rows are the images of the axes (row vectors)
+      // Row i is the image of axis i (row vectors).
       {1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)},
       {2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z + q.w * q.x)},
       {2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x * q.x + q.y * q.y)}};

@@ -15,28 +15,29 @@
 
 namespace risorius::rig {
 
-/// Views into one block of bytes that any number of Rigs may share.
+/// A compiled face. Its arrays are views into one block of bytes, which any number of Rigs may
+/// share.
 class Rig : public RigHeader, public RigArrays<View> {
  public:
   const simd::Kernels* kernels = nullptr;
-  /// A number that is unique among the Rigs that this process opens (copies share it); never 0 for
-  /// an opened Rig. A workspace keeps results of earlier frames under this number.
+  /// Unique among the Rigs that this process opens (copies share it); never 0 for an opened Rig. A
+  /// workspace remembers this number with its results of earlier frames.
   std::uint64_t number = 0;
 
   std::vector<std::string> raw_control_names() const { return texts(0, raw_count); }
   std::vector<std::string> gui_control_names() const { return texts(raw_count, gui_count); }
-  /// Layers of the file's behavior that are not evaluated.
+  /// Ids of behavior layers of the file that the evaluator does not know.
   std::vector<std::string> ignored_layers() const {
     return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
   }
-  /// In: lod below the number of LODs. Out: steps, see make_step.
+  /// The steps of a list at a LOD, see make_step. In: lod  below the number of LODs
   std::span<const std::uint32_t> steps_of(std::uint32_t lod, StepList list) const {
     const std::uint32_t* begin = step_begins.data() + std::size_t{lod} * kStepLists + list;
     return steps.subspan(begin[0], begin[1] - begin[0]);
   }
   bool is_half() const { return !joint_halves.empty(); }
-  /// The whole Rig as bytes: a header with version and hash, then the arrays. Such bytes can be
-  /// kept in a file as a cache for machines of the same byte order. The first call for a compiled
+  /// The whole Rig as bytes: a header with version and hash, then the arrays. The bytes can be
+  /// stored in a file as a cache for machines of the same byte order. The first call for a compiled
   /// Rig computes the hash; calls are thread-safe.
   std::span<const std::uint8_t> block() const;
   std::size_t memory_bytes() const { return sizeof(Rig) + block_.size(); }

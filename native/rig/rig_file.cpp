@@ -20,8 +20,8 @@ core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, 
   };
   if (file && by == bytes::ReadBy::kMap && !trusted()) file = bytes::read_file(path);
   if (!file) return std::move(file).propagate();
-  // A disk may have changed a bit of any file: the hash is skipped only if the caller vouches for
-  // it.
+  // A faulty disk may have changed a bit of any file. The hash is therefore skipped only if the
+  // caller guarantees the bytes.
   const BlockCheck own = trust == Trust::kCaller ? BlockCheck::kHeader : BlockCheck::kHash;
   const BlockCheck check = trusted() ? own : BlockCheck::kFull;
   auto rig = open_rig(file->bytes, file->owner, check, kernels);

@@ -22,7 +22,7 @@ RISORIUS_INLINE std::uint32_t from_big_endian(std::uint32_t v) {
   return (v >> 24) | ((v >> 8) & 0xFF00u) | ((v << 8) & 0xFF0000u) | (v << 24);
 }
 
-// Reads the number at `from` and copies it to `to`.
+// Copies a big-endian number to `to` in the machine's byte order, and returns it.
 template <class Word>
 RISORIUS_INLINE Word copy_number(const std::uint8_t* from, void* to) {
   Word v;

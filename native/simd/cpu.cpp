@@ -15,8 +15,8 @@ namespace risorius::simd {
 
 #ifdef RISORIUS_X86
 
-// Queries the processor directly, because __builtin_cpu_supports of some compilers always returns
-// false.
+// The following functions query the processor directly, because __builtin_cpu_supports always
+// returns false with some compilers.
 namespace {
 
 struct Leaf {
@@ -43,7 +43,8 @@ Leaf read_leaf(unsigned number) {
   return __get_cpuid_count(number, 0, &leaf.a, &leaf.b, &leaf.c, &leaf.d) != 0 ? leaf : Leaf{};
 }
 
-// The intrinsic _xgetbv would need a compiler option that allows such instructions everywhere.
+// The XCR0 register: the kinds of registers that the system saves. The intrinsic _xgetbv would need
+// a compiler option for the whole file.
 unsigned saved_registers() {
   unsigned low = 0, high = 0;
   __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
@@ -59,7 +60,7 @@ struct Features {
 Features detect() {
   const Leaf first = read_leaf(1), seventh = read_leaf(7);
   const auto has = [](unsigned word, int bit) { return (word >> bit & 1) != 0; };
-  // The registers that the system saves when it switches threads.
+  // The kinds of registers that the system saves when it switches threads.
   const unsigned saved = has(first.c, 27) ? saved_registers() : 0;
   const bool avx = (saved & 0x06) == 0x06, wide = (saved & 0xE6) == 0xE6;
   const bool avx2 = avx && has(first.c, 12) && has(first.c, 29) && has(seventh.b, 5);

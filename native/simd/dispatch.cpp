@@ -10,7 +10,7 @@ namespace risorius::simd {
 
 namespace {
 
-// In ascending order of preference.
+// The tables of functions, the best last; null if the CPU does not support one.
 std::array<const Kernels*, 5> tables() {
   return {&scalar_kernels(), sse4_kernels(), neon_kernels(), avx2_kernels(), avx512_kernels()};
 }

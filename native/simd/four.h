@@ -12,7 +12,7 @@
 
 namespace risorius::simd {
 
-/// Four numbers. NaN stays NaN.
+/// Four float32 in one register. If an operand is NaN, the result is NaN.
 #if defined(__x86_64__) || defined(_M_X64)
 struct Four {
   __m128 v;
@@ -21,7 +21,7 @@ struct Four {
   void store(float* p) const { _mm_storeu_ps(p, v); }
   Four operator*(Four o) const { return {_mm_mul_ps(v, o.v)}; }
   Four operator+(Four o) const { return {_mm_add_ps(v, o.v)}; }
-  // If the first operand is NaN, these instructions return the second.
+  // These instructions return the second operand if one is NaN, so that v must be second.
   Four at_least(float x) const { return {_mm_max_ps(_mm_set1_ps(x), v)}; }
   Four at_most(float x) const { return {_mm_min_ps(_mm_set1_ps(x), v)}; }
   bool any_but_0() const { return _mm_movemask_ps(_mm_cmpneq_ps(v, _mm_setzero_ps())) != 0; }
@@ -70,8 +70,8 @@ struct Four {
 #endif
 
 /// Transposes four rows of four numbers.
-/// In:  from  4 numbers at each of from, from + stride, from + 2 stride and from + 3 stride
-/// Out: a, b, c, d  4 numbers each: the first, second, third and fourth of each row
+/// In:  from  rows of 4 numbers at from, from + stride, from + 2 stride and from + 3 stride
+/// Out: a, b, c, d  4 numbers each: the first, second, third and fourth number of each row
 inline void turn_four(const float* from, std::size_t stride, float* a, float* b, float* c,
                       float* d) {
 #if defined(__x86_64__) || defined(_M_X64)

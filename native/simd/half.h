@@ -10,7 +10,7 @@ namespace risorius::simd {
 
 inline constexpr float kLargestHalf = 65504.0f;
 
-/// In: a finite half. Exact.
+/// Converts a half float exactly. In: half  finite
 inline float from_half(std::uint16_t half) {
   // The exponent biases differ by 112: multiplying by 2^112 corrects that, for denormals too.
   const float magnitude = std::bit_cast<float>((half & 0x7FFFu) << 13) * 0x1p112f;
@@ -18,7 +18,7 @@ inline float from_half(std::uint16_t half) {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | sign);
 }
 
-/// To the nearest half, ties to even. In: |value| <= kLargestHalf.
+/// Rounds to the nearest half float, ties to even. In: |value| <= kLargestHalf.
 inline std::uint16_t to_half(float value) {
   const std::uint32_t sign = (std::bit_cast<std::uint32_t>(value) >> 16) & 0x8000u;
   const float magnitude = std::fabs(value);

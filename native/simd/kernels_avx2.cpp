@@ -20,8 +20,9 @@ namespace risorius::simd {
 
 namespace {
 
-// For each mask of eight places: the index of the value that each place takes, with the highest bit
-// set if it takes one. A shuffle reads the lowest three bits, a blend the highest.
+// For each mask of eight places, an entry for each place: the index of the value that the place
+// gets, with bit 7 set, or 0. The shuffle uses only the lowest three bits, the blend only the
+// highest.
 constexpr auto kExpandOrders = [] {
   std::array<std::array<std::uint8_t, 8>, 256> orders{};
   for (std::size_t mask = 0; mask < 256; ++mask) {
@@ -33,7 +34,7 @@ constexpr auto kExpandOrders = [] {
   return orders;
 }();
 
-// Blends two columns of the matrix in each register.
+// Sums weighted matrices, with two columns of the matrix in each register.
 struct ColumnsByTwo {
   struct Sum {
     __m256 c[2];
@@ -62,8 +63,8 @@ struct ColumnsByTwo {
     _mm_storel_pi(reinterpret_cast<__m64*>(out), moved);
     _mm_store_ss(out + 2, _mm_movehl_ps(moved, moved));
   }
-  // Products of the columns with the coordinates of a point, added in pairs. In: numbers  four
-  // numbers that hold the point from kFirst on
+  // Products of the columns with the coordinates of a point, added in pairs.
+  // In: numbers  four numbers, of which three from kFirst on are the point
   template <int kFirst>
   RISORIUS_INLINE static __m256 products(const Sum& sum, const float* numbers) {
     constexpr int x = kFirst, y = x + 1, z = x + 2;
@@ -73,7 +74,7 @@ struct ColumnsByTwo {
                      _mm256_blend_ps(_mm256_permute_ps(both, z * 0x55), _mm256_set1_ps(1.0f), 0xF0);
     return _mm256_fmadd_ps(sum.c[0], first, _mm256_mul_ps(sum.c[1], second));
   }
-  // For four consecutive vertices.
+  // Writes four consecutive vertices.
   RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
     const __m256 a = products<0>(sums[0], points), b = products<0>(sums[1], points + 3),
                  c = products<0>(sums[2], points + 6), d = products<1>(sums[3], points + 8);
@@ -100,8 +101,9 @@ struct V {
   static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;
   RISORIUS_INLINE static Reg zero() { return _mm256_setzero_ps(); }
-  // Batches need all sixteen registers: twelve sums, three of rows, a weight. Without the empty
-  // statement Clang 22 loads the next weight too early and spills sums in the innermost loop.
+  // Batches need all sixteen registers: twelve for sums, three for rows, one for a weight. Without
+  // the empty asm statement Clang 22 loads the next weight too early, and moves sums to memory in
+  // the innermost loop.
   RISORIUS_INLINE static Reg set(float v) {
     Reg all = _mm256_set1_ps(v);
 #if defined(__GNUC__)
@@ -115,7 +117,8 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
-  // The values that eight places take, the index of the first, and whether there is any.
+  // For eight places: the value that each place gets, the index of the first value, and whether any
+  // place gets one.
   struct Half {
     __m256i order;
     std::size_t from;
@@ -140,8 +143,8 @@ struct V {
     expand_8(from, o.low, zero(), to);
     expand_8(from, o.high, zero(), to + 8);
   }
-  // Other places are rewritten with their own values, because some CPUs take 12 cycles for a masked
-  // store. Two of three extra pieces touch only one half.
+  // Places without a value are rewritten with their old values, because a masked store takes 12
+  // cycles on some CPUs. Two of three extra pieces touch only one half.
   RISORIUS_INLINE static void expand_more(const float* from, const Order& o, float* to) {
     if (o.low.any) expand_8(from, o.low, load(to), to);
     if (o.high.any) expand_8(from, o.high, load(to + 8), to + 8);

@@ -17,15 +17,16 @@ namespace risorius::simd {
 
 namespace {
 
-// Sixteen rotations at a time, four in a register. The sines load exactly these registers; loads
-// across two half stores would wait for both. The fourth number of each rotation is read and
-// written with the others.
+// Converts sixteen rotations at once, four in a register. The function for the sines then loads
+// exactly these registers; loads that span two stores of half a register would have to wait for
+// both. The number after each rotation is read and written with it.
 struct SixteenByFour {
   static_assert(kTurns == 16);
-  // With masks, because gcc 12 warns about reads of unset values in the plain intrinsics.
+  // Intrinsics with masks are used, because gcc 12 warns about reads of unset values in intrinsics
+  // without masks.
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kFour = 0xF;
-  // In each quarter: r[k] lane i becomes r[i] lane k.
+  // Transposes the registers in each quarter: lane i of r[k] becomes lane k of r[i].
   RISORIUS_INLINE static void transpose(__m512 (&r)[4]) {
     const __m512 a = _mm512_maskz_unpacklo_ps(kAll, r[0], r[1]),
                  b = _mm512_maskz_unpackhi_ps(kAll, r[0], r[1]),
@@ -61,7 +62,7 @@ struct SixteenByFour {
       _mm_storeu_ps(rotations + at[i + 12], _mm512_maskz_extractf32x4_ps(kFour, r[i], 3));
     }
   }
-  // Like OneByOne, but one instruction gathers the signs.
+  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m512i most = _mm512_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm512_set1_epi32(0x7FFFFFFF);
@@ -75,9 +76,10 @@ struct SixteenByFour {
   }
 };
 
-// Blends all columns of the matrix in one register. Each vertex has two sums, because an addition
-// takes four cycles and four sums would allow only one addition per cycle. With masks, because gcc
-// 12 warns about reads of unset values in the plain intrinsics.
+// Sums weighted matrices, with all columns of the matrix in one register. Each vertex has two sums:
+// an addition takes four cycles, so that four vertices with one sum each would allow only one
+// addition per cycle. Intrinsics with masks are used, because gcc 12 warns about reads of unset
+// values in intrinsics without masks.
 struct AllColumns {
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kThree = 7, kFour = 0xF, kEight = 0xFF;
@@ -110,20 +112,21 @@ struct AllColumns {
         _mm_add_ps(_mm256_castps256_ps128(two), _mm256_maskz_extractf32x4_ps(kFour, two, 1));
     _mm_mask_storeu_ps(out, kThree, _mm_add_ps(p, one));
   }
-  // Products of the columns with the coordinates of a point. In: four  twelve coordinates of four
-  // points, then 1
+  // Products of the columns with the coordinates of a point.
+  // In: four  the twelve coordinates of four points, then 1
   template <int kVertex>
   RISORIUS_INLINE static __m512 products(const Sum& sum, __m512 four) {
     constexpr int x = 3 * kVertex, y = x + 1, z = x + 2, w = 12;
     const __m512i column = _mm512_setr_epi32(x, x, x, x, y, y, y, y, z, z, z, z, w, w, w, w);
     return _mm512_mul_ps(sum.whole(), _mm512_maskz_permutexvar_ps(kAll, column, four));
   }
-  // Adds the first and third, and the second and fourth quarter, of two vertices.
+  // Adds the first and third quarter, and the second and fourth quarter, of two vertices.
   RISORIUS_INLINE static __m512 halves(__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_maskz_shuffle_f32x4(kAll, a, b, 0x44),
                          _mm512_maskz_shuffle_f32x4(kAll, a, b, 0xEE));
   }
-  // For four consecutive vertices. A masked read is slower than two reads; a masked write is not.
+  // Writes four consecutive vertices. A masked read is slower than two reads; a masked write is not
+  // slower.
   RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
     const __m256 last = _mm256_insertf128_ps(_mm256_set1_ps(1.0f), _mm_loadu_ps(points + 8), 0);
     const __m512 first = _mm512_maskz_broadcast_f32x8(kAll, _mm256_loadu_ps(points));
@@ -149,7 +152,8 @@ struct V {
   RISORIUS_INLINE static Reg set(float v) { return _mm512_set1_ps(v); }
   RISORIUS_INLINE static Reg load(const float* p) { return _mm512_loadu_ps(p); }
   RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
-    // With a mask, because gcc 12 warns about a read of unset values.
+    // The intrinsic with a mask is used, because gcc 12 warns about a read of unset values in the
+    // intrinsic without a mask.
     return _mm512_maskz_cvtph_ps(0xFFFF, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm512_storeu_ps(p, v); }
@@ -163,7 +167,7 @@ struct V {
     const auto places = static_cast<__mmask16>(mask);
     _mm512_mask_storeu_ps(to, places, _mm512_maskz_expand_ps(places, load(from)));
   }
-  // Used if many frames have the same order: the value of each place is found once, and a
+  // Used if several frames have the same order: the value of each place is found once, and a
   // permutation takes half the time of an expansion.
   struct Orders {
     __mmask16 places;

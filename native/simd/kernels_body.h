@@ -20,8 +20,8 @@ namespace risorius::simd {
 
 namespace {
 
-// kCount registers of rows of some frames. Unrolled by templates, because gcc 12 keeps sums of a
-// loop in memory.
+// The sums of kRow registers of rows for each of some frames. The loops are unrolled by templates,
+// because gcc 12 keeps sums of a loop in memory.
 template <class Frames, class Rows>
 struct BlockSums;
 template <std::size_t... kFrame, std::size_t... kRow>
@@ -33,7 +33,7 @@ struct BlockSums<std::index_sequence<kFrame...>, std::index_sequence<kRow...>> {
   RISORIUS_INLINE void add(std::size_t f, V::Reg weight, const V::Reg* rows) {
     ((sums[f][kRow] = V::madd(weight, rows[kRow], sums[f][kRow])), ...);
   }
-  // In: weights  one for each frame
+  // Adds a column to all frames. In: weights  one for each frame
   template <class T>
   RISORIUS_INLINE void add(const T* column, const float* weights) {
     const V::Reg rows[] = {V::load(column + kRow * V::kLanes)...};
@@ -60,7 +60,7 @@ RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n
   sums.store(out, 0);
 }
 
-// For V::kBatchFrames frames: each value is read once for all of them.
+// Sums columns for V::kBatchFrames frames. Each value is read once for all of these frames.
 template <int kCount, class T>
 RISORIUS_TARGET void batch_block(const T* values, const Column* columns, std::size_t n,
                                  const float* weights, float* out, std::size_t stride) {
@@ -81,7 +81,8 @@ constexpr auto batch_block_table(std::integer_sequence<int, kCounts...>) {
   return std::array{&batch_block<kCounts + 1, T>...};
 }
 
-// Calls f(first register, registers) for the smallest number of blocks, of about equal size.
+// Divides the rows into the smallest number of blocks of about equal size, and calls f(first
+// register, number of registers) for each.
 template <class F>
 void for_blocks(std::size_t rows, std::size_t most, F f) {
   const std::size_t all = (rows + V::kLanes - 1) / V::kLanes, blocks = (all + most - 1) / most;
@@ -102,7 +103,7 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
   });
 }
 
-// to = sums + weight * values, for kWidest values.
+// to = sums + weight * values, for kWidest numbers.
 template <class T>
 RISORIUS_INLINE void add(V::Reg weight, const T* values, const float* sums, float* to) {
   for (std::size_t l = 0; l < kWidest; l += V::kLanes) {
@@ -151,7 +152,7 @@ RISORIUS_INLINE auto order_of(std::uint32_t mask) {
   }
 }
 
-// Decodes each piece once for all frames.
+// Places the pieces in all frames. Each mask is decoded only once.
 template <bool kMore, bool kMany>
 RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {
@@ -166,7 +167,7 @@ RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames f
   }
 }
 
-// One frame without the loop over frames.
+// A single frame has its own branch, because it needs no loop over frames.
 template <bool kMore>
 RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
   if (frames.count == 1) {

@@ -16,8 +16,8 @@
 
 namespace risorius::simd {
 
-/// For each mask of four places the bytes that each place takes; 0 for a place without a value. For
-/// instruction sets that shuffle bytes by a table.
+/// For each mask of four places: the bytes of the values that each place gets, 0x80 (which gives 0)
+/// for a place without a value. For instruction sets that shuffle bytes by a table.
 inline constexpr auto kExpandBytes = [] {
   std::array<std::array<std::uint8_t, 16>, 16> orders{};
   for (std::size_t mask = 0; mask < 16; ++mask) {

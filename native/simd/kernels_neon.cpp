@@ -15,7 +15,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Blends a row of the matrix in each register.
+// Sums weighted matrices, with one row of the matrix in each register.
 struct RowsOfFour {
   struct Sum {
     float32x4_t r[3];

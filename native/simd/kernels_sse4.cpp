@@ -19,7 +19,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Four rotations at a time; the fourth number of each is read and written with the others.
+// Converts four rotations at once. The number after each rotation is read and written with it.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -39,7 +39,7 @@ struct FourByFour {
       for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + at[l + i], r[i]);
     }
   }
-  // Like OneByOne, but one instruction gathers the signs.
+  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m128i most = _mm_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm_set1_epi32(0x7FFFFFFF);
@@ -52,7 +52,7 @@ struct FourByFour {
   }
 };
 
-// Blends a row of the matrix in each register.
+// Sums weighted matrices, with one row of the matrix in each register.
 struct RowsOfFour {
   struct Sum {
     __m128 r[3];
@@ -81,7 +81,7 @@ struct RowsOfFour {
   RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_rows(matrix, row); }
 };
 
-// Products and sums are rounded separately, as in the scalar path.
+// Products and sums are rounded separately, as in the scalar functions.
 struct V {
   using Parts = FourByFour;
   using Skin = RowsOfFour;

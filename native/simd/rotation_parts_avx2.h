@@ -15,11 +15,12 @@ namespace risorius::simd {
 
 namespace {
 
-// Eight rotations at a time, the fifth to eighth in the upper halves. The sines load exactly these
-// registers; loads across two half stores would wait for both. The fourth number of each rotation
-// is read and written with the others.
+// Converts eight rotations at once; the registers have the fifth to eighth in their upper halves.
+// The function for the sines then loads exactly these registers; loads that span two stores of half
+// a register would have to wait for both. The number after each rotation is read and written with
+// it.
 struct EightByFour {
-  // In each half: r[k] lane i becomes r[i] lane k.
+  // Transposes the registers in each half: lane i of r[k] becomes lane k of r[i].
   RISORIUS_INLINE static void transpose(__m256 (&r)[4]) {
     const __m256 a = _mm256_unpacklo_ps(r[0], r[1]), b = _mm256_unpackhi_ps(r[0], r[1]),
                  c = _mm256_unpacklo_ps(r[2], r[3]), d = _mm256_unpackhi_ps(r[2], r[3]);
@@ -53,7 +54,7 @@ struct EightByFour {
       }
     }
   }
-  // Like OneByOne, but one instruction gathers the signs.
+  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m256i most = _mm256_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm256_set1_epi32(0x7FFFFFFF);

@@ -20,12 +20,13 @@ namespace {
 
 constexpr std::size_t kTurns = 16;
 using Turns = float[kTurns];
-// Angles about all three axes: one loop over all of them is faster than three loops, because the
-// CPU overlaps more sines.
+// The angles about all three axes are in one array, because one loop over all of them is faster
+// than three loops: the CPU computes more sines in parallel.
 constexpr std::size_t kAngles = 3 * kTurns;
 using Angles = float[kAngles];
 
-// Sine and cosine of angles up to an eighth of a turn, by Cephes' polynomials.
+// Sine and cosine of angles up to 45 degrees, by the polynomials of Cephes. In: r  radians; z  r *
+// r
 RISORIUS_INLINE float near_sine(float r, float z) {
   return r + r * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
 }
@@ -34,7 +35,7 @@ RISORIUS_INLINE float near_cosine(float z) {
          z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
 }
 
-// Sine and cosine of any angle, reduced by quarter turns; error below 1e-7.
+// Sine and cosine of any angles in radians, reduced by quarter turns; error below 1e-7.
 RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
   for (std::size_t l = 0; l < kAngles; ++l) {
@@ -49,8 +50,8 @@ RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cos
     cosines[l] = std::bit_cast<float>(((cb & ~swap) | (sb & swap)) ^ (((n + 1u) & 2u) << 30));
   }
 }
-// The same bits for angles that need no reduction. Faces rarely turn a joint by 90 degrees, and
-// this takes half the time.
+// As sine_and_cosine, for angles that need no reduction: the same bits in half the time. Faces
+// rarely rotate a joint so far that an angle needs a reduction.
 RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float z = x[l] * x[l];
@@ -69,7 +70,7 @@ void repair(const Angles& x, Angles& sines, Angles& cosines) {
   }
 }
 
-// Converts half angles in the order of rotation to quaternions with w last.
+// Converts half angles, in the order of rotation, to quaternions x y z w.
 template <class Parts>
 RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   alignas(64) Angles sines, cosines;
@@ -92,7 +93,8 @@ RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   }
 }
 
-// Copies scattered rotations into arrays of their parts, and back. In: at  kTurns offsets
+// Copies kTurns rotations from memory into one array for each of their numbers, and back.
+// In: at  the offset of each rotation
 struct OneByOne {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -107,7 +109,7 @@ struct OneByOne {
     }
   }
   // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN. The sign
-  // of a difference tells it, because the compiler would not vectorise a comparison.
+  // of the difference of the bits is used, because the compiler would not vectorise a comparison.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kAngles; ++l) {
@@ -134,9 +136,10 @@ RISORIUS_TARGET void turn_together(const EulerTurns& e, const std::uint32_t* at,
   Parts::join(parts, rotations, at);
 }
 
-// Whether an angle is anything but +0.
+// Whether any of three angles is not +0.
 RISORIUS_INLINE bool turns(const float* angles) {
-  // Copied to two numbers, because an array would be stored and read again.
+  // The angles are copied to two integers, because the compiler would store an array and read it
+  // again.
   std::uint64_t two = 0;
   std::uint32_t third = 0;
   std::memcpy(&two, angles, sizeof(two));
@@ -144,9 +147,9 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Gathers the rotations that turn and sets the others to no rotation. A batch of sixteen is
-// computed only when another sixteen have been gathered behind it, because it would otherwise wait
-// for the stores just before.
+// Collects the rotations that are not 0, and writes quaternions of no rotation for the others. A
+// batch of sixteen is computed only when 32 more have been collected, because it would otherwise
+// have to wait for the stores just before.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {
@@ -159,7 +162,8 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     for (std::size_t j = i; j < end; ++j) {
       const std::size_t at = which[j] * stride;
       const bool moves = turns(rotations + at);
-      // The w of gathered rotations is written later.
+      // The w of a collected rotation is written later, so that this store goes to an unused
+      // number.
       float* w = moves ? &elsewhere : rotations + at + 3;
       *w = 1.0f;
       turning[count] = static_cast<std::uint32_t>(at);
@@ -178,7 +182,8 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     turn_together<Parts>(e, turning + done, rotations);
   }
   if (count == done) return;
-  // Fills incomplete arrays by repeating the last rotation: it is read before it is written.
+  // The last batch is filled by repeating the last rotation, which does no harm because a batch is
+  // read before it is written.
   for (std::size_t l = count; l < done + kTurns; ++l) turning[l] = turning[count - 1];
   turn_together<Parts>(e, turning + done, rotations);
 }

@@ -20,7 +20,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Adds four influences of a vertex, one after the other.
+// Adds four influences of a vertex to its sum, one after the other.
 template <class S, std::size_t... kInfluence>
 RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std::uint16_t* bones,
                               const float* weights, std::index_sequence<kInfluence...>) {
@@ -38,7 +38,8 @@ RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std
   }
 }
 
-// Adds influences of some vertices of a group.
+// Adds all influences of kVertex vertices of a group.
+// In: fours  number of influences of each vertex, divided by four
 template <class S, std::size_t... kVertex>
 RISORIUS_INLINE void add_all(typename S::Sum* sums, const float* rows, const std::uint16_t* bones,
                              const float* weights, std::size_t fours,
@@ -123,13 +124,13 @@ RISORIUS_TARGET void skin_rows(const float* matrices, std::size_t n, float* rows
   }
 }
 
-// Stores a matrix by rows: for vectors of four.
+// Stores a matrix by rows, for vectors of four floats.
 RISORIUS_INLINE void pack_rows(const float* matrix, float* row) {
   for (std::size_t i = 0; i < 12; ++i) row[i] = matrix[i];
   for (std::size_t i = 12; i < kSkinRow; ++i) row[i] = 0.0f;
 }
-// Stores a matrix by columns, each followed by a 0: for wider vectors, which multiply columns by
-// the coordinates of a point and then have few additions left.
+// Stores a matrix by columns, each followed by a 0, for wider vectors: these multiply the columns
+// by the coordinates of a point, and then need few additions.
 RISORIUS_INLINE void pack_columns(const float* matrix, float* row) {
   for (std::size_t c = 0; c < 4; ++c) {
     for (std::size_t r = 0; r < 3; ++r) row[4 * c + r] = matrix[4 * r + c];

@@ -9,7 +9,8 @@ namespace risorius::solve {
 namespace {
 
 /// Solves m x = b for a symmetric positive definite m [n, n], which is overwritten. A direction
-/// whose pivot is 0 or negative by rounding is left out. In: x  holds b. Out: x
+/// whose pivot is 0 or, by rounding, negative gets the value 0. In: x  the right side b. Out: x
+/// the solution
 void solve_symmetric(std::size_t n, double* m, double* x) {
   for (std::size_t j = 0; j < n; ++j) {
     double* row = m + j * n;
@@ -40,13 +41,13 @@ double length(const std::vector<double>& v) {
   return std::sqrt(sum);
 }
 
-/// The dual of least_change.
+/// The dual problem of least_change, with an unknown y for each row.
 struct Dual {
   std::size_t rows, columns;
   const double *a, *b, *low, *high;
   double ridge;
 
-  /// Out: x  the image of y; slope  y + a x - b
+  /// Out: x  the solution that belongs to y; slope  y + a x - b, the gradient of value()
   void image(const std::vector<double>& y, double* x, std::vector<double>& slope) const {
     std::fill(x, x + columns, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {
@@ -58,7 +59,7 @@ struct Dual {
       for (std::size_t c = 0; c < columns; ++c) slope[r] += a[r * columns + c] * x[c];
     }
   }
-  /// The dual function, whose gradient is the slope of image().
+  /// The value of the dual function, which is minimised.
   double value(const std::vector<double>& y) const {
     double sum = 0.0;
     for (std::size_t r = 0; r < rows; ++r) sum += y[r] * (0.5 * y[r] - b[r]);
@@ -86,7 +87,7 @@ struct Dual {
   }
 };
 
-/// A descent of a Quadratic: x, and slope = g - h x.
+/// The state while a Quadratic is minimised. slope is g - h x.
 struct Descent {
   const Quadratic& q;
   double* x;
@@ -102,13 +103,13 @@ struct Descent {
     const double* row = q.h + i * q.count;
     for (std::size_t k = 0; k < q.count; ++k) slope[k] -= by * row[k];
   }
-  /// Moves each coordinate to its minimum. Out: the largest change
+  /// Moves each coordinate in turn to its minimum. Out: the largest change of a coordinate
   double sweep() {
     double largest = 0.0;
     for (std::size_t i = 0; i < q.count; ++i) {
       const double curve = q.h[i * q.count + i];
       if (!(q.low[i] < q.high[i])) continue;
-      // With t = x - rest: 1/2 curve t^2 - pull t + sparse |t|.
+      // With t = x - rest, the function of this coordinate is 1/2 curve t^2 - pull t + sparse |t|.
       const double pull = slope[i] + curve * (x[i] - q.rest[i]);
       double to = q.rest[i];
       if (std::fabs(pull) > q.sparse[i] && curve > 0.0) {
@@ -122,8 +123,8 @@ struct Descent {
     }
     return largest;
   }
-  /// A Newton step in the free coordinates: those strictly between their bounds and not at rest.
-  /// The step is shortened so that no coordinate crosses a bound or its rest.
+  /// A Newton step in the free coordinates: coordinates strictly between their bounds and not at
+  /// rest. The step is shortened so that no coordinate crosses a bound or its rest.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {
@@ -135,7 +136,7 @@ struct Descent {
     for (std::size_t r = 0; r < n; ++r) {
       const std::size_t i = loose[r];
       for (std::size_t s = 0; s <= r; ++s) m[r * n + s] = q.h[i * q.count + loose[s]];
-      // Without this ridge two controls with the same effect would have no unique minimum.
+      // Without this ridge, the minimum would not be unique if two controls had the same effect.
       m[r * n + r] *= 1.0 + 1e-9;
       step[r] = slope[i] - (x[i] > q.rest[i] ? q.sparse[i] : -q.sparse[i]);
     }

@@ -10,16 +10,19 @@
 namespace risorius::solve {
 
 /// Finds the x between low and high with the least |a x - b|^2 + ridge |x|^2. With a small ridge it
-/// is the shortest of all x that come equally near to b. Meant for few rows and many columns, such
-/// as a drag of some points: the dual problem has one unknown per row. In it x = clip(a^T y /
-/// ridge, low, high), and y is the zero of y + a x(y) - b, the gradient of a convex function. It is
-/// found by Newton's method with step halving.
+/// is the shortest x among all that come equally close to b.
+///
+/// It is meant for few rows and many columns, such as a drag of some points: the dual problem has
+/// one unknown per row. There x(y) = clip(a^T y / ridge, low, high), and y is the zero of y + a
+/// x(y) - b, the gradient of a convex function. The zero is found by Newton's method with step
+/// halving.
 /// In:  a [rows, columns], b [rows], low <= high [columns]; all finite; ridge above 0
 /// Out: x [columns]
 void least_change(std::size_t rows, std::size_t columns, const double* a, const double* b,
                   const double* low, const double* high, double ridge, double* x);
 
-/// A quadratic between bounds: 1/2 x^T h x - g^T x + sum of sparse_i |x_i - rest_i|.
+/// A quadratic function with bounds: 1/2 x^T h x - g^T x + sum of sparse_i |x_i - rest_i|, for low
+/// <= x <= high.
 struct Quadratic {
   std::size_t count = 0;
   const double* h = nullptr;  // [count, count], symmetric, positive semidefinite
@@ -27,15 +30,16 @@ struct Quadratic {
   const double *low = nullptr, *high = nullptr, *rest = nullptr;
   const double* sparse = nullptr;  // 0 or more
 };
-/// Minimises it by coordinate descent, with Newton steps among the coordinates that are not at a
-/// bound.
+/// Minimises the function by coordinate descent, with Newton steps in the coordinates that are not
+/// at a bound.
 /// In:  x          [count], a start between the bounds
-///      tolerance  of a coordinate
-/// Out: x
+///      tolerance  the descent ends when no coordinate changes by more
+/// Out: x          the minimum
 void descend(const Quadratic& q, double tolerance, double* x);
 
-/// Out: h [controls, controls] = J^T J
+/// Computes the normal matrix. Out: h [controls, controls] = J^T J
 void normal_matrix(const Jacobian& jacobian, double* h);
+/// Computes the gradient of a residual.
 /// In:  residual [points, 3]
 /// Out: g [controls] = J^T residual
 void gradient(const Jacobian& jacobian, const double* residual, double* g);

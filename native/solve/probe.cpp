@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::uint32_t kUnused = 0xFFFFFFFFu;
 
-/// Inverts lists: for each thing, the points that use it, ascending.
+/// Inverts lists: from the things that each point uses to the points that use each thing,
+/// ascending. A thing is a joint or a channel.
 /// In:  begins, things  the things that each point uses
 /// Out: user_begins     [count + 1] into users
 template <class T, class F>
@@ -99,7 +100,7 @@ void Probe::list_users() {
   is_marked_.resize(points_.size());
 }
 
-// Makes a frame of the last evaluation the base pose for differences.
+// Makes a frame of the last evaluation the base pose of the differences.
 void Probe::take(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;
@@ -146,8 +147,8 @@ void Probe::mark(std::span<const std::uint32_t> users) {
   }
 }
 
-// Takes the values in which a frame differs from the base pose, and marks the points that depend on
-// them.
+// Copies the values in which a frame differs from the base pose, and marks the points that depend
+// on these values.
 void Probe::changed(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;
@@ -182,7 +183,8 @@ void Probe::positions(const float* raw, double* out) {
   for (const std::array<double, 3>& p : base_) out = std::copy(p.begin(), p.end(), out);
 }
 
-// Makes a control's column from the points that changed() marked, then restores the base pose.
+// Computes a control's column from the points that changed() marked, then restores the base pose.
+// In: step  change of the control
 void Probe::add_column(std::uint32_t control, double step, Jacobian& out) {
   constexpr std::size_t kNumbers = 3 * Jacobian::kBlock;
   for (const std::uint32_t p : marked_) {

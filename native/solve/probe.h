@@ -19,8 +19,8 @@ struct Point {
   std::uint32_t mesh, vertex;
 };
 
-/// The step of a control for a difference. The rig's numbers are float32, so that a derivative has
-/// an error of about 2^-24 / kStep of the largest value.
+/// The step of a control for a difference quotient. The rig's numbers are float32, so that a
+/// derivative has an error of about 2^-24 / kStep of the largest value.
 inline constexpr double kStep = 1.0 / 256;
 
 /// The Jacobian, in blocks of kBlock neighbouring points. A block lists the controls that move any
@@ -35,19 +35,22 @@ struct Jacobian {
   std::vector<Block> blocks;
 };
 
-/// Points and scratch memory. Not thread-safe.
+/// Computes positions and derivatives of some points. Not thread-safe, because it has scratch
+/// memory.
 class Probe {
  public:
-  /// In: points  each within its mesh; the surface outlives the probe
+  /// In: points  vertices that exist; surface  must outlive the probe
   Probe(const Surface& surface, std::span<const Point> points);
 
   std::size_t size() const { return points_.size(); }
+  /// Computes the positions of the points in a pose.
   /// In:  raw  float32[R]
   /// Out: out  float64[points, 3], file units
   void positions(const float* raw, double* out);
+  /// Computes the derivatives of the positions.
   /// In: raw   float32[R], the pose
   ///     high  float32[R]: a control whose step would exceed it is moved down instead
-  ///     free  [R]: controls with 0 are left out
+  ///     free  [R]: controls with 0 get no column
   Jacobian jacobian(const float* raw, const float* high, const std::uint8_t* free);
 
  private:
@@ -77,7 +80,7 @@ class Probe {
   std::vector<std::uint32_t> joint_users_begins_, joint_users_, channel_users_begins_,
       channel_users_;
 
-  // The base pose of the derivatives.
+  // The base pose of the differences.
   std::vector<float> deltas_;   // [joints_, 9]
   std::vector<float> weights_;  // [channels_]
   std::vector<Matrix> world_, skin_;

@@ -49,7 +49,7 @@ std::vector<std::uint32_t> parents_first(const std::vector<std::uint32_t>& paren
   return order;
 }
 
-/// The inverse of a rotation and translation.
+/// The inverse of a matrix that rotates and translates.
 Matrix rigid_inverse(const Matrix& m) {
   Matrix out{};
   for (std::size_t i = 0; i < 3; ++i) {

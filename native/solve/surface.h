@@ -13,7 +13,7 @@
 
 namespace risorius::solve {
 
-/// Three rows of four of an affine matrix for column vectors.
+/// The upper three rows of an affine 4 x 4 matrix for column vectors.
 using Matrix = std::array<double, 12>;
 
 struct Influence {
@@ -26,7 +26,8 @@ struct Shape {
   std::array<float, 3> delta;
 };
 
-/// A mesh of the file by vertex: the entries of vertex v are [begins[v], begins[v + 1]).
+/// A mesh of the file, sorted by vertex: influences and shapes of vertex v are [begins[v], begins[v
+/// + 1]).
 struct SkinMesh {
   std::vector<std::array<float, 3>> positions;  // file units
   std::vector<std::uint32_t> influence_begins;
@@ -44,17 +45,18 @@ struct Surface {
   std::vector<SkinMesh> meshes;
 };
 
-/// Copies the needed parts of a face. A vertex without weights is moved by its shapes only.
+/// Copies the parts of a face that positions need. A vertex without weights is moved only by its
+/// shapes.
 /// In:     rig  compiled from dna, with Euler angles as rotation
 ///         lod  below the number of LODs
-/// Fails:  as dna::validate; invalid_argument (a rig or a LOD that does not fit)
+/// Fails:  as dna::validate; kInvalidArgument (a rig or a LOD that does not fit)
 core::Result<Surface> make_surface(const dna::Dna& dna, std::shared_ptr<const rig::Rig> rig,
                                    std::uint32_t lod);
 
-/// A joint's transform relative to its parent.
+/// A joint's transform relative to its parent in a pose.
 /// In: delta  the joint's nine numbers of a Pose
 Matrix local_matrix(const rig::Rig& rig, std::uint32_t joint, const float* delta);
-/// a * b: b acts first.
+/// The matrix a * b, which applies b first.
 Matrix multiply(const Matrix& a, const Matrix& b);
 
 }  // namespace risorius::solve

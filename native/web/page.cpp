@@ -16,7 +16,7 @@ namespace {
 
 using Four = float __attribute__((vector_size(16), aligned(16)));
 
-// Filled by skin.js: 22 words.
+// A mesh of the page. skin.js writes this struct, 19 words of 32 bits, into memory.
 struct PageMesh {
   std::uint32_t positions, vertices, triangles, targets;
   const Four* rest;               // [positions]
@@ -54,7 +54,7 @@ void add_shapes(const PageMesh& mesh, const float* channels) {
   }
 }
 
-// In: matrices  four columns for each joint
+// Deforms positions and normals by the joints. In: matrices  four columns for each joint
 void add_joints(const PageMesh& mesh, const Four* matrices) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) {
     Four x{}, y{}, z{}, w{};
@@ -74,7 +74,7 @@ void add_joints(const PageMesh& mesh, const Four* matrices) {
   }
 }
 
-// The normal of a triangle counts by its area.
+// Computes normals of vertices as the sum of the triangles' normals, weighted by area.
 void find_normals(const PageMesh& mesh) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) mesh.turned[v] = Four{};
   for (std::uint32_t i = 0; i < 3 * mesh.triangles; i += 3) {
@@ -119,7 +119,7 @@ PAGE_API void page_pose(const PageMesh* mesh, const float* matrices, const float
   write_out(*mesh);
 }
 
-/// Reads a whole .rzc file; the result is valid until the next call.
+/// Reads a whole .rzc file. The result is valid until the next call.
 PAGE_API const PageClip* page_clip(const std::uint8_t* bytes, std::uint32_t size) {
   static risorius::clip::Clip clip;
   static std::string names;  // or the error text

@@ -5,8 +5,9 @@
 
 A comment is a docstring or a block of comment lines of C++ or Python. A sentence comes from a
 Markdown page, an interface text or an error message. Each item shows the place in the project and
-the text as its readers see it: a comment with its signature and the docstring of its file, a
-sentence with its paragraph. The code itself is not shown.
+the text as its readers see it: a comment with its signature, the docstring of its file, and the
+class or function around it with the first sentence of its docstring; a sentence with its paragraph.
+The code itself is not shown.
 """
 
 import ast
@@ -21,6 +22,8 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parents[2]
 COUNT = 100
 Item = tuple[str, str, str, str]  # place, context, name of the described thing, text
+Described = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+_DESCRIBED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 _NOT_PROSE = re.compile(r"SPDX|noqa|type:|NOLINT|clang-format|-{4}")
 
 
@@ -45,16 +48,38 @@ def python_comments(path: Path) -> Iterator[Item]:
     source = path.read_text(encoding="utf-8")
     lines, tree = source.splitlines(), ast.parse(source)
     about = one_line(ast.get_docstring(tree) or "")
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Module):
-            continue
+    nodes = [node for node in ast.walk(tree) if isinstance(node, _DESCRIBED)]
+    for node in nodes:
         text = ast.get_docstring(node)
-        if text and isinstance(node, ast.Module):
-            yield place_of(path), "", "the file", text
-        elif text:
-            signature = lines[node.lineno - 1 : node.body[0].lineno - 1]
-            yield f"{place_of(path)}:{node.lineno}", about, one_line(" ".join(signature)), text
-    yield from blocks(path, lines, about, "#")
+        if text:
+            number, context = node.lineno, about + around(nodes, node.lineno, lines)
+            yield f"{place_of(path)}:{number}", context, signature(node, lines), text
+    if about:
+        yield place_of(path), "", "the file", ast.get_docstring(tree) or ""
+    for place, _, name, text in blocks(path, lines, about, "#"):
+        number = int(place.rpartition(":")[2])
+        yield place, about + around(nodes, number, lines), name, text
+
+
+def signature(node: Described, lines: list[str]) -> str:
+    """The lines of a definition before its docstring, as one line."""
+    return one_line(" ".join(lines[node.lineno - 1 : node.body[0].lineno - 1]))
+
+
+def around(nodes: list[Described], number: int, lines: list[str]) -> str:
+    """The definitions around a line: signature and first sentence of the docstring of each.
+
+    Args:
+        nodes: all definitions of the file.
+        number: number of the line, from 1; a definition that begins there is not one of them.
+        lines: lines of the file.
+    """
+    out = ""
+    for node in nodes:
+        if node.lineno < number <= (node.end_lineno or node.lineno):
+            said = one_line(ast.get_docstring(node) or "").partition(". ")[0]
+            out += f" | inside: {signature(node, lines)} {said}"
+    return out
 
 
 def cpp_comments(path: Path) -> Iterator[Item]:

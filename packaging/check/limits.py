@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 STILL = 300.0  # wall time in seconds in which a command must use LEAST_SHARE of a core
-# Fraction of a core. A process of low priority beside twenty others gets six times as much.
+# Least fraction of a core that a command must use. Beside twenty other jobs, a process of low
+# priority still gets six times as much.
 LEAST_SHARE = 0.005
 LOOK = 1.0  # seconds between two checks
 KILLED = 128 + 9
@@ -90,7 +91,8 @@ class Watch:
             if now - self._since > 10 * self.cpu + self.still:
                 self._stop(f"after {now - self._since:.0f} s by the clock")
             return
-        # The sum falls if a child ends and no process waits for it. Its seconds stay counted.
+        # The total falls if a child ends and no process waits for it. `used` keeps the child's
+        # seconds.
         total = sum(map(_seconds, _family(self.process.pid).values()))
         self.used, self._total = self.used + max(0.0, total - self._total), total
         if self.used > self.cpu:

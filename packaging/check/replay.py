@@ -42,7 +42,7 @@ def any_heads(folder: Path) -> None:
 
 
 def sheets(folder: Path) -> None:
-    """Draw a sheet of each DNA file in a folder, a sheet of all, and a sheet of all speaking."""
+    """Draw a sheet of each DNA file in a folder, of all together, and of all speaking a clip."""
     maker = [sys.executable, str(PROJECT / "packaging" / "films" / "any_heads_sheet.py")]
     faces = [str(face) for face in sorted(folder.glob("*.dna"))]
     for face in faces:

@@ -9,8 +9,9 @@
         prints the table of the rows in FOLDER/LANE; exit code 1 if a test failed or a lane ended
         early
 
-A row is one line: its kind, then its fields, separated by tabs: `row NAME PASSED FAILED NOT_RUN`,
-`say TEXT`, `time STAGE SECONDS CPU_SECONDS`, and `end` once at the end of a lane.
+test.sh runs several lanes in parallel, each of which writes a file of rows. A row is one line: its
+kind, then its fields, separated by tabs: `row NAME PASSED FAILED NOT_RUN`, `say TEXT`, `time STAGE
+SECONDS CPU_SECONDS`, and `end` once at the end of a lane.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def read(report: Path) -> list[Case]:
 
 
 def _uncollected(cases: list[Case], files: list[Path]) -> list[Path]:
-    # The name is enough, because pytest forbids two files with the same name in one run.
+    # A file's name without its folder is enough, because pytest forbids equal names in one run.
     seen = {part for case in cases for part in case.module.split(".")}
     return [file for file in files if file.stem not in seen]
 

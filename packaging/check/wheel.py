@@ -22,8 +22,8 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parents[2]
 PACKAGING = PROJECT / "packaging"
 WITH_TESTS = ["pytest", "python-osc", "threadpoolctl", "xxhash", "matplotlib", "colorama"]
-# Python version -> NumPy's version. Blender up to 5.0 has NumPy 1.26. NumPy has wheels for Windows
-# on ARM since 2.3.
+# Python version -> NumPy's version, because Blender up to 5.0 has NumPy 1.26. All other Pythons get
+# NEWER_NUMPY, and so does Windows on ARM, for which NumPy has no wheels before 2.3.
 NUMPY = {(3, 11): "1.26.4"}
 NEWER_NUMPY = "2.3.5"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The acting of the demo as data: keyframes of controls and bones. Does not need Blender.
+"""Lists the keyframes of controls and bones in the demo. Does not need Blender.
 
 A track is control: [(frame, value), ...]. A name that ends in * stands for both sides or all four
 lip quarters. The frame rate is 24 frames per second.
@@ -10,7 +10,7 @@ from __future__ import annotations
 FRAME_RATE = 24
 LAST_FRAME = 96
 
-# A blink closes in two frames, holds one, and opens in four.
+# Frames at which blinks begin. The lids close in two frames, stay closed for one, and open in four.
 BLINKS = [9, 25, 64]
 
 TRACKS = {
@@ -55,7 +55,7 @@ TRACKS = {
         (90, 0.4),
         (96, 0.3),
     ],
-    # "Hello, I'm alive": he-llo-i-m-a-live, then silence before the storm.
+    # The syllables of "Hello, I'm alive", then silence before the shout.
     "jawOpen": [
         (38, 0),
         (41, 0.34),
@@ -118,7 +118,7 @@ TRACKS = {
     "mouthPressU*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthPressD*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthLowerLipRollIn*": [(60, 0), (62, 0.45), (64, 0), (96, 0)],
-    # The angry shout of the white paper, with the controls that this face has.
+    # An angry shout, with the controls that this face has.
     "jawOpenExtreme": [(70, 0), (76, 0.9), (88, 1.0), (96, 0.6)],
     "neckStretch*": [(68, 0), (76, 0.9), (88, 1.0), (96, 0.7)],
     "noseWrinkle*": [(64, 0), (70, 0.5), (76, 1.0), (90, 0.9), (96, 0.7)],
@@ -154,7 +154,7 @@ BONES = {
     ],
 }
 
-# (frame, caption) of the pictures of the contact sheet.
+# (frame, caption) of each picture on the sheet of stills.
 SHEET = [
     (1, "neutral"),
     (11, "blink"),

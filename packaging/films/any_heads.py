@@ -49,7 +49,7 @@ def meshes_of(person: Person, source: Source) -> dict[str, tuple[Doubles, Faces]
 
     Args:
         person: a person of PEOPLE or a changed copy.
-        source: the data of the sample people. The axes have y up.
+        source: the data of the sample people, with y up.
     """
     dna, _parts, _body = assemble(source, lambda _share: None, person)
     out = {}
@@ -119,7 +119,7 @@ def _used(points: Doubles, faces: Faces) -> tuple[Doubles, Faces]:
 
 
 def drawn(meshes: dict[str, tuple[Doubles, Faces]]) -> tuple[Doubles, Faces]:
-    """A head of few polygons with large eyes, a small jaw and a high forehead."""
+    """A stylised head of few polygons with large eyes, a small jaw and a high forehead."""
     points, faces = meshes[HEAD]
     eyes = [meshes[f"eye{side}_lod0_mesh"][0].mean(axis=0) for side in ("Left", "Right")]
     points = points.copy()

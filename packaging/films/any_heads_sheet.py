@@ -122,7 +122,7 @@ class Face:
         return np.concatenate([self._seen.positions(raw, m) for m in self._meshes]).astype(float)
 
     def picture(self, row: dict[str, float], size: int, turn: float = 0.3) -> Image.Image:
-        """Draw the face from the side.
+        """Draw the face, turned a little to the side.
 
         Args:
             row: name -> value of controls, as for raw_of().
@@ -146,7 +146,7 @@ def put(rows: list[list[tuple[str, Image.Image]]], out: str) -> None:
     """Write a sheet of pictures with captions.
 
     Args:
-        rows: (caption, picture) of each cell, by rows.
+        rows: rows of the sheet, with (caption, picture) for each cell.
         out: path of the sheet.
     """
     first = rows[0][0][1]

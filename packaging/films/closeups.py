@@ -26,7 +26,7 @@ from mathutils import Vector  # noqa: E402
 
 GROWN = 0.063  # metres between the eyes of an adult head, to which VIEWS refers
 # View -> (origin, target of the camera, place of the camera, focal length in mm). Target and place
-# are in mm from the point between the eyes; with "teeth" the origin has the height of the teeth.
+# are in mm from the origin: the midpoint between the eyes, lowered to the teeth for "teeth".
 VIEWS = {
     "eye": ("eyes", (32, -5, 0), (32, -180, 4), 60),
     "mouth": ("teeth", (0, 0, 0), (0, -200, 8), 70),
@@ -107,7 +107,7 @@ def pictures(path, args):
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
-        # EEVEE draws strands at least one pixel wide, so brows would look too heavy.
+        # EEVEE renders cards: it draws strands at least one pixel wide, so brows would look heavy.
         bpy.ops.risorius.set_strands(enable=engine == "cycles" and not args.cards)
         for view in args.view:
             begin = time.monotonic()

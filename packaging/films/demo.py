@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The demo inside Blender: installs the extension, imports the face, keys the acting, renders.
+"""Makes the demo in Blender: installs the extension, imports the face, keys the acting, renders.
 
 demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
@@ -22,7 +22,7 @@ import scene as stage  # noqa: E402
 from progress import Progress  # noqa: E402
 
 # Width and height of the film in pixels, and frames of the acting per frame of the film. Chosen so
-# that demo.sh takes ten minutes on two cores, three of them for the compiler.
+# that demo.sh takes ten minutes on two cores; three minutes of them are compilation.
 FILM, STEP = 288, 2
 
 
@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key every track on the bone `face` and the turning bones."""
+    """Key the tracks of acting.py on the bone `face`, and the rotations of BONES on other bones."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)
@@ -102,7 +102,7 @@ def still(path, frame, size=None):
     """Render one frame to a file.
 
     Args:
-        path: the picture.
+        path: path of the picture.
         frame: frame of the scene.
         size: width and height in pixels; None keeps the scene's resolution.
     """

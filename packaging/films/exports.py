@@ -37,7 +37,7 @@ def parse():
 
 
 def original(args):
-    """Import and animate the face, render it, write the four files."""
+    """Import and animate the face, export it to the four formats, and render it."""
     import demo
 
     install_extension.install(args.extension)
@@ -59,7 +59,7 @@ def original(args):
 
 
 def read(args):
-    """Import one file into an empty scene and render it."""
+    """Import the file of one format into an empty scene, and render it."""
     path = args.out / f"face.{ENDINGS[args.read]}"
     bpy.context.scene.render.fps = acting.FRAME_RATE
     if args.read == "GLTF":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hair by geometry nodes along a band of cloth. Blender simulates the band, not the hairs."""
+"""Makes hair by geometry nodes along a band of cloth. Blender simulates only the band."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def chance(tree, low, high, seed):
 
 
 def offset(tree):
-    """Returns an output socket: each point's offset from its edge, REACH scaled by SPREAD."""
+    """Returns an output socket: a random offset of each hair, REACH scaled by SPREAD."""
     place = add(tree, "FunctionNodeRandomValue", data_type="FLOAT_VECTOR")
     place.inputs["Min"].default_value = [-r for r in REACH]
     place.inputs["Max"].default_value = REACH
@@ -58,7 +58,7 @@ def offset(tree):
 
 
 def grow(band, material):
-    """Show a band as hair.
+    """Replace the display of a band by hair along its edges.
 
     Args:
         band: an object whose mesh has the attribute `along` at the edges that hairs follow.

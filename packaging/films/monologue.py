@@ -2,7 +2,7 @@
 """Renders a film of twenty seconds in which one person reads a letter.
 
 The acting has emotions, speech, gaze, blinks and idle life. The extension's operators make all of
-the acting except the head bone's turns and the looked-at Empty, which have keyframes.
+the acting except the rotations of the head bone and the Empty of the gaze, which have keyframes.
 monologue_acting.py contains the times.
 
 monologue.py -- --extension ZIP --dna FILE --voices WAV ... --out FOLDER [--size N]
@@ -44,7 +44,7 @@ def go_to(seconds):
 
 
 def add_moods(controls):
-    """Key each mood's expression at the begin and the end of its time."""
+    """Key each mood's expression at the beginning and the end of its time."""
     for begin, end, name, strength, flip in acting.MOODS:
         for seconds in (begin, end):
             go_to(seconds)
@@ -54,7 +54,7 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """Drag one corner of the mouth up by its vertex, with a single control, and key the result."""
+    """Drag a vertex of the mouth's corner up, which sets one control, and key the result."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex, way = corner_of_mouth(path)
@@ -119,7 +119,7 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """The point between the eyes, and the head's height: four times the eyes' distance. Metres."""
+    """The point midway between the eyes, and the head's height (4 x distance of the eyes), in m."""
     rig = next(
         thing
         for thing in controls.users_collection[0].objects

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The acting of the monologue as data: speech, moods, gaze and turns. Does not need Blender.
+"""Lists the times of speech, moods, gaze and head turns of the monologue. Does not need Blender.
 
 python monologue_acting.py      prints a line of milliseconds, words per minute and text, separated
                                 by tabs, for each line of speech
@@ -33,7 +33,7 @@ SMIRK = 0.45  # fraction of the displacement of the mouth's corner in a full smi
 NEARER = 0.62  # the camera's distance as a fraction of the studio's
 BLINKS = [0.9, 4.9, 6.8, 12.8, 15.2, 17.2]
 
-# Targets of the gaze: (second, (beside, in front of, above the eyes)) in heights of the head.
+# Targets of the gaze: (second, (left of, in front of, above the eyes)) in heights of the head.
 LOOKS = [
     (0.0, (1.6, 2.6, 0.1)),
     (1.1, (1.6, 2.6, 0.1)),

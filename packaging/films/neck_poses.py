@@ -175,7 +175,7 @@ class _Neck:
         self.mask = self._shared()
 
     def _shared(self) -> np.ndarray:
-        """float64[V]: 1 if several joints of the chain share the vertex, 0 if one joint owns it."""
+        """float64[V], 0 to 1: the degree to which several joints of the neck share a vertex."""
         parents, chain = self.dna.joint_parents, [0, *self.turns]
         column = []
         for joint in range(len(parents)):
@@ -284,7 +284,7 @@ def _edges(mesh: risorius.Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _world(dna: risorius.Dna, turns: dict[int, np.ndarray]) -> list[np.ndarray]:
-    """World matrices [4, 4] of all joints. Joints without an entry in `turns` keep the identity.
+    """World matrices [4, 4] of all joints. Joints without an entry in `turns` are not rotated.
 
     Args:
         dna: the face; its neutral joint translations are used, its neutral rotations are not.

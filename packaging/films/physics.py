@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The demo's acting with a loop scarf and a lock of hair that Blender simulates on the face.
+"""Renders the demo's acting with a loop scarf and a lock of hair, which Blender simulates.
 
 physics.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 
@@ -158,7 +158,7 @@ def simulate(thing, mass, bending, first, last):
 
 
 def add_scarf(first, last):
-    """A loop of wool around the neck, wide enough to fall into folds."""
+    """Add a loop scarf of wool around the neck, wide enough to fall into folds."""
     rows, columns = 18, 110
     angle = np.linspace(0, 2 * np.pi, columns, endpoint=False)
     height = np.linspace(0, 1, rows)[:, None]
@@ -188,7 +188,7 @@ def add_scarf(first, last):
 
 
 def add_lock(head, first, last):
-    """A lock over the forehead: a band of cloth, and hair that follows its long edges."""
+    """Add a lock over the forehead: a band of cloth, and hair that follows its long edges."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     hit, root, normal, *_ = bpy.context.scene.ray_cast(depsgraph, ROOT, (0, 1, 0))
     if not hit:
@@ -226,7 +226,7 @@ def add_lock(head, first, last):
 
 
 def follow_skin(thing, head):
-    """Bind an object to the posed skin by a Surface Deform modifier. Raises if Blender does not."""
+    """Bind an object to the posed skin by a Surface Deform modifier. Raises if this fails."""
     bound = thing.modifiers.new("Skin", "SURFACE_DEFORM")
     bound.target = head
     with bpy.context.temp_override(object=thing, active_object=thing):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The stage of the films: the add-on's studio in a dark room, and the render settings."""
+"""Builds the stage of the films: the add-on's studio in a dark room, and the render settings."""
 
 from __future__ import annotations
 
@@ -183,7 +183,7 @@ def _denoise(cycles):
 
 
 def _develop(view):
-    """Choose a view transform with higher contrast; small colour configurations lack some."""
+    """Choose a view transform with higher contrast, among those that this Blender has."""
     _choose(view, "view_transform", ("AgX", "Filmic", "Standard"))
     _choose(view, "look", ("AgX - Medium High Contrast", "Medium High Contrast", "None"))
 

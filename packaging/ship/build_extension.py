@@ -42,7 +42,7 @@ def manifest_version(text: str) -> str:
 
 def platform_of(wheel: Path) -> str:
     tag = wheel.stem.rsplit("-", 1)[-1]
-    # A wheel may have several tags: manylinux_2_27_x86_64.manylinux_2_28_x86_64.
+    # Of several tags, such as manylinux_2_27_x86_64.manylinux_2_28_x86_64, the first one counts.
     for pattern, platform in PLATFORMS.items():
         if re.fullmatch(pattern, tag.split(".")[0]):
             return platform

@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 
 HEADS, COMPONENTS, SEED = 1600, 40, 56
 STYLISED = 0.25  # fraction of heads with features stronger than those of people
-# Decimetres of the base mesh. Triangles below CUT in y or beyond WIDE in |x| are left out.
+# Limits in decimetres on the base mesh: triangles below y = CUT or beyond |x| = WIDE are left out.
 CUT, WIDE = 5.75, 0.95
 FEATURES = (
     "eyes", "asym", "ears", "mouth", "nose", "head", "neck", "cheek", "chin", "forehead",
@@ -116,7 +116,7 @@ class Heads:
         self.axes = self._axes()
 
     def shape(self, name: str) -> Doubles:
-        """float64[kept, 3]: the displacements of a target, decimetres. Results are cached."""
+        """float32[kept, 3]: the displacements of a target, decimetres. Results are cached."""
         if name not in self._read:
             self._read[name] = self.source.target(name, self.count)[self.kept].astype(np.float32)
         return self._read[name]
@@ -187,7 +187,7 @@ def aligned(points: Doubles, like: Doubles, weight: Doubles) -> tuple[Doubles, D
 
     Args:
         points: points [V, 3] to move.
-        like: their targets [V, 3].
+        like: points [V, 3] to which they are fitted.
         weight: weight [V] of each point.
 
     Returns: the moved points, the rotation [3, 3] for row vectors, and the scale.
@@ -311,11 +311,11 @@ def teeth_told(
     mean: Doubles, weights: Doubles, skins: list[Doubles], teeth: list[Doubles],
     strip: list[list[int]],
 ) -> dict[str, NDArray[np.generic]]:  # fmt: skip
-    """The arrays that tell the lower teeth by the skin: a linear regression (ridge).
+    """The arrays of a ridge regression that predicts the lower teeth from the skin.
 
     Args:
         mean: float64[V, 3], the mean skin.
-        weights: float64[V], how much a vertex says of where a face is.
+        weights: float64[V], weight of each vertex in the fit of a head.
         skins: float64[V, 3] of each head.
         teeth: float64[n, 3] of each head, vertices of the strip of its lower teeth.
         strip: polygons of that strip.

@@ -157,7 +157,7 @@ TEST(ApiFace, HasNoMeshThatWasNotAskedFor) {
   EXPECT_EQ(m.target_count, 0u);
 }
 
-// A compiled program relies on these values.
+// A compiled program depends on these values, so that a change needs a new RISORIUS_ABI.
 TEST(ApiFace, TheLibraryIsTheHeaders) {
   EXPECT_EQ(risorius_abi(), std::uint32_t{RISORIUS_ABI});
   EXPECT_STREQ(risorius_version(), RISORIUS_TEST_VERSION);

@@ -13,8 +13,8 @@ using namespace testing_support;
 
 using Bytes = std::vector<std::uint8_t>;
 
-// The bytes are opened and evaluated at every LOD, or refused with a sentence and a place in the
-// file.
+// Expects that the bytes are either opened and evaluated at every LOD, or rejected with a message
+// and a place in the file.
 void expect_sound(const Bytes& bytes) {
   risorius_options options{};
   options.flags = RISORIUS_GEOMETRY | RISORIUS_TARGETS;

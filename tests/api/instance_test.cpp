@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The poses of the C API have the same bits as those of the C++ evaluator.
+// The poses of the C API have the same bits as the poses of the C++ evaluator.
 #include "rig/stages/instance.h"
 
 #include <cmath>
@@ -29,7 +29,7 @@ rig::Rig compile_golden(const std::string& name, const compile::CompileOptions& 
   return std::move(rig).value();
 }
 
-// Numbers between 0 and 1 that change with `turn`; every third control rests.
+// Numbers between 0 and 1 that depend on `turn`; every third one is 0.
 std::vector<float> wave(std::size_t count, std::size_t turn) {
   std::vector<float> out(count, 0.0f);
   for (std::size_t i = 0; i < count; ++i) {
@@ -122,7 +122,7 @@ TEST(ApiInstance, GuiControlsMoveTheRawControlsOfTheirTableAndNoOther) {
   const std::vector<float> before = wave(rig.raw_count, 1), gui = wave(rig.gui_count, 2);
   ASSERT_GT(gui.size(), 1u);
   set_raw(instance, before);
-  // GUI controls are set one by one; the table reads all of them.
+  // GUI controls are set one by one. Each call computes the raw controls from all of them.
   for (std::uint32_t i = 0; i < gui.size(); ++i) {
     ASSERT_EQ(risorius_set(instance.get(), RISORIUS_GUI_CONTROLS, i, 1, &gui[i]), RISORIUS_OK);
   }
@@ -163,7 +163,7 @@ TEST(ApiInstance, TwoThreadsWithOneEachDoNotMeet) {
                 RISORIUS_OK);
       EXPECT_EQ(risorius_evaluate(instance.get()), RISORIUS_OK);
       out.push_back(values(instance, RISORIUS_JOINTS));
-      // The last error is stored per thread.
+      // The last error is stored per thread, so that each thread finds its own number in it.
       EXPECT_EQ(risorius_set_lod(instance.get(), static_cast<std::uint32_t>(1000 + first)),
                 RISORIUS_BAD_ARGUMENT);
       EXPECT_NE(std::string(risorius_last_error()->message).find(std::to_string(1000 + first)),

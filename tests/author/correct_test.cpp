@@ -18,7 +18,7 @@ constexpr double kRadius = 6.0;       // mm, of a ball whose top lies 1 mm below
 double x_of(std::uint32_t v) { return double(v % kSheet) - 20.0; }
 double y_of(std::uint32_t v) { return double(v / kSheet) - 20.0; }
 
-/// Rings of a sphere, outwards.
+/// A sphere of rings of vertices, with triangles that face outwards.
 Skin::Solid sphere(std::vector<Vector3>& positions) {
   constexpr std::uint32_t kRings = 60, kAround = 60;
   Skin::Solid out;
@@ -39,7 +39,7 @@ Skin::Solid sphere(std::vector<Vector3>& positions) {
   return out;
 }
 
-/// The sheet and its ball; positions in millimetres.
+/// A flat sheet of skin above a solid ball; positions in mm.
 struct Scene {
   Skin skin;
   std::vector<Vector3> ball;
@@ -61,7 +61,7 @@ struct Scene {
     skin.solids.push_back(sphere(ball));
   }
   SkinPose pose(const std::vector<Vector3>& positions) const { return {positions, {ball}}; }
-  /// The sheet pushed down softly in the middle, by `depth` mm.
+  /// The sheet, smoothly pushed down around its middle by `depth` mm.
   std::vector<Vector3> pushed(double depth, double reach = 9.0) const {
     auto out = skin.neutral;
     for (std::uint32_t v = 0; v < out.size(); ++v) {
@@ -153,7 +153,7 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
     const auto& x = repair->displacement[v];
     const double length = std::hypot(x[0], x[1], x[2]);
     most = std::max(most, length);
-    // The ball is deeper than kDepth within 3.2 mm of the middle.
+    // All vertices deeper than kDepth in the ball are within 3.2 mm of the middle.
     if (std::hypot(x_of(v), y_of(v)) > 3.5 + SkinChecker::kAround) {
       EXPECT_EQ(length, 0.0) << v;
     }
@@ -167,7 +167,7 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
 TEST(Correct, WhatDoesMostAtAVertexStays) {
   const Scene scene;
   const SkinChecker check = checker(scene);
-  // Beyond 7 mm only the wide push acts.
+  // Only the wide push moves vertices beyond 7 mm.
   const auto narrow = scene.pushed(0.95, 7.0), wide = scene.pushed(0.6, 14.0);
   auto both = narrow;
   for (std::size_t v = 0; v < both.size(); ++v) both[v][2] += wide[v][2];
@@ -183,7 +183,8 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
   }
 }
 
-/// The repair of a pose whose parts cannot be undone, compared with the sheet at rest.
+/// The repair of a pose with one part, whose removal changes nothing, so that only the least
+/// squares solve can help. The faults of the sheet at rest are allowed.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));
@@ -197,7 +198,7 @@ Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
     }
     for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
   }
-  // The sums of the repair agree with the mended pose.
+  // The sums that the repair reports equal the sums of the repaired pose.
   const auto sums = check.sum(look(check, scene.pose(mended)), allowed);
   EXPECT_NEAR(sums->volume, repair->after.volume, 1e-3);
   EXPECT_EQ(sums->stretched, repair->after.stretched);
@@ -260,7 +261,8 @@ TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
       std::ranges::all_of(repair->displacement, [](const Vector3& x) { return x == Vector3{}; }));
 }
 
-/// Two sheets as one skin, 1 mm apart. In: apart  they face away from each other, like a thin plate
+/// One skin of two sheets, 1 mm apart. In: apart  true: the sheets face away from each other, like
+/// a thin plate; false: they face each other
 Scene sheets(bool apart) {
   Scene scene;
   const std::size_t count = scene.skin.neutral.size(), faces = scene.skin.corners.size();
@@ -288,7 +290,8 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
   auto positions = scene.skin.neutral;  // the upper sheet moves down by 2 mm, through the lower one
   for (std::size_t v = count; v < positions.size(); ++v) positions[v][2] -= 2.0;
   const auto found = look(check, {positions, {}});
-  // Light reaches so narrow a gap only at the rim: faults are found where vertices are shown.
+  // Light reaches into the narrow gap only at its rim. Faults must be found only at vertices that
+  // are shown.
   double deepest = 0.0;
   std::size_t inside = 0;
   for (std::size_t v = count; v < positions.size(); ++v) {
@@ -306,7 +309,7 @@ TEST(Correct, WhatGoesIntoOneAnotherGoesBackByHalfEach) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, {scene.skin.neutral, {}});
   const std::uint32_t count = kSheet * kSheet;
-  // At the rim, where light enters, the upper sheet moves down.
+  // The upper sheet moves down at the rim, where light enters and vertices are shown.
   auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < count; ++v) {
     const double d = std::hypot(x_of(v) + 20.0, y_of(v)) / 6.0;

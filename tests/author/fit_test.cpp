@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t kSide = 21;  // vertices along a side: 441 in all
 
-/// A sheet of 2 x 2 about the origin, in the plane z = 0.
+/// A flat sheet of 2 x 2 units around the origin, in the plane z = 0.
 Shapes sheet(std::size_t expressions) {
   Shapes out;
   out.expressions = expressions;
@@ -40,7 +40,7 @@ double bump(const Vector3& p, double x, double y) {
   return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
 }
 
-/// Three expressions: the left side rises, the right side rises, the left side turns about y.
+/// Three expressions: the left side rises, the right side rises, the left side rotates about y.
 Shapes two_sides() {
   Shapes out = sheet(3);
   const double angle = 0.3;
@@ -55,7 +55,7 @@ Shapes two_sides() {
   return out;
 }
 
-/// The fit's own position of a vertex, by Rodrigues' formula.
+/// The position of a vertex that the fit's joints give, by Rodrigues' formula.
 Vector3 posed(const Shapes& shapes, const Fit& fit, std::size_t v, std::size_t e) {
   Vector3 out{};
   const Vector3& p = shapes.neutral[v];
@@ -178,7 +178,7 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
-/// The largest displacement of a vertex by one joint in an expression.
+/// The largest displacement of any vertex by one joint in an expression.
 double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
   Fit alone = fit;
   for (std::size_t other = 0; other < fit.joints.size(); ++other) {
@@ -193,7 +193,7 @@ double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e
   return most;
 }
 
-/// The index of the same joint and expression on the other side.
+/// The index, in Fit::motions, of the mirrored joint in the mirrored expression.
 std::size_t other_side(const Mirror& mirror, const Fit& fit, std::size_t j, std::size_t e,
                        std::size_t expressions) {
   return fit.mirrored[j] * expressions + mirror.expressions[e];
@@ -250,7 +250,8 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    // The fit also counts the mirror of the third expression.
+    // The bound is not exact: the fit minimises over four expressions, because it adds the mirror
+    // of the third one.
     EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
@@ -307,7 +308,8 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
     Shapes left = shapes;
     for (std::size_t v = 0; v < left.vertex_count(); ++v) {
       if (left.neutral[v][0] > 0.0) continue;
-      // The right side is not compared.
+      // Vertices of the right side get no displacement and no weight on moving joints, so that
+      // their error is 0.
       for (std::size_t e = 0; e < left.expressions; ++e) {
         for (std::size_t k = 0; k < 3; ++k) at(left, v, e, k) = 0.0f;
       }
@@ -360,7 +362,8 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto again = fit_weights(shapes, joints, few(9), start);
   ASSERT_TRUE(again) << again.error().describe();
   EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
-  // Resting joints, even more of them than candidates of a vertex, displace no moving joint.
+  // 30 joints without motion, more than the candidates of a vertex, must not displace a moving
+  // joint.
   std::vector<GivenJoint> many(30);
   many.insert(many.end(), joints.begin() + 1, joints.end());
   StartWeights later = start;
@@ -382,7 +385,7 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
-/// A sheet half as wide and twice as deep, with displacements scaled alike.
+/// The sheet half as wide, twice as deep and sheared, with displacements scaled alike.
 Shapes reshaped(Shapes shapes) {
   for (Vector3& p : shapes.neutral) p = {0.5 * p[0], p[1], 2.0 * p[2] + 0.1 * p[1]};
   for (std::size_t i = 0; i < shapes.displacements.size(); i += 3) {
@@ -400,7 +403,7 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   ASSERT_TRUE(fit) << fit.error().describe();
   const StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
   const std::vector<std::uint32_t> middles(8, kInTheMiddle);
-  // On the same sheet the fit finds the same motions, and the weights stay.
+  // On the same sheet the fit finds motions as good, and does not change the weights.
   auto same = fit_motions(shapes, options, weights, middles);
   ASSERT_TRUE(same) << same.error().describe();
   EXPECT_LT(largest_error(shapes, *same), 1.2 * largest_error(shapes, *fit));
@@ -480,7 +483,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
 
 TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
   const Shapes shapes = two_sides();
-  // Two joints of each side turn about one point, each in its own expression.
+  // On each side two joints have the same position. Each of them moves in another expression.
   std::vector<GivenJoint> joints(5);
   for (std::size_t j = 1; j < 5; ++j) {
     joints[j].position = {j % 2 == 1 ? 0.5 : -0.5, 0.0, -0.4};
@@ -512,7 +515,8 @@ TEST(Fit, JointsOfALidLieInTheEye) {
   EXPECT_GT(at_pivot(0.5), 0);
   EXPECT_EQ(at_pivot(0.5), at_pivot(-0.5));
   EXPECT_LT(largest_error(shapes, *fit), 0.02);
-  // The eyes are slightly asymmetric: the joints of both sides are placed half way.
+  // The pivots of the eyes are slightly asymmetric: the joints of both sides are placed at the mean
+  // of the pivots.
   options.pivots[1].position[0] = -0.48;
   fit = fit_joints(shapes, options);
   ASSERT_TRUE(fit) << fit.error().describe();

@@ -9,8 +9,9 @@ namespace {
 
 constexpr std::uint32_t kNone = Mirror::kNone;
 
-/// Two triangles that share the middle vertices 0 and 2, whose heights are not in that order.
-/// Vertex 1 lies on the left, 3 on the right.
+/// Two triangles that share the vertices 0 and 2 in the middle; vertex 1 is on the left, vertex 3
+/// on the right. The vertices are not in the order of their heights, because the search sorts them
+/// by height.
 Shapes kite(std::size_t expressions) {
   Shapes out;
   out.neutral = {{0, 2, 0}, {1, 1, 0.5}, {0, 0, 0}, {-1, 1, 0.5}};

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kCorners = 17;
 
-/// A flat sheet of 17 x 17 corners, of size 1.
+/// A flat sheet of 17 x 17 corners with sides of length 1.
 Surface square() {
   Surface out;
   for (std::uint32_t y = 0; y < kCorners; ++y) {
@@ -55,7 +55,8 @@ TEST(Simplify, WhatAnAttributeShowsIsKept) {
   Surface surface = square();
   surface.attribute_count = 1;
   for (std::uint32_t c = 0; c < surface.positions.size(); ++c) {
-    // An attribute that peaks in one corner of the sheet and is invisible in the positions.
+    // The attribute is high only in one corner of the sheet, whereas all positions lie in one
+    // plane.
     const float x = surface.positions[c][0], y = surface.positions[c][1];
     surface.attributes.push_back(std::max(0.0f, 0.5f - x) * std::max(0.0f, 0.5f - y) * 4.0f);
   }

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Measures the depth of skin inside eyeballs and teeth, and of hair inside skin.
 
-Eyes and teeth are rigid. Each has a table of its outer radius around a middle or an axis, made from
-the neutral face. Samples of the skin are transformed back by the body's motion and looked up in the
-table, so a frame costs little. Lengths are in the file's unit. Places are float64[n, 3] with x to
-the side, y up and z to the front.
+Eyeballs and rows of teeth are rigid bodies. Each has a table of its outer radius around a middle or
+an axis, made from the neutral face. In each frame, samples of the skin are transformed by the
+inverse of the body's motion, and compared with the table, which takes little time. Lengths are in
+the file's unit. Places are float64[n, 3] with x to the side, y up and z to the front.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Ints = npt.NDArray[np.int64]
 
 
 def rigid_motion(rest: Floats, now: Floats) -> tuple[Floats, Floats]:
-    """The rotation R [3, 3] and shift t [3] of the best now = rest R^T + t.
+    """The rotation R [3, 3] and shift t [3] for which now = rest R^T + t fits best.
 
     Args:
         rest, now: the same points, [n, 3].
@@ -56,7 +56,7 @@ def skin_samples(places: Floats, faces: Sequence[Sequence[int]]) -> Skin:
 
     Args:
         places: [V, 3] at rest.
-        faces: corners of each, three or more.
+        faces: vertex indices of each face, three or more.
     """
     normals = np.zeros_like(places)
     rows: list[tuple[int, int, int, int]] = []
@@ -111,7 +111,7 @@ class Ball:
         return table
 
     def depth(self, places: Floats) -> Floats:
-        """Depth of places [n, 3], in the ball's neutral frame, inside it; negative outside."""
+        """Depth of places [n, 3] below the surface of the ball at rest; negative outside."""
         rays = places - self.middle
         far = np.linalg.norm(rays, axis=1).clip(1e-9)
         up = np.arccos((rays[:, 1] / far).clip(-1.0, 1.0)) / np.pi * self.ROWS
@@ -155,12 +155,12 @@ class Arch:
         return row, column, np.hypot(x, z), there
 
     def depth(self, places: Floats, may_be_behind: npt.NDArray[np.bool_]) -> Floats:
-        """Depth of places inside the row or behind its front; 0 outside.
+        """Depth of places behind the outer surface of the row; 0 in front of it.
 
         Args:
-            places: [n, 3], in the row's neutral frame.
-            may_be_behind: [n], whether a place may be behind this row (lips of the other row); then
-                only the depth inside the row counts.
+            places: [n, 3], transformed to the neutral position of the row.
+            may_be_behind: [n], whether a place may be behind the whole row, as the lip of the other
+                jaw may. The depth of such a place is 0 behind the row's inner surface.
         """
         row, column, radius, there = self._cells(places)
         row, column = np.where(there, row, 0), np.where(there, column, 0)
@@ -171,7 +171,7 @@ class Arch:
 
 
 def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
-    """Points all over triangles."""
+    """Points spread evenly over triangles, with `fine` steps along each edge."""
     steps = [(i, j) for i in range(fine + 1) for j in range(fine + 1 - i)]
     shares = np.array([(i, j, fine - i - j) for i, j in steps], np.float64) / fine
     return np.einsum("sk,fkd->fsd", shares, places[triangles]).reshape(-1, 3)
@@ -180,7 +180,8 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 class Cards:
     """Vertices of hair, each assigned to the nearest skin triangle in the neutral pose."""
 
-    # Numbers of nearby skin triangles that may become the nearest: usually, and in deep folds.
+    # The nearest triangle in another pose is searched among the triangles that are near a hair in
+    # the neutral pose: among the NEAR nearest, and in deep folds among the AROUND nearest.
     NEAR, AROUND = 48, 400
 
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:

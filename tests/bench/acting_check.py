@@ -33,13 +33,13 @@ _ROOT = 0.5  # mm; hair vertices nearer to the skin in the neutral pose are root
 
 
 class Points:
-    """The vertices that several users need in each frame; each vertex is computed once."""
+    """The vertices that the checks need in each frame; each is computed once for all checks."""
 
     def __init__(self, surface: Any) -> None:
         self._surface, self._rows, self._where = surface, [], {}
 
     def add(self, mesh: int, vertices: Ints) -> Ints:
-        """Register vertices of a mesh. Returns their rows in at(). Args: vertices  any shape."""
+        """Register vertices of a mesh, an array of any shape. Returns their rows in at()."""
         unique, inverse = np.unique(vertices, return_inverse=True)
         place = []
         for vertex in unique:
@@ -65,7 +65,7 @@ class Points:
 
 
 class Eye:
-    """The lids around an eyeball."""
+    """Checks the lids around an eyeball."""
 
     def __init__(self, face: Face, name: str) -> None:
         mesh = face.mesh(name)
@@ -91,7 +91,7 @@ class Eye:
 
 
 class Mouth:
-    """The lips around both rows of teeth."""
+    """Checks the lips around both rows of teeth."""
 
     def __init__(self, face: Face, name: str) -> None:
         mesh = face.mesh(name)
@@ -121,7 +121,7 @@ class Mouth:
         return skin.kept(outward & tall & ahead & (radius < wide + 2.0) & (radius > 0.85 * wide))
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """As of Eye."""
+        """The name of the check, the depth of each sample, and the samples' places."""
         places = now[self._corners].mean(axis=1)
         deep = np.zeros(len(places))
         for lower, arch, rest, points in self.rows:
@@ -132,7 +132,7 @@ class Mouth:
 
 
 class Hair:
-    """Hair cards over the skin: their roots, or their other vertices."""
+    """Checks hair cards over the skin: either their roots, or their other vertices."""
 
     def __init__(self, face: Face, name: str, roots: bool, most: int = 4000) -> None:
         mesh = face.mesh(name)
@@ -151,9 +151,10 @@ class Hair:
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
         """The name of the check, the depth of each hair vertex, and their places.
 
-        A plane continues beyond its triangle, which gives wrong depths if skin rolls in (lips). So
-        doubtful vertices are measured again from the nearest triangles of the pose, and too deep
-        ones from many more triangles, because folds bring distant triangles near.
+        The depth is first measured from the plane of one triangle. A plane continues beyond its
+        triangle, which gives wrong depths if skin rolls in (lips). So doubtful vertices are
+        measured again from the nearest of Cards.NEAR triangles. Vertices that are still too deep
+        are measured from Cards.AROUND triangles, because folds bring distant triangles near.
         """
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
@@ -210,7 +211,7 @@ class Face:
         return [corners[a:b] for a, b in itertools.pairwise(ends)]
 
     def triangles(self, mesh: int) -> Ints:
-        """[F, 3], fans of the faces."""
+        """int64[F, 3]: the vertices of the faces, divided into triangles."""
         fans = ((f[0], f[i], f[i + 1]) for f in self.faces(mesh) for i in range(1, len(f) - 1))
         return np.array(list(fans), np.int64)
 
@@ -222,7 +223,7 @@ class Face:
 
 
 def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
-    """Check -> float64[frames, 4]: largest depth of each frame in mm, and its place."""
+    """Check -> float64[frames, 4]: largest depth of each frame in mm, and x, y, z of the place."""
     checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
     for frame, raw in enumerate(acting.raw):
         now = face.points.at(raw)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Makes frames of random acting by a seed, both usual and unusual ones.
+"""Makes frames of random acting from a seed, both usual and unusual ones.
 
 A third of the frames are one or two expressions. A third are speech (of a clip, or blended visemes)
-under an expression. A third are two random controls. Gaze and blinks are added to all. The rules of
-risorius.Mixer resolve controls that exclude each other, so all remaining combinations are allowed.
+under an expression. A third are two random controls. Half of all frames get a gaze, and a third get
+a blink. The rules of risorius.Mixer resolve controls that exclude each other, so all remaining
+combinations are allowed.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 
     python tests/bench/animation_sizes.py FACE.dna [FACE.dna ...]
 
-The demo's acting at 30 and 60 frames a second, smoothed between its keys, and at 30 with the noise
-of a capture on all controls. Joints: the curves that change, as a bake writes them (three
-translations and three rotations of each joint that moves), and the blend shape weights that change.
-Float32 as it is, and both packed by the same lossless clip format.
+The animation is the demo's acting, smoothed between its keyframes: at 30 and 60 fps, and at
+30 with the noise of a capture on all controls. The size of joints and blend shapes counts only
+curves that change, as a bake writes them: three translations and three rotations of each joint that
+moves, and blend shape weights. Sizes are given for plain float32, and for the lossless clip format.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def controls_clip(names, rate):
 
 
 def captured(clip, names, noise):
-    """The clip like a capture: all controls, with noise, rounded to thousandths.
+    """The clip as a capture would record it: all controls, with noise, rounded to thousandths.
 
     Args:
         clip: clip of raw controls.
@@ -63,7 +63,7 @@ def captured(clip, names, noise):
 
 
 def baked_clips(rig, clip):
-    """Clips of the changing curves of joints and of blend shapes.
+    """Two clips of a baked animation: curves of joints and of blend shapes that change.
 
     Args:
         rig: a risorius.Rig.

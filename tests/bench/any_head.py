@@ -86,7 +86,8 @@ def measured(
     """The table row of one head, in the order of COLUMNS.
 
     Args:
-        marks: random error in mm of pairs at true places; None: landmarks are found instead.
+        marks: random error in mm that is added to the true places of the paired vertices; None:
+            landmarks are found instead.
     """
     random = np.random.default_rng(seed)
     chosen = marks_of(template)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Compares the expressions of a face conformed to another head with the head's own expressions.
 
-The places of the face's skin on each head are given. The errors of each expression are measured
-over the vertices that move by at least 0.1 mm: mean, 95 % quantile and largest in mm. The errors of
-plainly copied displacements are printed beside them.
+HEAD.npz gives the true place of each vertex on the head. The errors of each expression are measured
+over the vertices that move by at least 0.1 mm: mean, 95 % quantile and largest in mm. For
+comparison, the errors of displacements that are copied unchanged are printed, too.
 
 python tests/bench/any_head_conform.py FACE.dna HEAD.npz ... [--worst N] [--remeshed KIND]
 
-With --remeshed the skin of FACE.dna is laid onto HEAD_KIND.obj, which has other vertices.
+With --remeshed the skin of FACE.dna is fitted to HEAD_KIND.obj, which has other vertices.
 
 HEAD.npz has, in centimetres and with the vertices of FACE.dna's skin, NAME/points float64[V, 3],
 NAME/deltas float32[E, V, 3], where NAME is the skin's mesh, and expressions, str[E]: names of raw

@@ -3,8 +3,8 @@
 
     python tests/bench/any_head_contact.py HEAD.obj... [--template FACE.dna] [--deepest 3]
 
-Each head gets the template's expressions with automatic landmarks, and they are repaired. Two rows
-per head, before and after the repair, over all expressions and correctives:
+The template's expressions are transferred to each head with automatic landmarks, and repaired. The
+table has two rows per head, before and after the repair, over all expressions and correctives:
 *gap*: the widest gap between closed lids, by rays from the eye's centre;
 *seen*: the largest visible area of an eye with both blinks, over five views of the face;
 *cut*: the greatest depth of the outer lids in the eye;
@@ -12,7 +12,7 @@ per head, before and after the repair, over all expressions and correctives:
 of an open jaw;
 *teeth*: volume of skin in teeth and gums beyond rest, measured by SkinChecker, summed over the
 `--deepest` expressions with the largest volume;
-*torn*: polygons of more than 2.5 times their area, summed over all expressions.
+*torn*: number of polygons that grow to more than 2.5 times their area, over all expressions.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def main():
     parser.add_argument("--strength", type=float, default=1.0)
     parser.add_argument("--deepest", type=int, default=3)
     args = parser.parse_args()
-    template = risorius.load(args.template) if args.template else default_template()
+    template = risorius.load(args.template or default_template())
     source = read_template(template)
     print("| " + " | ".join(HEADS) + " |\n|" + "---|" * len(HEADS))
     for path in args.heads:

@@ -4,8 +4,8 @@
     python tests/bench/any_head_transfer.py [--heads 4] [--first 300] [--known] [--threads 0]
 
 Draws random people from the sample's generator, whose expressions are known, remeshes them, and
-transfers the man's expressions to them without repair at strength 1. The template is laid on a head
-by registration with automatic landmarks, or with --known by the true vertex positions. An
+transfers the man's expressions to them without repair at strength 1. The template is fitted to a
+head by registration with automatic landmarks, or with --known by the true vertex positions. An
 expression's error is the distance from the true expression, over the vertices that it moves by more
 than 0.1 mm.
 

@@ -9,8 +9,8 @@ Measures the faults of all pairs of expressions that move common vertices and ar
 repairs the pairs, and measures them again with their correctives, for several numbers of
 correctives.
 
-*Bound*: the fraction by which the three totals (volume, torn, folded) can all fall at most if this
-number of pairs is repaired completely.
+*Bound*: an upper bound of the fraction by which all three totals (volume, torn, folded) can fall if
+this number of pairs is repaired completely.
 *Undone*: vertices without a fault that the linear sum moves by more than 0.5 mm, and that keep
 less than 0.9 of this motion with the corrective.
 *Worse*: pairs whose greatest depth grows by more than 0.1 mm with the corrective, or whose most
@@ -52,8 +52,11 @@ def corners_of(mesh):
 
 
 def undone(search, on, mesh):
-    """Numbers of moving vertices without a fault: (all; held back: keeping less than KEPT of their
-    motion; held back and over REACH_MM from a fault; changed by over 0.01 mm).
+    """Four numbers of moving vertices without a fault, in a pair with its corrective.
+
+    They are: all such vertices; vertices whose motion the corrective reduces to less than the
+    fraction KEPT; of these, the ones more than REACH_MM away from any fault; and vertices that the
+    corrective moves by more than 0.01 mm.
 
     Args:
         search: the search, after it has repaired the pair.
@@ -95,7 +98,7 @@ def worse(search, on):
 
 
 def grew(a, b):
-    """Whether the greatest depth of b exceeds that in a by 0.1 mm, or its largest stretch by 1 %.
+    """Whether `b` exceeds `a` by 0.1 mm in greatest depth, or by 1 % in largest stretch.
 
     Args:
         a: faults of a skin without a corrective.

@@ -3,7 +3,7 @@
 
     python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound] [--heads HEAD ...]
 
-Dem Bones is EA's library: pip install py-dem-bones==0.13.1. Both get the same mesh, number of
+Dem Bones is EA's library: pip install py-dem-bones==0.13.1. Both fits get the same mesh, number of
 joints and influences. HEAD is cc0 (the CC0 head with its expressions), a name of MACROS (the same
 expressions on a body shape that no sample person has), or the path of ICT FaceKit's head as .npz.
 """

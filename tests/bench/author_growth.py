@@ -3,9 +3,9 @@
 
     python tests/bench/author_growth.py [--largest] [--picture GROWTH.png]
 
-A ball of polygons that bumps of many places and directions move. Each size is a process of its own,
-so that its memory is its own; seconds are of CPU. --largest adds 24,000 vertices, 260 expressions
-and 800 joints at once.
+The input is a ball of polygons, whose expressions are bumps at many places in many directions. Each
+size is measured in a separate process, so that its memory can be measured; seconds are CPU time.
+--largest adds a run with 24,000 vertices, 260 expressions and 800 joints.
 """
 
 from __future__ import annotations

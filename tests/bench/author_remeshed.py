@@ -64,7 +64,7 @@ def remeshed(positions, faces, voxel):
 
 
 def carried(points, positions, faces, units):
-    """The nearest point on the old surface of each point, and the units' displacements there."""
+    """For each point, the nearest point on the old surface, and the units' displacements there."""
     triangles = np.array([[f[0], f[i], f[i + 1]] for f in faces for i in range(1, len(f) - 1)])
     tree = BVHTree.FromPolygons(positions.tolist(), triangles.tolist())
     corners, shares, apart = [], [], []

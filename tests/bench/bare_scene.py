@@ -10,7 +10,7 @@ CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 class Bare:
-    """Stored poses of the add-on: finished positions, or bones and live keys."""
+    """Replays poses that the add-on has computed: vertices, or bones and live shape keys."""
 
     def __init__(self, rigs):
         # Names instead of objects, because an undo replaces all objects.
@@ -38,11 +38,11 @@ class Bare:
         self.poses.append(pose)
 
     def begin(self):
-        """Disable the modifiers of meshes with finished positions, as the add-on does."""
+        """Disable Armature modifiers of meshes with final vertex positions, as the add-on does."""
         self._switch(False)
 
     def end(self):
-        """Enable them again: the add-on would take them for disabled by the user."""
+        """Enable these modifiers, so that the add-on does not assume that a user disabled them."""
         self._switch(True)
 
     def _switch(self, on):
@@ -54,7 +54,7 @@ class Bare:
                         modifier.show_viewport = on
 
     def write(self, *_arguments):
-        """Write the next pose; a handler of Blender may call it."""
+        """Write the next stored pose into the scene; can be used as a handler of Blender."""
         self.turn += 1
         for rig_name, bones, keys in self.poses[self.turn % len(self.poses)]:
             rig = bpy.data.objects[rig_name]

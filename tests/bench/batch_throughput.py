@@ -132,7 +132,7 @@ def batches(table: Table, dna: Path, lod: int, folder: Path) -> None:
 
 
 def shares(summary: Path) -> str:
-    """Text: percentages of the jobs' time for reading, for evaluating, and for the rest."""
+    """Percentages, as text, of the jobs' time for reading, evaluating and everything else."""
     rows = json.loads(summary.read_text())["jobs"]
     total = sum(row["job_seconds"] for row in rows)
     load = sum(row["load_seconds"] for row in rows) / total

@@ -64,7 +64,8 @@ void decode(benchmark::State& state, const File& file) {
 
 void one_frame(benchmark::State& state, const File& file) {
   clip::Player player(open(file));
-  // Far from the previous frame, so that it is in another block unless the clip has only one block.
+  // Each frame is so far from the previous one that it is in another block, unless the clip has
+  // only one block.
   std::size_t at = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(player.frame(at));

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """clip_compare.py [--out FOLDER]: compares `.rzc` with other lossless packers of float32, on the
 three kinds of curves of clip_curves.py. Values are the size of the curves divided by the packed
-size, and the unpacking speed in GB/s. The size of `.rzc` includes its head, names and index.
+size, and the unpacking speed in GB/s. The size of `.rzc` includes its header, names and index.
 
 Each other packer counts with the smaller of two sizes: all curves in one array, or each curve alone
 with constant curves at no cost. Packages: pcodec, zstandard, blosc2, fpzip; a missing package is
@@ -42,7 +42,8 @@ def pcodec(level: int) -> tuple[Pack, Unpack]:
 
 
 def zstd(shuffled: bool) -> tuple[Pack, Unpack]:
-    """zstd at level 19. With `shuffled`, it packs uint32 differences of frames, byte by byte."""
+    """zstd at level 19. With `shuffled`, it packs uint32 differences between frames: all first
+    bytes, then all second bytes, and so on."""
     package = importlib.import_module("zstandard")
     compressor, decompressor = package.ZstdCompressor(level=19), package.ZstdDecompressor()
 

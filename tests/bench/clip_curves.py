@@ -14,9 +14,9 @@ RATE = 60
 
 
 def sparse(frames: int = 3600) -> Curves:
-    """Hand-keyed animation sampled at 60 fps: 72 of 260 controls have keys, 8 to 40 frames apart;
-    80 % of the segments are Bezier with automatic handles, 12 % linear, 8 % constant. A quarter of
-    the keys repeat the value before them. The other controls stay at 0."""
+    """Hand-keyed animation sampled at 60 fps: 72 of 260 controls have keyframes, 8 to 40 frames
+    apart; 80 % of the segments are Bezier with automatic handles, 12 % linear, 8 % constant. A
+    quarter of the keyframes repeat the value before them. The other controls stay at 0."""
     rng = np.random.default_rng(SEED)
     curves = np.zeros((CONTROLS, frames), np.float32)
     for control in rng.choice(CONTROLS, 72, replace=False):
@@ -35,7 +35,7 @@ def sparse(frames: int = 3600) -> Curves:
 
 
 def _segment(kind: int, at: Curves, values: Curves, i: int, time: Curves) -> Curves:
-    """Values at `time` (frames) between keys i and i + 1; kind 0 Bezier, 1 linear, 2 constant."""
+    """Values at `time` (frames) from keyframe i to i + 1; kind 0 Bezier, 1 linear, 2 constant."""
     first, last = values[i], values[i + 1]
     if kind == 2 or first == last:
         return np.full(time.size, first, np.float32)

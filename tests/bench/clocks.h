@@ -19,8 +19,8 @@ double wall_seconds_of(F f) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The time in which this process had a core, without the time of other processes on a busy
-/// machine.
+/// The seconds during which f ran on a core. Time that the system gave to other processes does not
+/// count.
 template <class F>
 double own_seconds_of(F f) {
 #ifdef CLOCK_PROCESS_CPUTIME_ID
@@ -37,7 +37,7 @@ double own_seconds_of(F f) {
 #endif
 }
 
-/// Touches 256 MB, more than every cache holds.
+/// Writes to 256 MB, more than all caches have, so that they lose their content.
 inline void empty_caches() {
   static std::vector<std::uint64_t> memory((std::size_t{256} << 20) / 8, 1);
   for (std::size_t i = 0; i < memory.size(); i += 8) ++memory[i];

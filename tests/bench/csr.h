@@ -22,7 +22,7 @@ struct Csr {
 class Baseline {
  public:
   Baseline(const dna::Dna& dna, std::uint32_t lod);
-  /// All stages for the raw controls of one frame.
+  /// Runs all stages of an evaluation for the raw controls of one frame.
   void evaluate(const float* raw);
   const Csr& matrix() const { return matrix_; }
   const std::vector<float>& joints() const { return joints_; }

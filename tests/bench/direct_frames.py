@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Frames of faces from raw controls to finished vertices, by threads and by number of faces.
+"""Measures frames of faces, from raw controls to vertices, by numbers of threads and faces.
 
     python tests/bench/direct_frames.py FILE.dna [--faces 1 2 4 8] [--threads 1 2] [--rounds 60]
 
-Every frame has other values of 60 controls; all meshes of LOD 0 are written. Medians in ms of
-rounds that take turns. Run by a Python with `risorius`.
+Every frame has other values of 60 controls; all meshes of LOD 0 are written. Prints medians in ms;
+rounds of the compared cases alternate. Run by a Python with `risorius`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Draw every expression on a face: a sheet to judge them by.
+"""Draw every expression on a face, on a sheet for visual inspection.
 
     python tests/bench/draw_expressions.py SAMPLE.dna SHEET.jpg [--size 160] [--samples 8]
         [--only NAME ...] [--columns 9] [--file EXPRESSIONS.toml]
 
-Run by a Python that has `bpy`, `risorius` and Pillow. Visemes are seen from nearer.
+Run by a Python that has `bpy`, `risorius` and Pillow. Pictures of visemes show only the mouth.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ class Shot(NamedTuple):
 
 
 MODULE = "bl_ext.user_default.risorius"
-# How high the middle is over the eyes and how high the picture, in distances between the eyes.
+# (height of the picture's middle above the eyes, height of the picture), as multiples of the
+# distance between the eyes.
 LOOKS = {"face": (-0.42, 3.3), "mouth": (-1.05, 1.9), "eyes": (0.0, 1.9)}
 
 
@@ -129,11 +130,11 @@ def draw(
 
     Args:
         sample: a DNA file.
-        shots: in the order of the sheet.
-        out: the picture.
-        size: pixels of each, both ways.
-        samples: of Cycles.
-        columns: of the sheet.
+        shots: the pictures to render, in the order of the sheet.
+        out: path of the sheet.
+        size: width and height of each picture in pixels.
+        samples: samples of Cycles per pixel.
+        columns: number of columns of the sheet.
     """
     with tempfile.TemporaryDirectory() as folder:
         os.environ["BLENDER_USER_RESOURCES"] = folder

@@ -12,11 +12,11 @@ at every frame, by an NLA strip with a second strip in Add mode above it. Each r
     add-on, AUTO / LIVE / KEYS   the add-on: Direct, Live and real shape keys
     floor of AUTO / LIVE         a bare handler alternates between two poses of the add-on
     plain way                    a handler evaluates the same rig natively and writes all bones and
-                                 all key values to the originals, in bulk; real keys, no drivers
-    plain way, loops             the same, with one assignment per bone and key
+                                 all shape key values to the originals, in bulk; no drivers
+    plain way, loops             the same, with one assignment per bone and shape key
     curves only                  no handler follows the controls
 
-With --clip, a clip (tests/bench/real_frames.py) is imported and plays instead of these keys.
+With --clip, a clip (tests/bench/real_frames.py) is imported and plays instead of the strips.
 
 With --sample, also measures ten characters of SAMPLE.dna in one scene at their lowest LOD.
 """
@@ -101,11 +101,11 @@ def animate(controls, frames, active=ANIMATED):
 
 
 def play(controls, clip, frames, active):
-    """Animate the controls by an imported clip, or by keys of `animate`.
+    """Animate the controls by an imported clip, or by keyframes from `animate`.
 
     Args:
         controls: the control armature.
-        clip: path of a clip file, or None for keys.
+        clip: path of a clip file, or None for keyframes.
         frames: length of the keyed animation in frames.
         active: number of keyed controls.
     """
@@ -141,7 +141,7 @@ def own_time(package, frames):
 
 
 def plain_way(controls, rig, path, loops):
-    """Replace the add-on by a handler that writes bones and keys. Returns the number of bones."""
+    """Replace the add-on by a handler of bones and shape keys. Returns the number of bones."""
     import numpy as np
     import risorius
 
@@ -211,7 +211,7 @@ def row(way, times, note, base=None):
 
 
 def measure_full(path, package, frames, clip, active):
-    """Measure all rows of the full-scale face. The plain way is first: it is the others' base."""
+    """Measure all rows of the full-scale face, first the plain way, as base of the others."""
     print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
     base = None
     for loops in (False, True):

@@ -19,8 +19,8 @@ struct Frames {
   const float* at(std::size_t frame) const { return values.data() + frame * controls; }
 };
 
-/// Frames like a moving face: a part of the controls is active, every frame has new values, and in
-/// every second frame another control replaces an active one.
+/// Frames that change like a moving face. `active` controls are not 0, every frame has new values,
+/// and in every second frame another control replaces an active one.
 inline Frames make_frames(std::size_t controls, std::size_t active) {
   constexpr std::size_t kCount = 1024;
   std::mt19937 random(7);
@@ -38,7 +38,8 @@ inline Frames make_frames(std::size_t controls, std::size_t active) {
   return frames;
 }
 
-/// Little-endian float32[count, controls]; no frames if the file has another size.
+/// Reads a file of little-endian float32[count, controls]. Returns no frames if the file cannot be
+/// read or its size does not fit.
 inline Frames read_frames(const char* path, std::size_t controls) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return {};

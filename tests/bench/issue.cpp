@@ -39,7 +39,7 @@ const Data& data() {
   return made;
 }
 
-// Matrix of the (i % 4)-th of four bone indices, which are packed as 16-bit fields into `four`.
+// The matrix of bone number i % 4 of the four bone indices that `four` has as 16-bit fields.
 const float* row(const Data& d, std::uint64_t four, std::size_t i) {
   return d.rows + std::size_t{static_cast<std::uint16_t>(four >> (16 * (i % 4)))} * kRow;
 }
@@ -50,7 +50,7 @@ std::uint64_t four_bones(const Data& d, std::size_t i) {
   return four;
 }
 
-// Each function below has as many independent sums as fit into the registers.
+// Each of the following functions has as many independent sums as fit into the registers.
 
 #ifdef RISORIUS_WIDE
 
@@ -112,7 +112,8 @@ __attribute__((target("avx2,fma"))) float issue_256(const Data& d, std::size_t i
   return sum;
 }
 
-// With registers of four numbers, as in SSE4: a multiplication and an addition, not fused.
+// With registers of four floats, as in SSE4. Multiplication and addition are separate instructions,
+// not fused.
 float issue_128(const Data& d, std::size_t influences) {
   constexpr std::size_t kSums = 4;
   __m128 s[kSums][3];

@@ -8,8 +8,8 @@
 namespace risorius::bench {
 
 /// Issues the reads and multiply-adds that `Kernels::skin` of an instruction set needs for this
-/// number of influences, on data in the first cache: for each influence a row of the matrix, for
-/// each four the bones and the weights. Other work per vertex is left out.
+/// number of influences: a row of the matrix for each influence, and bones and weights for each
+/// four influences. The data are in the first-level cache. Other work for each vertex is left out.
 void issue_skin(std::string_view set, std::size_t influences);
 
 }  // namespace risorius::bench

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How long a face takes from the phone's packet to the slider, and what it costs.
+"""Measures the time from a phone's packet to the slider of a face, and its cost in Blender.
 
     python tests/bench/live_latency.py [--seconds 20] [--rate 60] [--dna FILE]
 
@@ -38,7 +38,7 @@ for n in range(int(rate * seconds)):
 
 
 def _prepare(dna):
-    """The add-on in an empty file with a face."""
+    """Enable the add-on in an empty file, and load a face. Returns its rig."""
     sys.path.insert(0, str(PROJECT / "blender_tests"))
     import os
     import shutil
@@ -63,7 +63,8 @@ def _prepare(dna):
 
 
 def _measure(rig, options):
-    """(sent times, then by frame number: arrival, written), durations of timer and of update."""
+    """Frame number -> time of sending; frame number -> times of arrival and of writing the sliders;
+    durations of the timer function; durations of the scene's update. All in seconds."""
     import bpy
     from support import scene
 

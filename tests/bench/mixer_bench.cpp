@@ -19,7 +19,7 @@ std::vector<std::string> control_names() {
   return out;
 }
 
-// A clip in which every `step`-th region moves.
+// A layer whose clip moves every `step`-th region. The mask of the other controls is 0 if step > 1.
 clip::Layer make_layer(std::size_t step, clip::Blend blend, unsigned seed) {
   const std::vector<std::string> names = control_names();
   std::mt19937 random(seed);

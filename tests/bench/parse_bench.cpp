@@ -44,7 +44,7 @@ class CountingSource final : public bytes::Source {
   std::uint64_t bytes_ = 0;
 };
 
-// The results of a run. Bytes come from a separate run.
+// The results of a benchmark. Numbers of bytes are measured in a separate run.
 struct Row {
   std::string name;
   std::vector<double> ms;
@@ -52,7 +52,8 @@ struct Row {
   std::uint64_t bytes_read = 0, bytes_kept = 0;
 };
 
-// An error here is a mistake of the caller, because main() has read the file once.
+// Returns the value of a result. An error ends the program: it is a mistake of the caller, because
+// main() has read the file before.
 template <class T>
 T must(core::Result<T> result) {
   if (!result) {
@@ -107,7 +108,7 @@ double ms_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-// load() returns the objects to free, which happens after the time is taken.
+// Measures the time of load(). The objects that it returns are freed outside of the measured time.
 template <class Load>
 void measure_load(benchmark::State& state, Row& row, const Load& load) {
   for (auto _ : state) {
@@ -180,7 +181,8 @@ class Bench {
     rows_.back()->name = name;
     return *rows_.back();
   }
-  // A run that Google Benchmark's filter excludes has no times and is not printed.
+  // Registers a benchmark. If Google Benchmark's filter excludes it, its row has no times and is
+  // not printed.
   template <class Run>
   void run(Row& row, Run measure) {
     benchmark::RegisterBenchmark(row.name.c_str(), measure)

@@ -25,7 +25,10 @@ Point = tuple[float, float, float | None, float | None]
 
 
 def read(path: Path) -> tuple[str, dict[str, list[Point]]]:
-    """The first line, and for each panel its points, sorted: (x, us, us of csr, us of read)."""
+    """The title in the first line, and panel -> sorted points.
+
+    A point is (x, us of Risorius, us of a CSR matrix, us of just reading the active columns).
+    """
     lines = path.read_text(encoding="utf-8").splitlines()
     points: dict[str, list[Point]] = {name: [] for name in PANELS}
     for row in csv.DictReader(lines[1:]):

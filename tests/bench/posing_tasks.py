@@ -246,7 +246,7 @@ def by_board(table, board, unit, away, goal):
 
 
 def by_drags(face, goal, moving, most):
-    """(cost, raw controls) of at most `most` skin drags; each reduces the error most."""
+    """(cost, raw controls) of at most `most` skin drags; each is the drag with the best result."""
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)

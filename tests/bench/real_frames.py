@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Frames of real clips for the benchmarks, on the controls of a face.
+"""Makes frames of speech and acting for the benchmarks, on the controls of a face.
 
     python tests/bench/real_frames.py FACE.dna VOICE.wav --text TEXT --out FOLDER
 
 Writes frames.npz for `risorius bench FACE.dna --frames`, and a clip of each kind for Blender:
-`active_20` (speech.rzc) is the voice alone, listened to; `active_60` (acted.rzc) the same with the
-demo's acting, a smile and idle life over it; `active_260` (captured.rzc) that with the noise of a
-capture on every control. What moves together is what moves together in a face. All are at 60 frames
-a second; how many controls are not 0 is printed.
+`active_20` (speech.rzc) is speech from the voice; `active_60` (acted.rzc) adds the demo's acting, a
+smile and idle life; `active_260` (captured.rzc) also adds the noise of a capture to every control.
+The same controls are active together as in the acting of a face, unlike in random frames. All clips
+have 60 frames a second. Prints the number of controls that are not 0.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NAMES = {"active_20": "speech", "active_60": "acted", "active_260": "captured"}
 
 
 def clips_of(names, voice, text):
-    """The three clips by the names of their frames.
+    """Name of the frames, such as active_20 -> clip, for the three kinds of clips.
 
     Args:
         names: names of the face's raw controls.

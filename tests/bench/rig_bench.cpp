@@ -36,9 +36,9 @@ namespace {
 using namespace risorius;
 using bench::Frames;
 
-// A row of the table: names of the benchmark, of its base, and of the tight read of its active
-// columns, and the target as text. With a read,
-// the target is at most kReads times the read plus kBeside us.
+// A row of the table. name: the benchmark; base: the benchmark to which it is compared; read: the
+// benchmark that only reads the same columns; asked: the target as text. With a read, the target is
+// at most kReads times the read's time plus kBeside us.
 struct Line {
   std::string name, base, read, asked;
   double bytes = 0;  // size of the active columns
@@ -80,7 +80,7 @@ Step csr(const dna::Dna& dna, std::uint32_t lod) {
   return [base](const float* raw) { base->evaluate(raw); };
 }
 
-// No frame is evaluated twice in a row.
+// Adds a benchmark of single evaluations. No frame is evaluated twice in a row.
 void add(const std::string& name, Step step, const Frames& frames) {
   benchmark::RegisterBenchmark(name.c_str(), [&frames, step](benchmark::State& state) {
     std::size_t f = 0;
@@ -103,9 +103,10 @@ void add_cold(const std::string& name, Step step, const Frames& frames) {
   b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Many frames or faces at once in several threads. Several threads are measured by wall time and in
-// rounds, because starting a thread on an idle core of a virtual machine takes as long as hundreds
-// of frames. One thread is measured by its own clock, which stops while others have the core.
+// Adds a benchmark that evaluates many frames or faces at once. Several threads are measured by
+// wall time and in rounds, because starting a thread on an idle core of a virtual machine takes as
+// long as hundreds of frames. One thread is measured by its processor time, which does not count
+// the time of other processes.
 void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                std::size_t count, std::size_t threads, std::size_t rounds = 1) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=, &frames](benchmark::State& state) {
@@ -142,7 +143,7 @@ void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, con
   b->UseManualTime()->Iterations(static_cast<benchmark::IterationCount>(2000 / count + 2));
 }
 
-// Adds a benchmark that only reads the data that an evaluation of these frames needs.
+// Adds a benchmark that only reads the columns that an evaluation of these frames needs.
 // Out: mean number of bytes per frame
 double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                 std::uint32_t lod) {
@@ -158,7 +159,8 @@ double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, co
   return bytes;
 }
 
-// The time of storing one pose of a clip past the caches.
+// Adds a benchmark that stores the poses of a clip with stores that bypass the caches. The result
+// is the time for one pose.
 void add_store(const std::string& name, std::shared_ptr<const rig::Rig> rig, std::size_t count) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
     const std::size_t pose = std::size_t{rig->joint_count} * rig->joint_stride +
@@ -245,7 +247,7 @@ class Suite {
     lines_.push_back({name, base, read, asked, bytes});
     return lines_.back().name;
   }
-  // Adds the face, the sparse matrix and the tight read of its columns.
+  // Adds the benchmarks of a face, of the sparse matrix, and of the read of the active columns.
   void add_ours(const std::string& what, const std::shared_ptr<rig::Rig>& rig, const Frames& frames,
                 std::uint32_t lod, const std::string& asked, const std::string& level = "") {
     const std::string base = "csr" + level + ", " + frames.name;
@@ -323,7 +325,8 @@ class Suite {
   std::deque<Line> lines_;
 };
 
-// Measures how cost grows: each point as "name/x" beside "csr name/x".
+// Measures how the time grows with the size of the work x. Each point is a benchmark "name/x",
+// compared with "csr name/x".
 class Sweep {
  public:
   Sweep(const dna::Dna& dna, const Frames& frames) : dna_(dna), frames_(frames) {
@@ -394,7 +397,8 @@ class Sweep {
   std::vector<std::unique_ptr<dna::Dna>> smaller_;
 };
 
-// Keeps the medians. In: progress  show the running benchmark on one line of the terminal
+// Stores the median of each benchmark. In: progress  show the running benchmark on one line of the
+// terminal
 class Reporter : public benchmark::ConsoleReporter {
  public:
   explicit Reporter(bool progress) : progress_(progress) {}
@@ -425,7 +429,8 @@ core::Result<dna::Dna> read(const char* path) {
   return dna::parse(**source);
 }
 
-// The part that a face lacks for a table of evaluations, or nullptr.
+// The name of a part that a face must have for a table of evaluations but lacks; nullptr if it has
+// all.
 const char* missing_part(const dna::Dna& dna) {
   if (dna.definition.raw_control_names.empty()) return "raw controls";
   if (dna.descriptor.lod_count == 0) return "LODs";
@@ -434,7 +439,8 @@ const char* missing_part(const dna::Dna& dna) {
   return std::ranges::any_of(dna.behavior.joint_groups, has_values) ? nullptr : "joint groups";
 }
 
-// One set of frames, from a file or made. Out: false, after a message, if the file is not valid
+// Adds one set of frames, read from a file or generated. Out: false, after a message, if the file
+// is not valid
 bool add_frames(const std::string& name, std::size_t raw, std::size_t active, const char* file,
                 std::vector<Frames>& out) {
   Frames frames = file != nullptr ? bench::read_frames(file, raw) : bench::make_frames(raw, active);
@@ -447,13 +453,14 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
   return true;
 }
 
-// The sets of frames of the table.
-// In: files  of 20, of 60 and of all controls, or nullptr
-//     clip   frames of a real clip, or nullptr
+// Makes the sets of frames that the table compares.
+// In: files  three files: frames with 20, with 60 and with all controls active; nullptr: generated
+//     clip   file with the frames of a real clip, or nullptr
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
-  // Captures move 60 to 100 raw controls, so these rows come first.
+  // 60 and 100 are first, because in captured animations 60 to 100 raw controls move.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // The base rows are measured for small faces too.
+    // For small faces only the rows with 20 and 60 controls are measured, to which others are
+    // compared.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr
                        : active == 20   ? files[0]

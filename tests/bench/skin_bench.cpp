@@ -49,7 +49,8 @@ struct Problem {
   core::AlignedVector<float> rows;
 };
 
-// In: spread  range of the bones of a vertex; kBones: any bone
+// A mesh with random weights. In: spread  number of neighbouring bones from which a vertex's bones
+// are chosen; kBones: all bones
 Problem make_problem(std::uint32_t spread) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(0.01f, 1.0f);

@@ -10,10 +10,11 @@ random direction, often out of the face's reach. The add-on's two kinds of drags
 *Exact* (least squares) and *Near* (sparse).
 
 *sliders*: sliders that change by more than 0.0001, left and right as one; *extra*: this number
-minus the pose's own. *px off*: distance from the target at 1.25 pixels per mm. *needle*: the
-largest displacement within 12 mm that eight rounds of averaging over neighbours remove, relative
-to the vertex's displacement, divided by the same ratio of the artist's pose (for a pull, of the
-best single slider). *ms*: CPU time. Each cell is the median and the largest value.
+minus the number of sliders of the artist's pose. *px off*: distance from the target at 1.25 pixels
+per mm. *needle*: the largest displacement within 12 mm that eight rounds of averaging over
+neighbours remove, relative to the vertex's displacement, divided by the same ratio of the artist's
+pose (for a pull, of the best single slider). *ms*: CPU time. Each cell is the median and the
+largest value.
 """
 
 from __future__ import annotations
@@ -104,7 +105,10 @@ def tasks(face: Skin) -> Iterator[Case]:
 
 
 def poses(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
-    """Drags of random vertices to their places in random poses of three sliders that move them."""
+    """Drags of random vertices to their places in random poses of three sliders.
+
+    Each slider moves the vertex.
+    """
     random, made = np.random.default_rng(seed), 0
     zero = np.zeros(len(face.names))
     while made < COUNT:
@@ -131,7 +135,7 @@ def pulls(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
 
 
 def drag(face: Skin, case: Case, method: str, ease: bool = False):
-    """The solved raw controls, and the CPU seconds of the solver without local_ease."""
+    """The raw controls of a solved drag, and the solver's CPU seconds without local_ease()."""
     zero = np.zeros(len(face.names))
     reach = face.surface.jacobian(zero, face.mesh, np.array(case.vertices[:1]))
     free = np.ones(len(zero), bool)

@@ -89,7 +89,7 @@ __attribute__((target("avx2"))) std::uint64_t read_256(const char* memory,
 
 #endif
 
-// The lines of one frame; adjacent runs are joined.
+// Appends the cache lines that one frame needs. Adjacent runs are joined.
 void append_lines(const rig::Rig& rig, const float* controls, std::uint32_t lod, Reads& out) {
   const std::size_t size = rig.is_half() ? 2 : 4, begin = out.lines.size();
   for (std::size_t c = 0; c < rig.control_count; ++c) {

@@ -12,14 +12,14 @@
 
 namespace risorius::bench {
 
-/// Consecutive cache lines, counted from the begin of a matrix.
+/// Consecutive cache lines, counted from the beginning of a matrix.
 struct Lines {
   std::uint32_t first = 0, count = 0;
 };
 
-/// Reads lines with the widest registers of this CPU into eight independent sums.
+/// Reads cache lines with the widest registers of this CPU into eight independent sums.
 /// In:  memory  begins on a cache line
-/// Out: a number that depends on every line
+/// Out: a number that depends on every line, so that the compiler keeps the reads
 std::uint64_t tight_read(const void* memory, std::span<const Lines> lines);
 
 /// Fills memory with stores that bypass the caches, if this CPU has them.
@@ -27,7 +27,7 @@ std::uint64_t tight_read(const void* memory, std::span<const Lines> lines);
 ///     bytes   a whole number of lines
 void streaming_store(void* memory, std::size_t bytes);
 
-/// The lines of a Rig's matrices that the frames of one set need.
+/// The cache lines of a Rig's matrices that the frames of one set need.
 struct Reads {
   std::vector<Lines> lines;         // of all frames
   std::vector<std::size_t> begins;  // [frames + 1]: the first line of each frame
@@ -36,10 +36,10 @@ struct Reads {
     return std::span(lines).subspan(begins[frame], begins[frame + 1] - begins[frame]);
   }
 };
-/// In: lod  below the number of LODs
+/// Lists the cache lines that each frame needs. In: lod  below the number of LODs
 Reads reads_of(const rig::Rig& rig, const Frames& frames, std::uint32_t lod);
 
-/// The Rig's matrices: float32 or float16.
+/// The values of the Rig's matrices, float32 or float16.
 inline const void* values_of(const rig::Rig& rig) {
   return rig.is_half() ? static_cast<const void*>(rig.joint_halves.data())
                        : static_cast<const void*>(rig.joint_values.data());

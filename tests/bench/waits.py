@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Measures waiting times in Blender with the add-on, and those of Blender alone in the same scene.
+"""Measures waiting times in Blender with the add-on, and without it in the same scene.
 
     python tests/bench/waits.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--faces 1 2 4 8]
 
@@ -8,7 +8,7 @@ installed. FULL.dna is a file of real size (tests/fullscale/generate.py); the .b
 opening and saving contains ten characters of SAMPLE.dna. The floor is the time in the same scene
 with the add-on disabled; both are measured alternately, three times each. For frames and slider
 steps, a bare handler writes two poses alternately: vertex positions recorded from the add-on, or
-with --mode LIVE its bones and live keys. For undo, the same handler runs after a change of a
+with --mode LIVE its bones and live shape keys. For undo, the same handler runs after a change of a
 property. Files and edit mode need no handler. Times are medians in ms.
 """
 
@@ -31,7 +31,7 @@ import numpy as np
 
 
 def median_ms(action, rounds, before=None):
-    """Median time of an action in ms; `before` runs before each, outside the measured time."""
+    """Median time of an action in ms; `before` runs before each action, outside its time."""
     times = []
     for _ in range(rounds):
         if before is not None:

@@ -18,8 +18,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Like a file: gives only pieces. It may end earlier than its size, like a file that is cut
-// meanwhile.
+// A source that has no bytes in memory, like a file. It may have fewer bytes than its size, like a
+// file that is cut during reading.
 class Pieces final : public Source {
  public:
   explicit Pieces(Bytes bytes, std::size_t missing = 0)
@@ -38,7 +38,8 @@ class Pieces final : public Source {
   Bytes bytes_;
 };
 
-// Every test runs once from memory and once in pieces.
+// Each test of this class runs once with a source in memory and once with a source that is read in
+// pieces.
 class ByteReaderOf : public testing::TestWithParam<bool> {
  protected:
   ByteReader& open(Bytes bytes) {
@@ -85,7 +86,8 @@ TEST_P(ByteReaderOf, NumbersTextsAndListsComeBack) {
   EXPECT_EQ(reader.left(), 0u);
 }
 
-// Lists longer than a window, at every offset within a number and within a vector of AVX2.
+// Lists that are longer than the window are read correctly at every offset within a number and
+// within an AVX2 register.
 TEST_P(ByteReaderOf, LongListsAreTheSameHoweverTheyLie) {
   for (std::size_t before = 0; before < 33; ++before) {
     for (const std::size_t n : {0u, 1u, 7u, 8u, 9u, 127u, 20000u}) {

@@ -24,7 +24,8 @@ using testing_support::read_file;
 using Bytes = std::vector<std::uint8_t>;
 namespace fs = std::filesystem;
 
-// The system calls so far, one letter each; the call `failing` fails with `reason`.
+// The system calls so far, one letter each. The call whose letter is `failing` fails with the error
+// `reason`.
 std::string asked;
 char failing = 0;
 int reason = 0;
@@ -123,7 +124,8 @@ TEST_F(FileWrite, OfNoFileFromBeforeAndOfAFolderThatIsNotThereItSaysSo) {
   EXPECT_EQ(folder.error().message, "cannot write " + folder_.string() + ": Is a directory");
 }
 
-// Windows gives the same reason for a missing folder and for a file in its place.
+// Windows gives the same error for a missing folder and for a file in its place. The message must
+// tell them apart.
 TEST_F(FileWrite, AFileInPlaceOfTheFolderIsToldFromNoFolderWhateverTheSystemSays) {
   std::ofstream(folder_ / "file") << "x";
   failing = 'o', reason = ENOENT;
@@ -179,7 +181,7 @@ TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
   std::vector<std::string> left = hidden_files(folder_);
   ASSERT_EQ(left.size(), 2u);
   std::erase(left, live->path().filename().string());
-  // A leftover of another machine, on which its process may be alive.
+  // A leftover of another machine must not be removed: its process may be running there.
   std::string foreign = left.at(0);
   foreign[std::string(".risorius-").size()] ^= 1;
   std::ofstream(folder_ / foreign) << "half";

@@ -126,7 +126,8 @@ TEST(ClipFile, PairsOfMetadataAreLimited) {
   EXPECT_EQ(read.error().where, "head.metadata");
 }
 
-// Each name repeats the one before and adds a letter: 3 bytes of the file.
+// Each name repeats the previous one and adds a letter, which takes only 3 bytes of the file.
+// Together the names exceed the limit.
 TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   Clip clip;
   std::string name;
@@ -141,7 +142,7 @@ TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   EXPECT_EQ(read.error().where, "head.names");
 }
 
-// The encoder gives the same bytes as encode() for pieces of any size.
+// Whatever the sizes of the pieces, the encoder gives the same bytes as encode().
 TEST(ClipEncoder, TakesFramesAsTheyCome) {
   Clip clip = make_full_clip(250);
   clip.events.clear();
@@ -226,7 +227,8 @@ TEST(ClipFile, EveryDamagedByteIsNoticed) {
   }
 }
 
-// Damage by an attacker who corrects the checksums.
+// Bytes are changed and the checksums corrected, as an attacker would do. Reading must either fail
+// with an error or give a valid clip.
 TEST(ClipFile, DamageUnderAGoodChecksumDoesNoHarm) {
   const Bytes bytes = must_encode(make_full_clip(40), 30);
   Bytes same = bytes;
@@ -262,7 +264,7 @@ TEST(ClipFile, AnotherVersionIsNamed) {
   EXPECT_NE(read.error().message.find("version 9"), std::string::npos);
 }
 
-// A file of this version stays readable, on every processor.
+// A file that this version wrote must remain readable, on every processor.
 TEST(ClipFile, CommittedFileGivesItsCurves) {
   const Bytes bytes = read_file(data_folder() / "clip" / "version1.rzc");
   ASSERT_FALSE(bytes.empty());

@@ -75,7 +75,8 @@ TEST(ClipCurves, RandomBitsDoNotGrow) {
   }
 }
 
-// A polynomial of degree 4 leaves only its rounding, whatever its scale.
+// A smooth curve takes less than a third of its size: predicting a polynomial of degree 4 leaves
+// only rounding errors.
 TEST(ClipCurves, SmoothOnesAreContinued) {
   const Clip clip = make_all_kinds(512);
   Clip smooth = make_clip(1, 512);
@@ -100,7 +101,8 @@ TEST(ClipCurves, OfAnotherLengthAreRefused) {
   Clip smooth = make_clip(1, 64);
   std::copy_n(clip.curve(3).begin(), 64, smooth.curves.data());
   const Bytes bytes = encoded(smooth);
-  // A difference of one frame may go unnoticed because of the bits that pad the last byte.
+  // A length that differs by one frame is not tested: it may go unnoticed because of the bits that
+  // pad the last byte.
   const std::uint32_t first = 0;
   for (const std::size_t frames : {1u, 32u, 64u, 200u}) {
     const auto curves = EncodedCurves::open(bytes, 1, frames);

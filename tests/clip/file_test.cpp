@@ -84,7 +84,7 @@ TEST_F(ClipRecording, WithoutAFolderIsRefused) {
   EXPECT_NE(folder.error().message.find("Is a directory"), std::string::npos);
 }
 
-// The system calls during close(); the call `failing` fails.
+// The system calls during close(), one letter each. The call whose letter is `failing` fails.
 std::string asked;
 char failing = 0;
 

@@ -16,7 +16,7 @@ std::uint64_t hash_of(const std::string& text) {
   return core::xxh64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-// Values of the reference implementation, `xxhsum -H64`.
+// The expected values come from the reference program, `xxhsum -H64`.
 TEST(ClipHash, IsXxh64) {
   EXPECT_EQ(hash_of(""), 0xEF46DB3751D8E999u);
   EXPECT_EQ(hash_of("a"), 0xD24EC4F1A98C6E5Bu);

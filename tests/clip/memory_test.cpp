@@ -12,7 +12,7 @@ namespace {
 
 using namespace testing_support;
 
-// The size of a clip's content: values, times, names and events.
+// The size of a clip's content in bytes: values, times, names and events.
 std::size_t size_of(const Clip& clip) {
   std::size_t size = 4 * clip.curves.size() + 8 * clip.times.size();
   for (const std::string& name : clip.head.names) size += name.size();
@@ -20,7 +20,8 @@ std::size_t size_of(const Clip& clip) {
   return size;
 }
 
-// native/README.md documents the factors. In addition: the frames of a writer's block.
+// Limits of heap memory: factors that native/README.md documents, and a constant for the frames of
+// a writer's block.
 constexpr std::size_t kTimesTheClip = 4, kTimesTheFile = 16, kBeside = 64 * 1024;
 
 TEST(ClipMemory, OfWritingGrowsWithTheClip) {
@@ -43,8 +44,9 @@ TEST(ClipMemory, OfReadingGrowsWithWhatIsRead) {
   }
 }
 
-// Resting curves and names that repeat the one before take a few bytes of the file each. An open
-// reader keeps the head, the index, and one block in encoded form.
+// Constant curves, and names that repeat the previous one, take only a few bytes of the file.
+// Memory must grow with these bytes: an open reader stores the head, the index, and one block in
+// encoded form.
 TEST(ClipMemory, OfAnOpenReaderGrowsWithTheFile) {
   for (const std::size_t count : {5'000u, 10'000u}) {
     Clip clip = make_clip(count, 20);

@@ -52,7 +52,7 @@ std::vector<float> frame(Mixer& mixer, double time, const float* base = nullptr)
   return out;
 }
 
-// A bit of everything: different times for the layers, active reactions, rules that apply.
+// A mixer with layers at different times, a reaction, and rules that apply.
 Mixer full_mixer() {
   Mixer m = mixer();
   std::vector<Layer> layers;

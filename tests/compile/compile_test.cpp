@@ -19,7 +19,7 @@ namespace {
 using namespace testing_support;
 using core::ErrorCode;
 
-// Two raw controls, one corrective, one joint group, one channel, one map.
+// A valid face: two raw controls, one corrective, one joint group, one channel, one map.
 dna::Dna good_face() {
   dna::Dna dna = make_face(2, 1, 2);
   dna.definition.gui_control_names = names("gui", 1);
@@ -125,7 +125,7 @@ TEST(Compile, NeutralJointsTurnAsTheRigWritesRotations) {
   const rig::Rig angles = must_compile(face);
   const core::Result<rig::Rig> turned = compile(face, options);
   ASSERT_TRUE(turned.has_value()) << turned.error().describe();
-  // The last joint: 90 degrees about z.
+  // The last joint has a neutral rotation of 90 degrees about z.
   const float* a = angles.neutral_joints.data() + 2 * 9 + 3;
   EXPECT_EQ(std::vector<float>(a, a + 6), (std::vector<float>{0, 0, 90, 1, 1, 1}));
   const float* q = turned.value().neutral_joints.data() + 2 * 10 + 3;
@@ -134,8 +134,8 @@ TEST(Compile, NeutralJointsTurnAsTheRigWritesRotations) {
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(q[i], wanted[i], 1e-6f) << i;
 }
 
-// A twist setup that shares its rotation with a swing is compiled to another kind than a single
-// twist.
+// A twist setup with the same inputs as a swing setup becomes kUntwist, a twist setup with other
+// inputs kTwist.
 TEST(Compile, SwingsComeBeforeTwistsAndAreToldApart) {
   dna::Dna dna = good_face();
   dna::TwistSwingSetup alone, shared;
@@ -183,8 +183,8 @@ TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
 }
 
 TEST(Compile, AGroupMayListItsControlsInAnyOrder) {
-  // Sorted by control, the first four columns are 0, 2, 1, 3: the last is three behind the first,
-  // as if they were adjacent.
+  // Sorted by control, the first four columns are 0, 2, 1, 3. They are not adjacent, although the
+  // last one is three behind the first.
   const std::vector<std::uint16_t> inputs = {0, 2, 1, 3, 5, 4, 6, 7};
   constexpr std::size_t kRows = 9;
   std::vector<std::uint16_t> outputs(kRows);
@@ -302,9 +302,9 @@ TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {
             evaluate_once(must_compile(one), {1.0f}).joints);
 }
 
-// Both LODs have joint 0, only LOD 0 has joint 1. Column 1 turns nothing and column 5 only a joint
-// with Euler angles. LOD 1 finds column 3 empty and swaps it with 4, and then column 0, which is
-// also swapped with 4: this is not a stable sort.
+// Both LODs have joint 0, only LOD 0 has joint 1. Column 1 rotates no joint, and column 5 only a
+// joint with Euler angles. LOD 1 finds column 3 empty and swaps it with 4, and then swaps column 0
+// with 4: unlike a stable sort, this changes the order of the others.
 TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   const std::vector<bool> quaternions{true, true, false};
   const dna::JointGroup g = make_group({3, 1}, {0, 1, 2, 3, 4, 5}, {3, 13, 22},
@@ -316,7 +316,8 @@ TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   EXPECT_EQ(quaternion_column_order(g, 1, quaternions), finest);
 }
 
-// LOD 1 has only the first of two rows for one angle. It must still be an Euler angle there.
+// Two rows write one angle, and LOD 1 has only the first of them. The angle must be converted to a
+// quaternion at LOD 1 too.
 TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   dna::Dna dna = make_face(1, 0, 1);
   dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {3, 3}, {60, 90})};
@@ -328,7 +329,8 @@ TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 1).joints[3], 0.5f, 1e-6f);
 }
 
-// 60,000 correctives, each reading the next: the time must not grow with the square.
+// Each of 60,000 correctives reads the next one. The time must not grow with the square of their
+// number.
 TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   constexpr std::uint16_t n = 60000;
   dna::Dna dna = make_face(1, n, 1, 1);

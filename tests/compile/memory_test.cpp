@@ -12,7 +12,8 @@ namespace {
 
 using namespace testing_support;
 
-// Twice the budget's own limits, for vectors that double and for auxiliary lists.
+// Limits of heap memory: twice the limits of the budget, for vectors that double and for auxiliary
+// lists.
 constexpr std::size_t kTimesTheFace = 64, kBeside = 2u << 20;
 
 struct Taken {
@@ -41,8 +42,8 @@ TEST_P(CompileMemory, GrowsWithTheFace) {
 INSTANTIATE_TEST_SUITE_P(Every, CompileMemory, testing::ValuesIn(kBombs),
                          [](const auto& about) { return std::string(about.param.name); });
 
-// Counts comparisons: a linear search in a list of ranges would need four times as many for twice
-// the rows.
+// Compares the numbers of comparisons for 10,000 and 20,000 rows. A linear search in a list of
+// ranges would need four times as many for twice the rows.
 TEST(CompileSteps, OfAGuiTableGrowWithItsRows) {
   const auto steps = [](std::uint16_t rows) {
     core::Budget budget("this test", core::Budget::kUnlimited, core::Budget::kUnlimited);

@@ -108,7 +108,8 @@ void expect_vectors(const Vec3Array& before, const Vec3Array& after, const Matri
   }
 }
 
-// Angles up to 180 degrees in float32: three of them together err by less than 2 eps pi.
+// Three angles of up to 180 degrees in float32 have an error of less than 2 eps pi together; 8 eps
+// is above that.
 void expect_rotation(const Dna& from, const Row& before, const Dna& to, const Row& after) {
   const Matrix expected = Change(from, to).rotation(rotation_of(from, before));
   const Matrix result = rotation_of(to, after);
@@ -163,7 +164,7 @@ JointGroup make_group(std::vector<std::uint16_t> lods, std::vector<std::uint16_t
   return g;
 }
 
-// Joints at neutral 0, and controls raw0, raw1 ...
+// A rig whose joints have neutral transforms of 0, with controls raw0, raw1 and so on.
 Dna bare_rig(std::size_t joints, std::size_t raw = 2) {
   Dna dna;
   dna.descriptor.lod_count = 1;
@@ -267,7 +268,7 @@ void expect_group(const Dna& from, const Dna& to) {
         EXPECT_NEAR(b[i], translation[i] * change.unit, 200 * kEps);
         EXPECT_EQ(std::abs(b[6 + i]), std::abs(scale[i]));
       }
-      // Each scale delta of the source occurs once in the result, with its sign.
+      // Each scale delta of the source is in the result once, with its sign.
       EXPECT_TRUE(std::is_permutation(a.begin() + 6, a.end(), b.begin() + 6));
       expect_rotation(from, {a[3], a[4], a[5]}, to, {b[3], b[4], b[5]});
     }
@@ -347,7 +348,8 @@ TEST(DnaCoordinates, PlacesAndSignsComeBackExactly) {
   }
 }
 
-// A rotation that is mixed twice has two rounding errors in each angle.
+// Rotations are converted there and back. The result may only differ by the rounding errors of two
+// conversions.
 TEST(DnaCoordinates, MixedRotationsComeBackAsRotations) {
   Random random(4);
   for (int n = 0; n < 500; ++n) {
@@ -463,7 +465,8 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
   dna.descriptor.lod_count = 3;
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({4, 2, 0}, {3, 9, 1, 17}, {1, 2, 3, 4, 5, 6, 7, 8})};
-  // x right y up z front -> x front y right z up: the axes rotate, so that xyz becomes yzx.
+  // From x right, y up, z front to x front, y right, z up: the axes rotate, so that the order xyz
+  // becomes yzx.
   const Dna out = converted(dna, target_of({4, 1, 2}, 3, {1, 1, 1}));
   const JointGroup& g = out.behavior.joint_groups[0];
   EXPECT_EQ(g.lods, (Array<std::uint16_t>{4, 2, 0}));
@@ -474,7 +477,8 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
 TEST(DnaCoordinates, MixedRotationRowsComeWithTheFirstOfThem) {
   Dna dna = bare_rig(2, 1);
   dna.descriptor.lod_count = 3;
-  // rx0 tx1 ry0 ry1; the last row is of no LOD
+  // The rows are rx of joint 0, tx of joint 1, ry of joint 0 and ry of joint 1; no LOD uses the
+  // last one.
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({3, 2, 0}, {3, 9, 4, 13}, {40, 2, 30, 9})};
   std::vector<Warning> warnings;
@@ -491,7 +495,8 @@ TEST(DnaCoordinates, MixedRotationRowsComeWithTheFirstOfThem) {
   EXPECT_EQ(warnings[1].where, "behavior.joint_groups[0].lods");
 }
 
-// A turn about x by 90 and then y by 30 degrees equals one about z by -30 and then x by 90.
+// A rotation about x by 90 and then y by 30 degrees equals a rotation about z by -30 and then x by
+// 90 degrees.
 TEST(DnaCoordinates, RotationRowsOfZerosAreLeftOut) {
   Dna dna = bare_rig(1, 1);
   dna.behavior.joint_groups = std::vector<JointGroup>{make_group({2}, {3, 4}, {90, 30})};
@@ -699,7 +704,8 @@ TEST(DnaCoordinates, RefusesRowsBeyondTheFormat) {
   target.axes = CoordinateSystem{0, 2, 4};
   EXPECT_EQ(converted(dna, target).behavior.joint_groups[0].output_indices[0], 65535);
 
-  // One row too many: 65,535 rows, of which the last turns a joint about a third axis.
+  // The format allows 65,535 rows. The last one here rotates a joint about a second axis, whose
+  // conversion adds a row for the third axis.
   dna = bare_rig(1, 1);
   std::vector<std::uint16_t> outputs(65533, 0);
   outputs.insert(outputs.end(), {3, 4});
@@ -725,7 +731,7 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
   CoordinateTarget target = target_of({4, 1, 3}, 5, {1, -1, 1});
   target.translation_unit = 0;
   const Dna out = converted(dna, target);
-  // x (right) becomes y, y (up) -z, z (front) x; metres become centimetres.
+  // x (right) becomes y, y (up) becomes -z, and z (front) becomes x; metres become centimetres.
   const Array<float>& t = out.definition.neutral_joint_translations.values;
   const std::vector<float> expected{200,       300,  -kInfinity, kNan, kInfinity,
                                     kInfinity, -100, kInfinity,  kNan};
@@ -740,7 +746,7 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
   for (const float v : out.behavior.joint_groups[0].values) EXPECT_TRUE(std::isnan(v));
 }
 
-// Every file that parse accepts is converted or refused, and the result is as sound as its source.
+// Checks that a file that parse accepts is either converted to a valid Dna or rejected.
 void expect_sound(const std::vector<std::uint8_t>& bytes, const CoordinateTarget& target) {
   bytes::SpanSource source(bytes);
   const core::Result<Dna> dna = parse(source);

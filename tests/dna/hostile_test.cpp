@@ -37,8 +37,8 @@ Bytes golden(const std::string& name) {
   return bytes;
 }
 
-// All promises for each variant of a golden file would take too long: reading is tested, and in
-// every third turn one of the other promises instead.
+// Checks one promise of support/promises.h for a variant of a golden file; all of them would take
+// too long. It is the promise about reading, and in every third turn one of the other promises.
 std::string one_promise(const Bytes& bytes, std::size_t turn) {
   const auto dna = promises::parse(bytes);
   if (!dna || turn % 3 != 0) return promises::reading(bytes, dna);
@@ -64,8 +64,8 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
   }
 }
 
-// Each of these bytes is replaced by 0x00, by 0xFF, and by itself with one bit flipped. The number
-// `turn` that check receives differs for the three.
+// Calls check(changed bytes, turn) for each of these places: the byte is replaced by 0x00, by 0xFF,
+// and by itself with one bit flipped. `turn` differs between the three calls.
 template <class Check>
 void expect_of_every_patch(const Bytes& bytes, const std::vector<std::size_t>& places,
                            Check check) {
@@ -115,7 +115,8 @@ TEST_P(HostileFace, IsUsableOrRefusedWithEveryBytePatched) {
   expect_of_every_patch(bytes, bytes_to_change(bytes, newest), kEverything);
 }
 
-// Every prefix of a file is refused with an error; only the missing end mark of 2.1 is a warning.
+// Every prefix of a file is rejected with an error. Only a 2.1 file that lacks nothing but its end
+// mark is read, with a warning.
 TEST_P(HostileFace, IsRefusedCutAtEveryByte) {
   const Bytes bytes = generated(GetParam());
   const std::size_t needed = bytes.size() - (GetParam() == 1 ? 3 : 0);
@@ -167,7 +168,8 @@ std::uint8_t hex_byte(const std::string& text, std::size_t at) {
   return static_cast<std::uint8_t>(std::stoul(text.substr(at, 2), nullptr, 16));
 }
 
-// An edit is offset:bytes to remove:bytes to insert (tests/data/malformed/README.md).
+// Copies the base file up to the place of an edit and applies the edit. An edit is a text
+// OFFSET:BYTES TO REMOVE:BYTES TO INSERT (tests/data/malformed/README.md).
 void apply_edit(const std::string& edit, const Bytes& base, std::size_t& copied, Bytes& out) {
   const std::size_t first = edit.find(':'), second = edit.find(':', first + 1);
   const std::size_t at = std::stoul(edit.substr(0, first));
@@ -211,7 +213,8 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
 
 // ---- a file that changes during reading
 
-// From a given read on, the lowest byte of every word is increased by one, which affects counts.
+// From a given read on, every fourth byte that is read is increased by one. In one of the
+// four phases these are the lowest bytes of counts.
 class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)
@@ -233,7 +236,9 @@ class ChangingSource final : public bytes::Source {
   std::uint64_t phase_;
 };
 
-// Faces and skin weights are read twice, the first time to count; they are longer than the window.
+// A file that changes while it is parsed must do no harm: parsing fails, or gives a Dna that can be
+// rewritten. Faces and skin weights are longer than the reader's window, so that they take several
+// reads.
 TEST(HostileSource, ThatChangesBetweenTwoReadsIsNoHarm) {
   dna::Dna face = testing_support::make_full_face();
   constexpr std::uint32_t kCount = 30000;

@@ -106,7 +106,8 @@ TEST(DnaLimits, StopAJsonListOfTooManyNumbers) {
 }
 
 TEST(DnaLimits, StopATextThatIsTooDeep) {
-  // Root, layer mlbe, its types, a type, operation sets, a set, an operation, its parameters.
+  // The eight nested levels of the deepest value: root, layer mlbe, its types, a type, operation
+  // sets, a set, an operation, its parameters.
   Limits enough, too_little;
   enough.max_nesting = 8;
   too_little.max_nesting = 7;
@@ -165,7 +166,7 @@ TEST(DnaJson, RefusesTextsOfAnyDepthBeforeItBuildsThem) {
   }
 }
 
-// The face with one number of its descriptor replaced.
+// The face as JSON, with another text in the place of its lodCount.
 std::string with_lod_count(const std::string& number) {
   std::string text = face_as_json();
   const std::string before = "\"lodCount\": 2";
@@ -204,7 +205,7 @@ TEST(DnaJson, KeepsTheSmallestAndLargestFloats) {
 
 // ---- steps
 
-// Rows of which every third is dropped; counts the queries.
+// Tells for each row whether it is kept; every third row is dropped. Counts the queries.
 class CountingRows {
  public:
   explicit CountingRows(std::size_t size) : size_(size) {}
@@ -220,7 +221,8 @@ class CountingRows {
   mutable std::size_t asked_ = 0;
 };
 
-// A file may list any number of LODs, each with all rows.
+// The list of LODs is long and each LOD has all rows. Each row may be queried only once
+// nevertheless.
 TEST(DnaSteps, OfDroppingRowsDoNotGrowWithTheListOfLods) {
   constexpr std::uint16_t kMost = 65535;
   for (const std::size_t entries : {1u, 5000u}) {

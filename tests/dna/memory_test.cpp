@@ -79,8 +79,8 @@ TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
   std::filesystem::remove(path);
 }
 
-// An empty element takes up to 11 times its bytes in the file (a twist setup; a list of lists takes
-// 9). The error's text and path are small.
+// Limits of heap memory while a file is read. An empty element takes up to 11 times its bytes in
+// the file (a twist setup; a list of lists takes 9). The error's text and path are small.
 constexpr std::size_t kTimesTheBytes = 12, kBeside = 16 * 1024;
 
 std::size_t peak_of(const Bytes& bytes, bool* good = nullptr) {
@@ -117,7 +117,7 @@ TEST(Memory, AFileThatAnnouncesMuchGetsLittle) {
 
 using Fill = void (*)(Dna&, std::size_t);
 
-// Lists of empty elements.
+// Functions that fill a Dna with a list of n empty elements.
 const Fill kFills[] = {
     [](Dna& d, std::size_t n) { d.definition.raw_control_names.resize(n); },
     [](Dna& d, std::size_t n) { d.descriptor.metadata.resize(n); },
@@ -159,11 +159,13 @@ TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
   }
 }
 
-// Sizes just above a doubling list's capacity: the list holds both buffers while it grows.
+// Sizes just above a power of two: a list that doubles its capacity then has its old and its new
+// buffer at once.
 constexpr std::size_t kSizes[] = {4097, 8193};
-// Windows, messages, and the stack of open containers.
+// Heap memory in addition to the factors: windows of readers, messages, and the stack of open
+// containers.
 constexpr std::size_t kBesideOthers = 64 * 1024;
-// native/README.md documents the factors.
+// Limits of heap memory, as factors of a size; native/README.md documents them.
 constexpr std::size_t kTimesToJson = 48, kTimesFromJson = 64, kTimesFiltered = 24;
 
 std::size_t size_of(const Dna& dna) { return static_cast<std::size_t>(size_in_bytes(dna)); }
@@ -221,7 +223,7 @@ TEST(Memory, OfTheLodFilterOfAHeadIsAtMostTwiceTheHead) {
   }
 }
 
-// Numbers and texts that are longer in JSON than in the file.
+// Lists of numbers and texts that are longer in JSON than in the file.
 TEST(Memory, OfJsonGrowsWithItsNumbersAndTexts) {
   for (const std::size_t n : {std::size_t{30'000}, std::size_t{60'000}}) {
     Dna dna;

@@ -29,7 +29,7 @@ Bytes write_bytes(const Dna& dna, std::uint16_t minor = 8) {
 }
 
 // A 2.2 file with one layer: descriptor "Ab", caucasian female of 40, one pair of metadata, metres,
-// radians, axes right up front, 3 LODs from 1, complexity "", database "d".
+// radians, axes right up front, 3 LODs with max_lod 1, complexity "", database "d".
 const Bytes kDescriptorFile = {
     'D', 'N', 'A', 0,   2,   0,   2,      // signature, generation, version
     0,   0,   0,   1,                     // one layer
@@ -67,8 +67,8 @@ TEST(DnaWrite, PutsTheDescriptorWhereAHandWould) {
   core::Result<Dna> dna = parse_bytes(kDescriptorFile);
   ASSERT_TRUE(dna.has_value());
   const Bytes written = write_bytes(*dna, 2);
-  // The written file has four layers: the body follows a table of 4 * 16 bytes, without the unknown
-  // byte.
+  // The written file has four layers, so that the descriptor begins after a table of 4 * 16 bytes.
+  // The unknown byte at its end is not written.
   const std::size_t body = 7 + 4 + 4 * 16;
   ASSERT_GT(written.size(), body + 50);
   EXPECT_EQ(std::memcmp(written.data() + body, kDescriptorFile.data() + 27, 50), 0);

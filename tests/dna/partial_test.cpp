@@ -14,8 +14,9 @@ namespace {
 
 using namespace testing_support;
 
-// The first read after a jump, and the largest read. Behind the last wanted byte the reader may
-// read as much as it read in sequence before, up to the window.
+// The size of the first read after a jump, and of the largest read. After the last byte that is
+// needed the reader may read at most as much as it has read in sequence before, and never more than
+// the window.
 constexpr std::size_t kFirstRead = 512, kWindow = 64 * 1024;
 
 struct Region {
@@ -104,7 +105,8 @@ std::size_t target_bytes(const BlendShapeTarget& t) {
   return 4 * list(t.vertex_indices.size(), 4) + 2;
 }
 
-// Bodies of elements, which are preceded by their size or, in 2.1, by the offset of their end.
+// The regions of the bodies of elements. In the file a body is preceded by its size or, in 2.1, by
+// the offset of its end.
 std::vector<Region> sized_elements(const File& file, std::size_t at, std::size_t n) {
   std::vector<Region> out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -120,14 +122,14 @@ std::vector<Region> meshes_of(const File& file) {
   return sized_elements(file, at + 4, u32_at(file.bytes, at));
 }
 
-// The targets are the end of a mesh.
+// The region of the blend shape targets, which are the end of a mesh.
 Region targets_of(const Region& mesh, const Mesh& m) {
   std::size_t bytes = 4;
   for (const BlendShapeTarget& t : m.blend_shape_targets) bytes += target_bytes(t);
   return {mesh.end - bytes, mesh.end};
 }
 
-// Values of each joint group, without their count.
+// The region of the values of each joint group's matrix, without their count.
 std::vector<Region> matrices_of(const File& file, const Behavior& b) {
   std::size_t at = 0;
   if (file.sections) {
@@ -189,8 +191,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
-// Layers that contain a count of controls: a load with a definition reads that count. In files with
-// an empty rbfe the poses of rbfb are controls, and their count lies behind the solvers.
+// Whether a layer contains a count of controls, which a load with a definition reads. In files with
+// an empty rbfe the poses of rbfb are controls, and their count is stored after the solvers.
 bool counts_controls(const File& file, const std::string& layer) {
   const bool in_rbfb = layer == "rbfb" && file.layers.at("rbfe").size() == 8;
   return layer == "bhvr" || layer == "controls" || layer == "mlbh" || layer == "rbfe" || in_rbfb;
@@ -204,7 +206,8 @@ void expect_only_asked_layers(const File& file, const Load& load) {
     SCOPED_TRACE(name);
     if (name == "desc" || name == "dsce" || contains(load.asked, name)) {
       EXPECT_EQ(source.touched(region), region.size());
-      // The header is read together with the bytes behind it.
+      // Layers near the begin of the file are not compared, because they are read together with the
+      // header.
     } else if (region.begin >= kFirstRead) {
       const bool counted = load.options.definition && counts_controls(file, name);
       EXPECT_LE(source.touched(region), counted ? (name == "rbfb" ? kFirstRead : 4) : 0);
@@ -289,7 +292,8 @@ bool keeps(const Selection& s, std::size_t lod) {
   return std::ranges::find(s.kept, lod) != s.kept.end();
 }
 
-// In: slack  bytes that are read together with the number of elements, for the first element
+// Expects that a kept element is read completely and a dropped one is not.
+// In: slack  bytes of the element that may be read together with the number of elements
 void expect_whole_or_untouched(const RecordingSource& source, const Region& element, bool kept,
                                std::size_t slack) {
   if (kept) {
@@ -314,7 +318,8 @@ TEST(PartialLoad, ReadsNothingOfADroppedMesh) {
   }
 }
 
-// The mesh of all LODs: four small reads find the end of a dropped target.
+// The fifth mesh belongs to all LODs and is kept. Of its dropped targets only four small reads each
+// are allowed, which find the end of the target.
 TEST(PartialLoad, PassesOverDroppedTargetsOfAKeptMesh) {
   const Mesh mesh = make_head().geometry.meshes[4];
   for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {
@@ -404,7 +409,7 @@ TEST(PartialLoad, ByLodIsTheWholeFilteredByLod) {
   }
 }
 
-// Every vertex of mesh 0 has three joints; LOD 1 has the first two of them.
+// The first vertex of the mesh has three joints, of which LOD 1 has the first two.
 TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   Dna head = make_head(tiny_head());
   Mesh& mesh = head.geometry.meshes[2];
@@ -420,14 +425,16 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   ASSERT_EQ(dna.geometry.meshes.size(), 2u);
   const Mesh& cut = dna.geometry.meshes[1];
   EXPECT_EQ(cut.skin_offsets, (Array<std::uint32_t>{0, 2, 3, 4, 5}));
-  // 0.5 and 0.25 grow by 1 / 0.75; a vertex without remaining joints belongs to the root.
+  // The weights 0.5 and 0.25 grow by 1 / 0.75. A vertex without remaining joints is attached to the
+  // root.
   const float grow = 1.0f / 0.75f;
   EXPECT_EQ(cut.skin_weights, (Array<float>{0.5f * grow, 0.25f * grow, 1.0f, 1.0f, 1.0f}));
   EXPECT_EQ(cut.skin_joint_indices, (Array<std::uint16_t>{0, 1, 0, 1, 0}));
 }
 
-// The controls of the first channel in full_face.h: the last raw one, the corrective, both of the
-// networks, and the RBF pose. A channel is dropped with the layer that computes its control.
+// The first channel of full_face.h gets one control after the other: the last raw one, the
+// corrective, both controls of networks, and the RBF pose. The channel is dropped if the layer that
+// computes its control is not loaded.
 TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
   for (std::uint16_t control = 4; control <= 8; ++control) {
     Dna face = make_full_face();
@@ -444,7 +451,7 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
           control < 6 || (control < 8 ? options.machine_learned_behavior : options.rbf_behavior);
       const auto& inputs = dna.behavior.blend_shape_channels.input_indices;
       EXPECT_EQ(inputs.size(), is_computed ? 2u : 1u) << control << ", layers " << layers;
-      // The first channel, "wide", has a target in each mesh; "open" has a single one.
+      // The first channel, "wide", has targets in two meshes; "open" has a target in one.
       std::size_t targets = 0;
       for (const Mesh& m : dna.geometry.meshes) targets += m.blend_shape_targets.size();
       EXPECT_EQ(targets, is_computed ? 3u : 1u) << control << ", layers " << layers;
@@ -452,7 +459,8 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
   }
 }
 
-// If no layer names the controls of RBF poses, as before 2.5, the poses of the solvers count.
+// In a file without layer rbfe, as before 2.5, the number of pose controls is the number of poses
+// in rbfb, which must be read. An error in it names its place.
 TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   Dna face = make_full_face();
   face.rbf_behavior_ext = {};
@@ -473,7 +481,7 @@ TEST(PartialLoad, SaysWhereAJointIndexIsTooLarge) {
   const Dna head = make_head(tiny_head());
   Bytes bytes = write_head(head, 8);
   const Region mesh = meshes_of(describe_file(bytes))[0];
-  // The last vertex's last joint lies just before the targets; there are six of each.
+  // The joint index of the last vertex is stored just before the targets.
   const std::size_t at = targets_of(mesh, head.geometry.meshes[0]).begin - 2;
   bytes[at + 1] = 77;
   for (const bool one_lod : {true, false}) {

@@ -25,7 +25,7 @@ std::vector<dna::Finding> checked(const Bytes& bytes) {
   return dna::check(source);
 }
 
-// Number of findings for this field that have a place in the file.
+// Number of findings about a field that have an offset within the file.
 std::size_t placed(const std::vector<dna::Finding>& findings, const std::string& where,
                    std::size_t file_size) {
   return static_cast<std::size_t>(std::ranges::count_if(findings, [&](const dna::Finding& f) {
@@ -40,7 +40,7 @@ core::Error json_error(const std::string& name) {
   return dna ? core::Error{} : dna.error();
 }
 
-// A 2.1 load without the behavior ignored the places of its correctives in the control space.
+// The fault: a 2.1 load without the behavior did not count its correctives among the controls.
 TEST(FuzzFind001, CountsTheCorrectivesThatA21LoadLeavesOut) {
   dna::ParseOptions options;
   options.behavior = false;
@@ -49,20 +49,21 @@ TEST(FuzzFind001, CountsTheCorrectivesThatA21LoadLeavesOut) {
   EXPECT_EQ(dna->unread_controls.psd, 1u);
 }
 
-// The error gave the offset in the index, which lies behind the file's end.
+// The fault: the error's offset was the offset in the index, which lies beyond the file's end.
 TEST(FuzzFind002, PlacesALayerBeyondTheEndInTheFile) {
   const Bytes bytes = find("002-layer-beyond-the-end.dna");
   EXPECT_EQ(placed(checked(bytes), "rbf_behavior", bytes.size()), 1u);
 }
 
-// Messages about a list as a whole had no offset.
+// The fault: findings about a whole list had no offset.
 TEST(FuzzFind003, PlacesAListAsAWhole) {
   const Bytes bytes = find("003-joint-metadata-too-short.dna");
   const std::string where = "joint_behavior_metadata.joint_representations";
   EXPECT_EQ(placed(checked(bytes), where, bytes.size()), 1u);
 }
 
-// Messages about a missing layer had no offset: their place is the index that does not list it.
+// The fault: findings about a missing layer had no offset. Their place is the index that does not
+// list the layer.
 TEST(FuzzFind004, PlacesAMissingLayerInTheIndex) {
   const auto findings = checked(find("004-no-descriptor.dna"));
   const auto axes = std::ranges::find_if(findings, [](const dna::Finding& f) {
@@ -79,19 +80,20 @@ TEST(FuzzFind005, PlacesALayerThatCouldNotBeReadInTheFile) {
   EXPECT_EQ(promises::checking(bytes, promises::parse(bytes).has_value()), "");
 }
 
-// The error had neither field nor offset.
+// The fault: the error had neither field nor offset.
 TEST(FuzzFind006, NamesAnUnknownMemberAtTheRoot) {
   EXPECT_EQ(json_error("006-unknown-member-at-the-root.json").where, "mleh1.0");
 }
 
-// The second member silently replaced the first; later, the error had neither field nor offset.
+// The fault: the second member silently replaced the first one. After a first repair the error had
+// neither field nor offset.
 TEST(FuzzFind007, RefusesAMemberWithoutANameTwice) {
   const core::Error error = json_error("007-member-without-a-name-twice.json");
   EXPECT_EQ(error.code, core::ErrorCode::kInvalidValue);
   EXPECT_EQ(error.where, "\"\"");
 }
 
-// Text behind the zero byte was ignored.
+// The fault: text after the zero byte was ignored.
 TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   const core::Error error = json_error("008-zero-byte.json");
   EXPECT_EQ(error.code, core::ErrorCode::kNotDna);
@@ -99,7 +101,8 @@ TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   EXPECT_NE(error.message.find("zero byte"), std::string::npos);
 }
 
-// Rows without a column with a value: a batch advanced a null pointer, though it read nothing.
+// The fault: for rows in which no column has a value, a batch advanced a null pointer, though it
+// read nothing from it.
 TEST(FuzzFind009, EvaluatesRowsWithoutColumnsInBatches) {
   const auto dna = promises::parse(find("009-no-column-with-a-value.dna"));
   ASSERT_TRUE(dna.has_value()) << dna.error().describe();
@@ -115,8 +118,8 @@ TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
   EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
-// One finding for each level whose rows exceed the table took more than a few times the file's
-// size.
+// The fault: there was one finding for each LOD whose rows exceed the table, which together took
+// many times the file's size.
 TEST(FuzzFind011, SaysOnceWhatIsWrongWithTheLevelsOfATable) {
   const auto findings = checked(find("011-rows-of-levels-beyond-the-table.dna"));
   const auto of_levels = [](const dna::Finding& f) {

@@ -17,7 +17,7 @@ TEST(Regroup, TakesOutWhatIsSmallAndForeign) {
   EXPECT_EQ(out.report.changes.translation_mm.joint, "joint3");
   EXPECT_EQ(out.report.changes.translation_mm.expression, "raw1");
   EXPECT_EQ(out.report.changes.rotation_degrees.value, 0.0);
-  // Joint 5 has a small value in a column of its own region.
+  // Joint 5 keeps a small value, because the column belongs to its region.
   EXPECT_EQ(joints_of(out.dna, {1, 0}, 0)[45], 0.049f);
 }
 
@@ -28,7 +28,8 @@ TEST(Regroup, ZeroTakesOutNothing) {
 }
 
 TEST(Regroup, ACorrectiveThatAnotherReadsStaysInUse) {
-  // Control 2 moves one joint a little; control 3 is control 2 times raw1.
+  // Control 2 moves one joint a little. Control 3 is a corrective that reads control 2, so that
+  // control 2 must stay in use.
   dna::Dna dna = with_outliers(0.0f, 0.0f);
   dna.behavior.psd_count = 2;
   dna.behavior.psds = {{2, 3, 3}, {0, 2, 1}, {1.0f, 1.0f, 1.0f}};

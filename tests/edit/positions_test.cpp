@@ -10,7 +10,7 @@ namespace {
 using namespace regrouping;
 
 TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
-  // A foreign control turns joint 0 by a degree; its child joint 1 is 10 cm away.
+  // A foreign control rotates joint 0 by one degree; its child joint 1 is 10 cm away from it.
   dna::Dna dna = with_outliers(0.0f, 0.0f);
   std::vector<float> places(36, 0.0f);
   places[1] = 10.0f;

@@ -7,8 +7,8 @@ namespace {
 
 using namespace regrouping;
 
-// Two halves of the joints, each driven by its own control. The control of one half moves every
-// fifth joint of the other a little, which the search ignores as long as it ignores small values.
+// Two halves of the joints, each moved by its own control. Each control also moves every fifth
+// joint of the other half a little; such small values must not join the halves.
 TEST(Regroup, FindsRegionsByWhatIsNotSmall) {
   constexpr std::uint16_t kHalf = 40;
   dna::Dna dna = make_face(2, 0, 2 * kHalf);

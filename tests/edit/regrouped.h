@@ -37,7 +37,8 @@ inline std::vector<float> joints_of(const dna::Dna& dna, const std::vector<float
   return evaluate_once(rig.value(), raw, lod).joints;
 }
 
-// Compares every LOD and both forms of rotation, to the last bit.
+// Expects that two faces give the same joints to the last bit, at every LOD and for both forms of
+// rotation.
 inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
                                  const std::vector<float>& raw) {
   for (std::uint32_t lod = 0; lod < a.descriptor.lod_count; ++lod) {
@@ -51,7 +52,8 @@ inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
 
 inline Indices list(const core::Array<std::uint16_t>& a) { return Indices(a.begin(), a.end()); }
 
-// Control 0 drives joint 0 and control 1 joint 1, in one group with zeros between them.
+// Control 0 moves joint 0 and control 1 moves joint 1. Both are in one group, whose matrix has
+// zeros for the other joint.
 inline dna::Dna two_joints() {
   dna::Dna dna = make_face(2, 0, 2);
   dna.behavior.joint_groups =
@@ -59,7 +61,8 @@ inline dna::Dna two_joints() {
   return dna;
 }
 
-// Twelve joints that control 0 moves; control 1 is foreign to their region.
+// Twelve joints in one region. Control 0 moves all of them, joint 5 by `small`. Control 1 moves
+// joint 3 by `small` and joint 4 by `large`; it is foreign to the region.
 inline dna::Dna with_outliers(float small, float large) {
   dna::Dna dna = make_face(2, 0, 12);
   Indices outputs;

@@ -16,7 +16,8 @@ TEST(Regroup, ThresholdsCountInTheFilesUnits) {
 }
 
 TEST(Regroup, KeepsQuaternionJointsWhole) {
-  // Columns are out of order and one occurs twice: the product of rotations depends on the order.
+  // Controls are out of order and one occurs twice. Both matter, because the product of rotations
+  // depends on the order.
   dna::Dna dna = make_face(3, 0, 3);
   dna.behavior.joint_groups =
       std::vector{make_group({4, 3}, {2, 0, 2, 1}, {12, 14, 13, 0},
@@ -34,8 +35,8 @@ TEST(Regroup, KeepsQuaternionJointsWhole) {
 }
 
 TEST(Regroup, TheLastWriterOfARowStillWins) {
-  // At LOD 1 the second group is absent and the first one's row shows; the third hides a row at
-  // every LOD.
+  // The second group overwrites a row of the first one at LOD 0 but is absent at LOD 1. The third
+  // group overwrites a row of the first one at every LOD.
   dna::Dna dna = make_face(2, 0, 2);
   dna.behavior.joint_groups =
       std::vector{make_group({2, 2}, {0}, {0, 9}, {1, 2}), make_group({2, 1}, {1}, {1, 0}, {3, 4}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes small files that would need much memory or time without limits."""
+"""Makes small files that would need much memory or time if readers had no limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MiB = 1 << 20
 
 
 def fbx_arrays(path: Path) -> None:
-    """40 compressed arrays of 256 MiB in 10 MB, in objects that no reader needs."""
+    """40 compressed FBX arrays of 256 MiB in 10 MB, in records that no reader needs."""
     raw = zlib.compress(bytes(256 * MiB), 9)
     packed = b"d" + struct.pack("<III", 32 * MiB, 1, len(raw)) + raw
     inner = b"".join(_raw_record(b"Vertices", packed) for _ in range(40))
@@ -30,13 +30,13 @@ _HEAD = struct.calcsize("<IIIB")
 
 
 def _raw_record(name: bytes, values: bytes) -> bytes:
-    """A record whose end is relative to its own beginning; _placed() makes it absolute."""
+    """An FBX record whose end is counted from its begin; _placed() makes it a file position."""
     size = _HEAD + len(name) + len(values)
     return struct.pack("<IIIB", size, 1, len(values), len(name)) + name + values
 
 
 def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
-    """The head and a record that contains others; the ends become absolute file positions."""
+    """`head` and a record that contains others, whose ends become positions in the file."""
     start = len(head) + _HEAD + len(name)
     out, at = [], 0
     while at < len(inner):
@@ -49,14 +49,14 @@ def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
 
 
 def fbx_curve(path: Path) -> None:
-    """An animated curve of eight million equal keys."""
+    """An FBX with an animated curve of eight million equal keys."""
     curve = fbx_files.curve(1, np.zeros(8 * MiB), np.zeros(8 * MiB, "<f4"))
     tracks = [("Model/LimbNode", "jawOpen", "jawOpen", {"jawOpen": curve}, 0)]
     path.write_bytes(fbx_files.animation(tracks))
 
 
 def glb_channels(path: Path, channels: int = 1200, keys: int = 200_000) -> None:
-    """Many channels that share one accessor; each becomes a separate curve when read."""
+    """A GLB with many channels that share an accessor; each becomes a curve of its own."""
     views = [(0, 4 * keys), (4 * keys, keys)]
     document = {
         "asset": {"version": "2.0"},
@@ -87,33 +87,33 @@ def glb_channels(path: Path, channels: int = 1200, keys: int = 200_000) -> None:
 
 
 def gap(path: Path) -> None:
-    """Two rows that are 30,000 years apart."""
+    """A table of curves with two rows that are 30,000 years apart."""
     path.write_text("time,jawOpen\n0,0\n1e12,1\n")
 
 
 def gap_granted(path: Path) -> None:
-    """Two rows that are half a year apart; a system may grant the memory for all frames."""
+    """A table with two rows half a year apart; a system may grant the memory for all frames."""
     path.write_text("time,jawOpen,jawLeft\n0,0,0\n1.5e7,1,1\n")
 
 
 def slow_rate(path: Path) -> None:
-    """One frame per 10^300 seconds."""
+    """Audio2Face JSON with one frame per 10^300 seconds."""
     document = {"exportFps": 1e-300, "numPoses": 1, "numFrames": 2, "facsNames": ["jawOpen"]}
     path.write_text(json.dumps(document | {"weightMat": [[0], [1]]}))
 
 
 def deep_toml(path: Path) -> None:
-    """100,000 nested lists in TOML."""
+    """TOML with 100,000 nested lists."""
     path.write_text("x = " + "[" * 100_000 + "]" * 100_000)
 
 
 def deep_json(path: Path) -> None:
-    """100,000 nested lists in JSON."""
+    """JSON with 100,000 nested lists."""
     path.write_text("[" * 100_000 + "]" * 100_000)
 
 
 def laughs(path: Path) -> None:
-    """Nested XML entities that expand to 10^9 texts, hidden by a fake comment."""
+    """Rhubarb XML with nested entities that expand to 10^9 texts; comment marks hide them."""
     entities = ['<!ENTITY a0 "lol">']
     entities += [f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10)]
     path.write_text(
@@ -123,14 +123,14 @@ def laughs(path: Path) -> None:
 
 
 def rotation_order(path: Path) -> None:
-    """A DNA with an invalid rotation order."""
+    """A DNA file with an invalid rotation order."""
     facts = json.loads(risorius.load(GOLDEN / "core.dna").to_json())
     facts["dsce1.0"]["rotationSequence"] = 40
     risorius.Dna.from_json(json.dumps(facts)).save(path)
 
 
 def _solvers(count: int, poses: list[int], outputs: int) -> risorius.Dna:
-    """core.dna with `count` RBF solvers of the poses; each pose writes `outputs` controls."""
+    """core.dna with `count` RBF solvers of these poses; each pose writes `outputs` controls."""
     dna = risorius.load(GOLDEN / "core.dna")
     first = risorius.Rig(dna).control_count  # behind the correctives
     pose_count = max(poses) + 1
@@ -161,17 +161,17 @@ def _solvers(count: int, poses: list[int], outputs: int) -> risorius.Dna:
 
 
 def rbf_product(path: Path) -> None:
-    """A solver that names a pose 20,000 times; the pose writes 20,000 controls."""
+    """A DNA file with a solver that names a pose 20,000 times; the pose writes 20,000 controls."""
     _solvers(1, [0] * 20_000, 20_000).save(path)
 
 
 def graph(path: Path) -> None:
-    """12,000 solvers that all read and write the same control."""
+    """A DNA file with 12,000 solvers that all read and write the same control."""
     _solvers(12_000, [0], 1).save(path)
 
 
 def gui_rows(path: Path) -> None:
-    """A GUI table of a million rows, each with another range of values."""
+    """A DNA file with a GUI table of a million rows, each with another range of values."""
     dna = risorius.load(GOLDEN / "core.dna")
     rows = 1_000_000
     begin = np.linspace(0, 0.5, rows, dtype=np.float32)
@@ -184,7 +184,7 @@ def gui_rows(path: Path) -> None:
 
 
 def counts(path: Path) -> None:
-    """A DNA in whose second half every 4096th byte starts a huge count."""
+    """A DNA file in whose second half huge numbers are written every 4096 bytes."""
     data = bytearray((GOLDEN / "core.dna").read_bytes())
     for at in range(len(data) // 2, len(data) - 4, 4096):
         data[at : at + 4] = b"\xff\xff\xff\xfe"
@@ -200,7 +200,8 @@ def wav(path: Path) -> None:
 
 
 Bomb = tuple[str, Callable[[Path], None], list[str]]
-# (name of the file, function that makes it, arguments); FILE, OUT and CORE stand for paths.
+# (name of the file, function that writes it, arguments of the command); FILE, OUT and CORE are
+# replaced by paths.
 BOMBS: list[Bomb] = [
     ("zip40.fbx", fbx_arrays, ["clip", "info", "FILE"]),
     ("keys.fbx", fbx_curve, ["clip", "info", "FILE"]),

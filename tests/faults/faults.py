@@ -47,7 +47,7 @@ MEMORY_PER_BYTE = 40
 
 
 def bombs(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Bombs: limited peak memory and CPU time, and a result or an error in one sentence."""
+    """Small files that demand much give a result or one error sentence within limits."""
     for name, make, words in BOMBS:
         if names and name not in names:
             continue
@@ -113,7 +113,7 @@ print("done")
 
 
 def flips(rounds: int) -> Iterator[Row]:
-    """Flipped bits in DNA files, clips and cached rigs give an error or the right result."""
+    """DNA files, clips and cached rigs with changed bits must give an error or the right result."""
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         clip = folder / "take.rzc"
@@ -132,7 +132,7 @@ def flips(rounds: int) -> Iterator[Row]:
 
 
 def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longest: float) -> None:
-    """Wait for a random time, or until a hidden file shows that the command is writing."""
+    """Wait for a random time, or until a temporary file shows that the command is writing."""
     end = time.monotonic() + draw.uniform(0.0, longest)
     if draw.random() < 0.5:
         end = time.monotonic() + 60.0
@@ -147,7 +147,7 @@ def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longe
 def _signalled(
     group: str, what: signal.Signals, rounds: int, names: Sequence[str]
 ) -> Iterator[Row]:
-    """Send a signal at random moments. The target must be the complete old or new file."""
+    """Send a signal at random moments; the target must then be the complete old or new file."""
     draw = random.Random(20)
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
@@ -180,7 +180,7 @@ def _signalled(
 
 
 def _interrupted(done: Done) -> list[str]:
-    """Complaints about the end of an interrupted command.
+    """Sentences on faults in the end of an interrupted command.
 
     A command that has already printed its result may end by the signal, because Python ignores its
     handler while it exits.
@@ -190,7 +190,7 @@ def _interrupted(done: Done) -> list[str]:
 
 
 def kills(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """kill -9 leaves no partial target, and the next run removes temporary files."""
+    """After kill -9, no target is incomplete, and the next run removes temporary files."""
     yield from _signalled("kill", signal.SIGKILL, rounds, names)
 
 
@@ -202,7 +202,7 @@ def interrupts(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def _printing(rounds: int) -> Iterator[Row]:
-    """Interrupt commands that write no file."""
+    """Interrupt commands that write no file at random moments."""
     draw = random.Random(5)
     for words in (["bench", str(CORE)], ["info", str(CORE)], ["live", "--seconds", "5"]):
         row = Row("interrupt", words[0])
@@ -220,7 +220,7 @@ def _refused(row: Row, room: Room, target: Path, done: Done, named: str) -> None
     """Check that a command failed with a sentence that names the target, and changed no file."""
     row.runs += 1
     row.faults += complaints(done, (1,))
-    # Matplotlib prints an extra line if it cannot write its font cache.
+    # Matplotlib prints an additional line if it cannot write its font cache.
     lines = [line for line in done.err.splitlines() if "font_manager" not in line]
     said = "\n".join(lines)[-150:]
     row.check(named in said, f"{named} is not named: {said}")
@@ -236,7 +236,7 @@ def _limited() -> None:
 
 @contextlib.contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[bool]:
-    """Mount a small disk at a folder. Yields whether this succeeded."""
+    """Mount a small disk at a folder, with a size such as 64k. Yields whether this succeeded."""
     command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     try:
         made = subprocess.run(command, capture_output=True, check=False).returncode == 0
@@ -261,10 +261,10 @@ def _forbid(disk: Path) -> bool:
 
 
 def _on_a_disk(kind: str, name: str, spoil: Callable[[Path], bool]) -> Row:
-    """Run a command that writes to a small separate disk which refuses writing.
+    """Run a command whose target is on a small separate disk that refuses writing.
 
     Args:
-        kind: kind of the trial, for its row.
+        kind: group of the trial in its row.
         name: name of the command, key of COMMANDS.
         spoil: makes the disk refuse writing; gets its folder; returns False if it cannot.
 
@@ -311,7 +311,7 @@ def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """A missing or read-only folder is reported before the input is read."""
+    """If a folder is missing or read-only, a sentence says so before the input is read."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
@@ -362,7 +362,7 @@ def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def _batches(rounds: int) -> Row:
-    """Two batches in one folder: one works; the other names the first, or runs after it."""
+    """Two batches in one folder: one works; the other reports that the first runs, or waits."""
     row = Row("at once", "batch")
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as text:
@@ -383,7 +383,7 @@ def _batches(rounds: int) -> Row:
 
 
 def mutations(rounds: int, names: Sequence[str] = (), seed: int | None = None) -> Iterator[Row]:
-    """Mutated inputs of all commands, new in each run, give a result or a sentence in bounds."""
+    """Mutated inputs, new in each run, give a result or a sentence within the limits."""
     drawn = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"mutations: --seed {drawn} repeats them", flush=True)
     yield from trials(5 * rounds, drawn, tuple(names))
@@ -397,7 +397,7 @@ GROUPS: dict[str, Group] = {
 
 
 def line(row: Row) -> str:
-    """E.g. "kill       convert       30 runs  0 faults"."""
+    """A trial's results as a line: "kill       convert       30 runs  0 faults"."""
     what = f"{row.runs:5} runs {len(row.faults):4} faults"
     if row.not_run:
         what = f"NOT RUN: {row.not_run}"

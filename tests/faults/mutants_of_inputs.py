@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs all commands with small random faults in their input files or words.
+"""Runs all commands with small random faults in their input files or arguments.
 
 In JSON, TOML and tables, a value is replaced, or a part is removed or duplicated. In binary files,
 bytes change. Sometimes a word of the command line is replaced instead. Each command must end with a
@@ -58,7 +58,7 @@ ODD_WORDS = (
 
 
 def in_json(data: bytes, draw: random.Random) -> bytes:
-    """Replace a value, remove a key, duplicate an item, or insert deep lists."""
+    """JSON with a value replaced, a key removed, an item duplicated, or deep lists inserted."""
     document = json.loads(data)
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         places = list(_places(document))
@@ -95,7 +95,7 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def in_text(data: bytes, draw: random.Random) -> bytes:
-    """Replace a number or word, remove or duplicate a line, or insert invalid bytes."""
+    """Text with a word replaced, a line removed, duplicated or swapped, or bytes changed."""
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         what = draw.random()
         if what < 0.6:
@@ -142,7 +142,7 @@ _NUMBERS = (b"\xff" * 4, b"\0" * 4, b"\0\0\x80\x7f", b"\0\0\xc0\x7f", b"\xff\xff
 
 
 def in_bytes(data: bytes, draw: random.Random) -> bytes:
-    """Flip bits, insert special numbers, remove or duplicate a part."""
+    """Bytes with bits changed, special numbers inserted, or a part removed or duplicated."""
     out = bytearray(data)
     for _ in range(draw.choice((1, 1, 2, 8))):
         at = draw.randrange(len(out) + 1)
@@ -163,7 +163,7 @@ def in_bytes(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_dna(data: bytes, draw: random.Random) -> bytes:
-    """Change bytes, or change fields to values that the format can store."""
+    """A DNA file with changed bytes, or with other values of fields that the format can store."""
     if draw.random() < 0.4:
         return in_bytes(data, draw)
     for _ in range(8):
@@ -179,7 +179,7 @@ def _as_json(data: bytes) -> bytes:
 
 
 def in_glb(data: bytes, draw: random.Random) -> bytes:
-    """Change any bytes, or values in the JSON chunk."""
+    """A GLB with changed bytes, or with other values in its JSON chunk."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     (size,) = struct.unpack_from("<I", data, 12)
@@ -191,7 +191,7 @@ def in_glb(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_npz(data: bytes, draw: random.Random) -> bytes:
-    """Change any bytes, or the type, shape or values of an array."""
+    """An NPZ with changed bytes, or with an array of other type, shape or values."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     arrays = dict(np.load(io.BytesIO(data)))
@@ -223,7 +223,7 @@ IN: dict[str, Callable[[bytes, random.Random], bytes]] = {
 
 
 def mutant(name: str, data: bytes, draw: random.Random) -> bytes:
-    """The file with faults for its format, or in a tenth of all cases with changed bytes."""
+    """A file with faults for its format, or, in a tenth of all cases, with changed bytes."""
     kind = in_bytes if draw.random() < 0.1 else IN.get(Path(name).suffix, in_bytes)
     try:
         return kind(data, draw)
@@ -231,7 +231,8 @@ def mutant(name: str, data: bytes, draw: random.Random) -> bytes:
         return in_bytes(data, draw)
 
 
-# Name -> (files that get faults, command line). OUT.x is an output; FILE is one of the files.
+# Name of a trial -> (files that get faults, command line). OUT.x is an output; FILE is replaced by
+# one of the files.
 TRIALS: dict[str, tuple[list[str], str]] = {
     "info": (["core.dna", "face.dna"], "info FILE"),
     "info json": (["core.dna", "face.dna"], "info FILE --json"),
@@ -287,7 +288,7 @@ QUICK = ("info", "convert json", "clip info", "clip check", "author names", "sam
 
 
 class Round:
-    """A command with faults in its inputs, drawn by a seed."""
+    """A run of a command with faults in its inputs, drawn by a seed."""
 
     def __init__(self, inputs: dict[str, bytes], name: str, key: str) -> None:
         self.draw = random.Random(key)
@@ -305,7 +306,7 @@ class Round:
             self.files[target] = mutant(target, inputs[target], self.draw)
 
     def write(self, folder: Path) -> None:
-        """Write the files into an empty folder."""
+        """Write the inputs into an empty folder, and in half of the cases old output files."""
         for name, data in self.files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -351,7 +352,7 @@ def _contents(folder: Path) -> dict[str, int]:
 
 
 def _run(words: list[str]) -> Done:
-    """Run a command in this process. Returns its exit code and output."""
+    """Run a command in this process. Returns its end; exit code -1 if it raises an exception."""
     try:
         done = command_line.run(*words)
     except BaseException:  # noqa: BLE001  a command must not raise any exception
@@ -361,7 +362,7 @@ def _run(words: list[str]) -> Done:
 
 
 def _begin_peak() -> int:
-    """Reset the peak memory of this process if possible. Returns the peak in bytes."""
+    """Reset this process's largest memory use if possible. Returns the present one in bytes."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
     return _peak()
@@ -381,7 +382,7 @@ def rounds_of(name: str, seed: int, rounds: int, only: int | None = None) -> Row
     Args:
         name: one of TRIALS.
         seed: seed of all rounds.
-        rounds: number of rounds, before it is divided by SLOW.
+        rounds: number of rounds; slow commands run fewer, divided by SLOW.
         only: number of the only round to run; None: all rounds.
     """
     row = Row("mutants of inputs", name)
@@ -425,7 +426,7 @@ def _in_a_process(work: Callable[[], None]) -> int:
 def _work(
     inputs: dict[str, bytes], name: str, seed: int, numbers: list[int], folder: Path, log: Path
 ) -> None:
-    """Run rounds; each logs its number when it begins, and [number, faults] when it ends."""
+    """Run rounds; each logs its number when it begins, and [number, faults] when it has ended."""
     limit = 8192 * MiB
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -451,7 +452,7 @@ def _has_page() -> bool:
 
 
 def trials(rounds: int, seed: int, names: tuple[str, ...] = ()) -> Iterator[Row]:
-    """Yield the result of some or all commands.
+    """Yield the results of commands, a row for each.
 
     Args:
         rounds: number of rounds of each command.

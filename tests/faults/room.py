@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs commands of the command line in temporary folders, and checks how they end."""
+"""Runs commands of `risorius` in temporary folders, and checks how they end."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from risorius import importing
 from risorius.files import fileio
 
 CORE = GOLDEN / "core.dna"
-# Runs the command line and prints a line once it handles signals; earlier, Python would handle
-# them. Like the program, it ignores interrupts after the work is done.
+# Code that runs the command line, and prints a line when it can be interrupted; before that, Python
+# would handle signals itself. Like the program, it ignores interrupts after the work is done.
 READY = """
 import signal, sys, risorius.cli as c
 print("ready", flush=True)
@@ -35,7 +35,7 @@ MOST_LINES = 12
 
 @dataclass
 class Done:
-    """The end of a command: exit code, output, and peak memory in bytes."""
+    """How a command ended: exit code, output, and largest memory use in bytes."""
 
     code: int
     out: str
@@ -45,7 +45,7 @@ class Done:
 
 @dataclass
 class Row:
-    """The results of a trial: number of runs and failures."""
+    """The results of a trial: number of runs, and a sentence for each failure."""
 
     group: str
     name: str
@@ -59,7 +59,7 @@ class Row:
 
 
 def take(path: Path, frames: int = 60) -> Path:
-    """Write a take of core.dna's controls, made by a formula."""
+    """Write a CSV with curves of core.dna's controls, made by a formula."""
     names = risorius.load(CORE).raw_control_names
     t = np.arange(frames) / 30.0
     curves = 0.5 + 0.5 * np.sin(np.outer(1 + np.arange(len(names)) % 5, t))
@@ -69,7 +69,7 @@ def take(path: Path, frames: int = 60) -> Path:
 
 
 def voice(path: Path) -> Path:
-    """Write a sound: a hum of one second."""
+    """Write a WAV file with a tone of one second."""
     t = np.arange(16000) / 16000.0
     with wave.open(str(path), "wb") as file:
         file.setparams((1, 2, 16000, 0, "NONE", ""))
@@ -78,7 +78,7 @@ def voice(path: Path) -> Path:
 
 
 def jobs(folder: Path) -> Path:
-    """Write a batch of four jobs with the take; its output folder is folder / "out"."""
+    """Write a jobs.toml of four jobs with the take; outputs are in folder / "out"."""
     path = folder / "jobs.toml"
     path.write_text(
         'output = "out"\n[[jobs]]\nclips = "*.csv"\n'
@@ -87,7 +87,8 @@ def jobs(folder: Path) -> Path:
     return path
 
 
-# Name -> (file ending of the target, arguments); IN is an animation, VOICE a sound.
+# Name -> (suffix of the target, arguments). CORE, OUT, IN and VOICE are replaced by paths: a DNA
+# file, the target, curves, a sound.
 COMMANDS: dict[str, tuple[str, list[str]]] = {
     "convert": (".dna", ["convert", "CORE", "OUT"]),
     "convert json": (".json", ["convert", "CORE", "OUT"]),
@@ -106,7 +107,7 @@ QUICK = ("convert", "clip csv", "eval npz")
 
 @dataclass
 class Room:
-    """A folder of inputs and a folder for outputs."""
+    """A folder with the inputs of commands, and a folder for their outputs."""
 
     inputs: Path
     outputs: Path
@@ -137,7 +138,7 @@ class Room:
 def begin(
     arguments: Sequence[str], limit: Callable[[], None] | None = None
 ) -> subprocess.Popen[str]:
-    """Start a command and wait until it handles signals."""
+    """Start a command, and wait until it can be interrupted. limit: called in its process."""
     process = subprocess.Popen(
         [sys.executable, "-c", READY, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
@@ -155,7 +156,7 @@ def finish(process: subprocess.Popen[str]) -> Done:
 
 
 def measured(arguments: Sequence[str], folder: Path) -> Done:
-    """Run a command to its end, with limits far above the allowed ones. Measures peak memory."""
+    """Run a command to its end, and measure its largest memory use; large limits stop it."""
 
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
@@ -176,7 +177,7 @@ def measured(arguments: Sequence[str], folder: Path) -> Done:
 
 
 def complaints(done: Done, codes: Sequence[int]) -> list[str]:
-    """Sentences on a wrong end: a crash, a traceback, no error sentence, or several."""
+    """Sentences on faults in a command's end: exit code, traceback, no sentence, many lines."""
     lines = done.err.strip().splitlines()
     out = []
     if done.code not in codes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The short part of packaging/check/faults.sh, and checks that it detects planted faults."""
+"""Tests a short part of packaging/check/faults.sh, and that it detects planted faults."""
 
 import os
 import subprocess
@@ -89,12 +89,12 @@ def test_a_planted_fault_is_seen_by_mutations(fault, seen, monkeypatch):
 
 
 def planted(monkeypatch, code):
-    """Replace every command by given code."""
+    """Let every command run this code instead."""
     text = "import os, sys; print('ready', flush=True); " + code
     monkeypatch.setattr(room, "READY", text)
 
 
-# Leaves a hidden file, and replaces an old file by half of a new one.
+# Code that leaves a temporary file, and replaces an old file by half of a new one.
 WRITE = (
     "import time; p = sys.argv[-1]; old = os.path.exists(p) and open(p).read() == 'old'; "
     "open(os.path.dirname(p) + '/.risorius-x', 'w'); open(p, 'w').write('ne' if old else 'new'); "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes small valid inputs of all commands, into which mutants_of_inputs puts faults."""
+"""Makes small valid inputs of all commands; mutants_of_inputs adds faults to them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _glb(document: dict[str, Any], binary: bytes) -> bytes:
 
 
 def _glb_head() -> bytes:
-    """The small head with its expressions as morph targets."""
+    """Bytes of a GLB: a small head with its expressions as morph targets."""
     positions, faces, moved = _small_head()
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     arrays = [triangles.astype("<u2").reshape(-1, 1), positions.astype("<f4")]
@@ -80,7 +80,7 @@ def _glb_head() -> bytes:
 
 
 def _glb_take() -> bytes:
-    """A GLB with animated morph weights."""
+    """Bytes of a GLB with animated weights of morph targets."""
     times = np.arange(8, dtype="<f4") / 30
     binary = times.tobytes() + np.linspace(0, 1, 16, dtype="<f4").tobytes()
     document = {

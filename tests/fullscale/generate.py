@@ -55,7 +55,8 @@ LODS = 8
 GROUPS = 122
 FILLED = 0.149  # filled fraction of the merged matrix of the joint groups
 HEAD_CENTRE = (0.0, 150.0, 0.0)
-# Rotations of neck_01, neck_02 and head in degrees, and the axis of the joint.
+# Poses of the neck: name, the joint axis of the rotation, and rotations of neck_01, neck_02 and
+# head in degrees.
 NECK_POSES: tuple[tuple[str, int, Triple], ...] = (
     ("default", 2, (0, 0, 0)),
     ("turnUp_55", 2, (10, 20, 25)),
@@ -89,7 +90,7 @@ MESHES: tuple[Shape, ...] = (
 )
 MESHES_OF_LOD = (9, 9, 8, 6, 6, 4, 4, 4)
 INFLUENCES = (12, 12, 12, 8, 8, 8, 4, 4)
-# One head per LOD; each grid has half the vertices of the previous LOD.
+# A head mesh for each LOD; each grid has half the vertices of the previous LOD's.
 HEADS: tuple[Shape, ...] = tuple(
     (
         "head",
@@ -102,7 +103,7 @@ HEADS: tuple[Shape, ...] = tuple(
 
 
 def expression_names() -> list[str]:
-    """The names of the facial expressions; the last name has 100 characters."""
+    """Names of the facial expressions; the last name has 100 characters."""
     words = PROJECT / "addon" / "risorius" / "language" / "controls_en.toml"
     rows = [row for row in tomllib.loads(words.read_text(encoding="utf-8")) if row != "sides"]
     known = [row.replace("*", side) for row in rows for side in ("LR" if "*" in row else " ")]
@@ -116,7 +117,7 @@ def raw_names() -> list[str]:
 
 
 def channel_names() -> list[str]:
-    """Names of a channel per expression and per corrective; the first two names are equal."""
+    """Names of the channels of expressions and correctives; the first two names are equal."""
     single = [_snake(name.partition(".")[2][:50]) for name in expression_names()]
     names = [f"head__{name}" for name in single]
     names += [f"head__cor_{i:03d}" for i in range(CHANNELS - len(names))]
@@ -124,7 +125,7 @@ def channel_names() -> list[str]:
 
 
 def _snake(name: str) -> str:
-    """`eyeBlinkL` as `eye_blink_L`."""
+    """A name such as `eyeBlinkL`, written as `eye_blink_L`."""
     words = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)
     return "_".join(word if word in {"L", "R"} else word.lower() for word in words)
 
@@ -165,7 +166,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     """Add a short spine and facial joints on the surface of the head.
 
     Returns:
-        float32[J, 3] world positions in the neutral pose, up to the small neutral rotations.
+        float32[J, 3] world positions in the neutral pose, without the small neutral rotations.
     """
     parents = np.full(JOINTS, 3)
     parents[:4] = [0, 0, 1, 2]
@@ -179,7 +180,8 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     offsets[0] = points[0]
     turns = euler_matrices(random.uniform(-0.5, 0.5, (JOINTS, 3)))
     turns[:1] = turns[4:6] = np.eye(3)
-    # Along the neck x points up the bone and z to the character's right: about z it looks up.
+    # In joints of the neck, x points up along the bone and z to the character's right, so that a
+    # rotation about z looks up.
     turns[1:4] = np.array([[0, 0, -1], [1, 0, 0], [0, -1, 0]])
     local, offsets = turns.copy(), points.copy()
     for joint, parent in enumerate(parents.tolist()):
@@ -204,7 +206,7 @@ def euler_matrices(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def euler_angles(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The inverse of euler_matrices: float64[n, 3] angles in degrees."""
+    """float64[n, 3]: angles in degrees of rotation matrices, the inverse of euler_matrices."""
     x = np.arctan2(turns[:, 2, 1], turns[:, 2, 2])
     y = np.arcsin(np.clip(-turns[:, 2, 0], -1, 1))
     z = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
@@ -212,7 +214,7 @@ def euler_angles(turns: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def surface(places: NDArray[np.float64], radii: Sequence[float], centre: Sequence[float]) -> Floats:
-    """float32[n, 3] points of an ellipsoid; places float64[n, 2]: height and angle, both 0 to 1."""
+    """float32[n, 3] points of an ellipsoid. places: float64[n, 2], height and angle in 0 to 1."""
     polar, around = np.pi * (0.05 + 0.9 * places[:, 0]), 2 * np.pi * places[:, 1]
     unit = np.stack(
         [np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=1
@@ -245,7 +247,7 @@ def add_behavior(dna: risorius.Dna, random: np.random.Generator) -> None:
 
 
 def correctives(random: np.random.Generator) -> risorius.Psds:
-    """Correctives of 2 to 20 factors, mostly few; some have a pose of the neck as a factor."""
+    """Correctives of 2 to 20 factors, most of them of few; some read a pose of the neck."""
     sizes = np.minimum(2 + random.geometric(0.45, CORRECTIVES) - 1, 20)
     sizes[0] = 20
     columns = [np.sort(random.choice(EXPRESSIONS, n, replace=False)) for n in sizes]
@@ -261,7 +263,7 @@ def correctives(random: np.random.Generator) -> risorius.Psds:
 
 
 def add_neck_solver(dna: risorius.Dna) -> None:
-    """Add an RBF solver with poses of neck and head as quaternions; the twist axis is x."""
+    """Add an RBF solver whose poses are quaternions of neck and head; the twist axis is x."""
     targets = np.zeros((POSES, len(DRIVERS), 4))
     for row, (_name, axis, degrees) in zip(targets, NECK_POSES, strict=True):
         half = np.radians(degrees) / 2
@@ -297,7 +299,7 @@ def conditionals(inputs: Ints, outputs: Ints) -> risorius.Conditionals:
 
 
 def joint_group(joints: range, random: np.random.Generator) -> risorius.JointGroup:
-    """A joint group with translations and rotations, and scales for every tenth joint."""
+    """A joint group with translations and rotations of all joints, and scales of every tenth."""
     rows = np.array([9 * j + k for j in joints for k in range(9 if j % 10 == 0 else 6)])
     wanted = FILLED * 9 * JOINTS * CONTROLS / (6.3 * JOINTS)
     columns = np.sort(
@@ -350,7 +352,7 @@ def make_mesh(
 
 
 def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]:
-    """The nearest joints of each vertex, with weights that fall with distance and sum to 1."""
+    """Indices and weights of the joints nearest to each vertex; weights fall with distance."""
     square = np.square(points).sum(1)[:, None] + np.square(joints).sum(1) - 2 * points @ joints.T
     near = np.argpartition(square, influences, axis=1)[:, :influences]
     weights = 1 / (np.maximum(np.take_along_axis(square, near, axis=1), 0) + 0.05)
@@ -362,7 +364,7 @@ def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]
 def part_targets(
     name: str, lod: int, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """Shapes of a mesh at LOD 0 or 1: all channels for the head, 100 random ones for others."""
+    """Shapes of a mesh: all channels for the head, 100 random ones for others; none from LOD 2."""
     if lod > 1 or len(points) < 300:
         return []
     if name == "head":
@@ -411,7 +413,7 @@ def add_heads(
 
 
 def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[risorius.Mesh]:
-    """The meshes of a LOD; each has about half the vertices of its mesh at the previous LOD."""
+    """Meshes of a LOD; each has about half the vertices of the same mesh at the previous LOD."""
     found = []
     for name, (rows, columns), radii, centre in MESHES[: MESHES_OF_LOD[lod]]:
         grid = (max(round(rows * 2 ** (-lod / 2)), 4), max(round(columns * 2 ** (-lod / 2)), 5))
@@ -422,7 +424,7 @@ def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[ris
 
 
 def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.Dna:
-    """Generate the face; with deltas_per_channel, its only meshes are one head per LOD."""
+    """Generate the face. deltas_per_channel: if given, the only meshes are a head per LOD."""
     random = np.random.default_rng(seed)
     dna = risorius.Dna()
     dna.name, dna.archetype, dna.gender, dna.age = "Fullscale", "other", "other", 30

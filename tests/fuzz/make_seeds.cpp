@@ -27,7 +27,7 @@ constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
 constexpr std::size_t kLargestBomb = 8000;
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
-// The bytes that a target expects before the file; several give several seeds.
+// Bytes that fuzz targets expect before the file. Each entry gives a seed.
 const std::vector<Bytes> kFilters{{0, 0, 0, 0, 0, 0, 0, 0},       {0, 0x20, 1, 0, 0, 0, 0, 0},
                                   {0, 0x80, 0, 0, 0, 0, 0, 0},    {0x1D, 0x83, 1, 0, 0, 0, 0, 0},
                                   {0, 0x14, 0, 0, 200, 20, 9, 0}, {0, 0x0C, 0, 0, 0, 0, 0, 3}};
@@ -62,16 +62,16 @@ class Seeds {
     add_rig(name, *read);
   }
 
-  /// Adds a file whose lists multiply each other, which `evaluate` runs once. It takes as long as a
-  /// thousand other inputs and is therefore no seed for mutation.
+  /// Adds a file whose lists multiply each other, for `evaluate`. It takes as long as a thousand
+  /// other inputs, so that it is run only once and not mutated.
   void add_bomb(const std::string& name, const Bytes& file) {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
 
-  /// A seed for the deliberately faulty target: one run with this seed finds the fault.
+  /// Adds a seed for the target with a deliberate fault: one run with it must find the fault.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
 
-  /// Rows and packed buffers of each mode, as packed_fuzz reads them.
+  /// Adds rows, and packed buffers of each mode, in the form that packed_fuzz reads.
   void add_packed() {
     namespace author = risorius::author;
     using Mode = author::PackedMode;
@@ -130,7 +130,7 @@ class Seeds {
   void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file,
            std::size_t largest = kLargestSeed) {
     bytes.insert(bytes.end(), file.begin(), file.end());
-    // Blocks of rigs are larger because they are padded.
+    // Blocks of rigs may be larger, because they are padded.
     if (bytes.size() > (target == "rig" ? 4 : 1) * (largest + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);
@@ -146,7 +146,8 @@ Bytes written(const dna::Dna& face, std::uint16_t minor) {
   return *dna::write(face, {minor, false}, warnings);
 }
 
-// Each layer alone, and with the layer that it extends, because small inputs are tried most often.
+// Adds seeds with a single layer, or with a layer and the layer that it extends, because small
+// inputs are tried most often.
 void add_parts(Seeds& seeds) {
   const dna::Dna face = risorius::testing_support::make_full_face();
   for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {
@@ -155,7 +156,7 @@ void add_parts(Seeds& seeds) {
       const bool extends = wanted.id[3] == 'e' && id.substr(0, 2) == std::string_view(wanted.id, 2);
       if (id != "desc" && id != "defn" && id != wanted.id && !extends) layer = {};
     });
-    // The other layers still count their controls.
+    // The controls of removed layers must still be counted, so that indices remain valid.
     part.behavior.psd_count = face.behavior.psd_count;
     part.machine_learned_behavior.ml_control_names = face.machine_learned_behavior.ml_control_names;
     seeds.add(std::string("only-") + wanted.id, written(part, 8));
@@ -166,7 +167,7 @@ void add_parts(Seeds& seeds) {
   seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
 }
 
-// As large as a seed may be, and small enough that n * n steps take less than a second.
+// Adds bombs as large as they may be, but so small that n * n steps take less than a second.
 void add_bombs(Seeds& seeds) {
   for (const risorius::testing_support::Bomb& bomb : risorius::testing_support::kBombs) {
     std::uint16_t n = 16;

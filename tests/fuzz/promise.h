@@ -23,7 +23,7 @@ inline void demand(const std::string& broken_promise) {
 
 namespace heap {
 
-// One thread allocates; memory allocated before an input is not counted.
+// Heap bytes in use and their maximum since the input began. Only one thread allocates.
 inline std::ptrdiff_t now = 0, most = 0;
 
 inline void added(const volatile void*, std::size_t size) {
@@ -31,7 +31,8 @@ inline void added(const volatile void*, std::size_t size) {
   most = std::max(most, now);
 }
 inline void freed(const volatile void* p) {
-  // The sanitizer reports a block that it does not own and ends the process.
+  // A block that the sanitizer does not own is not counted; the sanitizer reports it and ends the
+  // process.
   auto* block = const_cast<void*>(p);
   if (__sanitizer_get_ownership(block) == 0) return;
   now -= static_cast<std::ptrdiff_t>(__sanitizer_get_allocated_size(block));
@@ -40,7 +41,7 @@ inline const int kInstalled = __sanitizer_install_malloc_and_free_hooks(added, f
 
 }  // namespace heap
 
-/// Demands that the peak of one input stays below beside + times * its size.
+/// Demands that an input of `size` bytes takes at most beside + times * size bytes of the heap.
 class HeapBound {
  public:
   HeapBound(std::size_t size, std::size_t times, std::size_t beside)
@@ -57,7 +58,8 @@ class HeapBound {
            " bytes of the heap, at most " + std::to_string(most_) + " were expected");
   }
 
-  /// Allows more heap, for a size that an input declares as a number without a list of that size.
+  /// Allows more heap, for sizes that an input states as a number without having a list of that
+  /// size.
   void allow(std::size_t bytes) { most_ += bytes; }
 
  private:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds Any in the public types of a module: arguments, results, members, and type aliases."""
+"""Finds public types of a module that contain Any: of arguments, results, members, aliases."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import suppress
 
 
 def shown_any(tree: ast.Module) -> list[str]:
-    """Dotted names of the public functions, members and names of a module whose types contain Any.
+    """Dotted names of a module's public functions, members and variables whose types contain Any.
 
     Variables inside functions are not public, nor are names with a leading underscore, except
     __init__.

@@ -7,18 +7,18 @@ import ast
 import re
 from collections.abc import Iterator
 
-# Methods that Blender calls on an add-on's classes, always with the same arguments.
+# Methods of an add-on's classes that Blender calls, always with the same arguments.
 BLENDERS = {"poll", "execute", "invoke", "modal", "draw", "draw_item", "filter_items"}
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def public_functions(tree: ast.Module) -> Iterator[tuple[str, Function]]:
-    """(dotted name, definition) of the functions of a module and the methods of its classes.
+    """(dotted name, definition) of the public functions and methods of a module.
 
-    Names that begin with an underscore and their members are not public. Overloads are skipped,
-    because their definition has the docstring. Methods that Blender calls are skipped, because
-    Blender's manual explains them.
+    Names that begin with an underscore, and members of such classes, are not public. Overloads are
+    skipped, because their definition has the docstring. Methods that Blender calls are skipped,
+    because Blender's manual explains them.
     """
     for node in tree.body:
         if isinstance(node, Function) and _shown(node):
@@ -37,7 +37,7 @@ def _shown(node: Function) -> bool:
 
 
 def arguments(node: Function) -> list[str]:
-    """The names of a function's arguments without self and cls."""
+    """Names of a function's arguments, without self and cls."""
     given = node.args
     plain = [*given.posonlyargs, *given.args]
     stars = [star for star in (given.vararg, given.kwarg) if star]
@@ -46,7 +46,7 @@ def arguments(node: Function) -> list[str]:
 
 
 def unsaid(node: Function) -> list[str]:
-    """Names of the arguments that a docstring does not mention, and "Raises" if it omits errors.
+    """Names of arguments that a docstring does not mention, and "Raises" if it omits errors.
 
     Only functions with at least two arguments are checked. The docstring must mention each
     argument, and errors if the function itself raises some, in Args and Raises or in sentences.

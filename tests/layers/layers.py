@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks the includes and imports of a part of the project against its rooms in rooms.toml."""
+"""Checks that folders (rooms) include and import only as rooms.toml allows."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ CODE_FROM_TEXT = {"exec", "eval", "run_module", "run_path"}
 
 
 class Use(NamedTuple):
-    """One import or include: a file of this part, something from outside it, or unreadable."""
+    """An import or include: of a file of the same part, of a name outside it, or an unclear one."""
 
     kind: str  # "inside", "outside" or "unreadable"
     name: str  # the file's path, the outside name, or the line as it is written
 
 
 def sources(root: Path, part: str) -> dict[str, str]:
-    """Path inside the part's folder -> text, for each file of a part of the project."""
+    """Path below the part's folder -> text, for each source file of a part of the project."""
     plan = ROOMS[part]
     base = root / plan["folder"]
     found = {}
@@ -40,13 +40,13 @@ def sources(root: Path, part: str) -> dict[str, str]:
 
 
 def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
-    """The room of a file: the file itself or its folder; None if `rooms` has neither."""
+    """The room of a file, a key of `rooms`: its path or its folder's path; None if neither is."""
     folder = PurePosixPath(path).parent.as_posix()
     return next((room for room in (path, folder) if room in rooms), None)
 
 
 def included(path: str, text: str, files: frozenset[str]) -> Iterator[Use]:
-    """Yields a C++ file's includes. A quoted name is searched beside the file, then in native/."""
+    """Yields a C++ file's includes. Quoted names are searched in its folder, then in native/."""
     for quoted, angled, other in _includes(text):
         name = quoted or angled
         places = [_joined(PurePosixPath(path).parent, name)] if quoted else []
@@ -77,7 +77,7 @@ def _joined(folder: PurePosixPath, name: str) -> str:
 
 
 def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
-    """Yields a Python file's imports, also in functions, under TYPE_CHECKING, by import_module."""
+    """Yields imports of a Python file, including the ones in functions and by import_module."""
     package = (name, *PurePosixPath(path).parts[:-1])
     for module, member in _imports(text, package):
         if module is None:
@@ -104,7 +104,7 @@ def _imports(text: str, package: tuple[str, ...]) -> list[tuple[tuple[str, ...] 
 def _names(
     nodes: list[ast.AST], package: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...] | None, str]]:
-    """(module, member) of each import; (None, the line) if the name is not a literal."""
+    """(module, imported name) of each import; (None, code) if the module's name is not literal."""
     importers = {"import_module", "__import__"}
     for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == "importlib":
@@ -154,7 +154,7 @@ def uses(part: str, files: Mapping[str, str]) -> dict[str, list[Use]]:
 
 
 def violations(part: str, files: Mapping[str, str]) -> list[str]:
-    """A sentence for each file, import or folder of a part that the plan does not allow."""
+    """A sentence for each file, import or folder of a part that contradicts the plan."""
     plan = ROOMS[part]
     used = uses(part, files)
     found = [
@@ -219,7 +219,7 @@ def _disordered(rooms: Mapping[str, list[str]]) -> list[str]:
 
 
 def _stale(used: Mapping[str, list[Use]], rooms: Mapping[str, list[str]]) -> list[str]:
-    """Sentences on uses that the plan allows but no file needs, so that the plan stays exact."""
+    """A sentence for each use that the plan allows but no file needs; the plan must be exact."""
     needed = {
         (room_of(path, rooms), room)
         for path, targets in used.items()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Compares the tables of files and folders in READMEs with the actual files and folders.
+"""Compares tables of files and folders in READMEs with the files and folders that exist.
 
 A map is a table of a page; the first column of its rows has names in backquotes. `Map.wrong`
-returns sentences on names that do not exist, and on names that the table lacks.
+returns sentences on names that do not exist, and on names that the table does not contain.
 """
 
 import re
@@ -15,14 +15,14 @@ _UNNAMED = {"README.md", "__init__.py", "CMakeLists.txt"}
 
 
 def first_cells(text: str, head: str) -> list[str]:
-    """The names in backquotes in the first column of the table whose head begins with a text.
+    """The names in backquotes in the first column of a table.
 
     Args:
         text: Markdown text of the page.
         head: beginning of the first cell of the table's head.
 
     Returns:
-        The names without options and following words; empty if the page lacks the table.
+        The first word of each name, without options; empty if the page has no such table.
     """
     found = re.search(rf"^\| {re.escape(head)}[^\n]*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE)
     cells = [row.split("|")[1] for row in found[1].splitlines()] if found else []
@@ -31,19 +31,19 @@ def first_cells(text: str, head: str) -> list[str]:
 
 
 def folders(path: Path) -> list[str]:
-    """The names of the subfolders that contain a file, without caches of Python."""
+    """Names of the subfolders that contain a file, apart from Python's caches."""
     inside = (p for p in path.iterdir() if p.is_dir() and p.name != "__pycache__")
     return [p.name for p in inside if any(f.is_file() and f.suffix != ".pyc" for f in p.rglob("*"))]
 
 
 def files(path: Path) -> list[str]:
-    """The names of the files in a folder without README.md, __init__.py and CMakeLists.txt."""
+    """Names of the files in a folder, except README.md, __init__.py and CMakeLists.txt."""
     return [p.name for p in path.iterdir() if p.is_file() and p.name not in _UNNAMED]
 
 
 @dataclass(frozen=True)
 class Map:
-    """A table of a page.
+    """A table of a page that lists files or folders.
 
     Attributes:
         page: path of the page.
@@ -58,7 +58,7 @@ class Map:
     places: tuple[str, ...]
 
     def wrong(self, text: str) -> list[str]:
-        """A sentence for each name that is missing in the table of a page's text or on the disk."""
+        """A sentence for each listed name that does not exist, and for each that is not listed."""
         named = [name.rstrip("/") for name in first_cells(text, self.head)]
         where = f"{self.page}, table {self.head}"
         lost = [n for n in named if not any((ROOT / place / n).exists() for place in self.places)]
@@ -72,7 +72,7 @@ def _all(*names: Iterable[str]) -> tuple[str, ...]:
 
 
 def maps() -> list[Map]:
-    """The maps of the project with the existing names."""
+    """The tables of the project's READMEs, with the names that exist now."""
     at = ROOT.joinpath
     native = [f"native/{name}" for name in folders(at("native"))]
     others = ["addon/risorius", "tests", "blender_tests", "packaging", "docs"]

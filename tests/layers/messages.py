@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Finds the error messages of the package that the add-on shows, to compare them with a table."""
+"""Finds the package's error messages that the add-on shows, for comparison with a table."""
 
 import ast
 import re
 from pathlib import Path
 
-# Rooms whose errors reach the interface of Blender. The command line alone shows the others.
+# Rooms whose errors the add-on shows in Blender. Errors of other rooms appear only on the command
+# line.
 ROOMS = (
     *("anim", "anyhead", "author", "base", "controls", "expressions", "files", "gameface"),
     *("importing", "lightening", "live", "mixing", "ranges", "rigs", "solving", "speech", "web"),
@@ -13,7 +14,7 @@ ROOMS = (
 
 
 def messages(package: Path) -> dict[str, str]:
-    """Message with {} for each value -> the file that raises it.
+    """Error message with {} for each value -> the file that raises it.
 
     Args:
         package: folder of the package `risorius`.
@@ -27,7 +28,7 @@ def messages(package: Path) -> dict[str, str]:
 
 
 def raised(source: str) -> list[str]:
-    """The messages of three words or more in the `raise` statements of a source text."""
+    """Messages with three words or more in the `raise` statements of a source text."""
     texts = (
         _template(node.exc.args[-1])
         for node in ast.walk(ast.parse(source))
@@ -37,7 +38,7 @@ def raised(source: str) -> list[str]:
 
 
 def without_names(text: str) -> str:
-    """A row of the table with {} for each {name}."""
+    """An English message of the table, with {} for each {name}."""
     return re.sub(r"\{\w+\}", "{}", text)
 
 

@@ -27,7 +27,8 @@ REGISTRATION = "registration.py"
 WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
 CACHES = {"cache", "lru_cache"}
-# Changed by being read, or made to be changed, whatever the name.
+# These objects change when they are read, or are made to be changed; not even a constant may be
+# one.
 ALWAYS_MUTABLE = {
     "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
     "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",
@@ -37,7 +38,7 @@ FIXED = {
     "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
     "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
 }  # fmt: skip
-# Classes whose objects a constant may be. Lock: it remembers nothing after its `with`.
+# Classes whose objects a constant may be. A Lock is in the same state after each `with`.
 VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
 CHANGES = {
     "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",
@@ -46,7 +47,7 @@ CHANGES = {
 
 
 def _last(node: ast.expr) -> str:
-    """The last word of a name with dots."""
+    """The last word of a dotted name; "" for other expressions."""
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
@@ -59,7 +60,7 @@ def _first(node: ast.expr) -> str:
 
 
 def _is_fixed(value: ast.expr, session: str) -> bool:
-    """Whether an assigned value is immutable, or a name for which another rule holds.
+    """Whether an assigned value is immutable, or an expression that another rule checks.
 
     Args:
         value: the assigned expression.
@@ -80,7 +81,7 @@ def _is_fixed(value: ast.expr, session: str) -> bool:
 
 
 def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
-    """Whether a name in UPPER_CASE may have a value. Args: frozen  see _frozen()."""
+    """Whether a constant (name in UPPER_CASE) may have this value. Args: frozen  see _frozen()."""
     if not isinstance(value, ast.Call):
         return not isinstance(value, (ast.GeneratorExp, ast.NamedExpr))
     name = _last(value.func)
@@ -91,13 +92,13 @@ def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
 
 
 class _File(NamedTuple):
-    """A parsed file. Attributes: body  its statements; nodes  kind -> all its syntax nodes."""
+    """A parsed file. Attributes: body  its statements; nodes  type -> its nodes of the type."""
 
     body: list[ast.stmt]
     nodes: dict[type, list[Any]]
 
     def of(self, *kinds: type) -> list[Any]:
-        """The nodes of some kinds."""
+        """All syntax nodes of some types."""
         return [node for kind in kinds for node in self.nodes.get(kind, ())]
 
 
@@ -111,7 +112,7 @@ def _read(text: str) -> _File:
 
 
 def _frozen(file: _File) -> set[str]:
-    """The classes of a module whose objects cannot change."""
+    """Names of the classes in a file whose objects cannot change."""
     found = set()
     for node in file.of(ast.ClassDef):
         heads = " ".join(map(ast.unparse, [*node.bases, *node.decorator_list]))
@@ -121,7 +122,7 @@ def _frozen(file: _File) -> set[str]:
 
 
 def _statements(body: list[ast.stmt], inside: str = "") -> Iterator[tuple[str, ast.stmt]]:
-    """The statements that run when a module is imported, each with the name of its class or ""."""
+    """(prefix, statement) of each statement that runs on import; prefix: names of its classes."""
     for node in body:
         yield inside, node
         if isinstance(node, ast.ClassDef):
@@ -140,14 +141,14 @@ def _names(target: ast.expr) -> list[str]:
 
 
 def _registry(file: _File) -> str:
-    """The file's name for the module session; "" if it does not import session."""
+    """The name by which a file calls the module session; "" if it does not import it."""
     imports = file.of(ast.ImportFrom)
     names = (alias for node in imports for alias in node.names if alias.name == "session")
     return next((alias.asname or alias.name for alias in names), "")
 
 
 def _of_names(file: _File) -> Iterator[tuple[int, str]]:
-    """The names of a module and its classes that have mutable values."""
+    """(line, message) of each name of a module or class that has a mutable value."""
     frozen, session = _frozen(file), _registry(file)
     for inside, node in _statements(file.body):
         if isinstance(node, ast.Assign):
@@ -166,7 +167,7 @@ def _of_names(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _modules(path: str, file: _File, files: Mapping[str, str]) -> set[str]:
-    """The file's names for other modules of the add-on."""
+    """Names by which a file calls other modules of the add-on."""
     found = set()
     for node in file.of(ast.ImportFrom):
         if node.level:
@@ -200,7 +201,7 @@ def _changed(node: ast.AST) -> ast.expr | None:
 
 
 def _of_changes(file: _File, modules: set[str]) -> Iterator[tuple[int, str]]:
-    """The places that change a constant, a class or another module."""
+    """(line, message) of each place that changes a constant, a class or another module."""
     for node in file.of(ast.Global):
         yield node.lineno, f"global {', '.join(node.names)}"
     classes = {node.name for node in file.of(ast.ClassDef)}
@@ -217,7 +218,7 @@ def _of_changes(file: _File, modules: set[str]) -> Iterator[tuple[int, str]]:
 
 
 def _cached(file: _File) -> Iterator[tuple[int, str]]:
-    """The functions of a module whose results functools caches."""
+    """(line, name) of each function whose results functools caches."""
     for node in file.of(ast.FunctionDef, ast.AsyncFunctionDef):
         for decorator in node.decorator_list:
             call = decorator.func if isinstance(decorator, ast.Call) else decorator
@@ -226,7 +227,7 @@ def _cached(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _of_defaults(file: _File) -> Iterator[tuple[int, str]]:
-    """Mutable defaults of arguments, which all calls share."""
+    """(line, message) of each mutable default of an argument, which all calls share."""
     for arguments in file.of(ast.arguments):
         for value in [*arguments.defaults, *filter(None, arguments.kw_defaults)]:
             if isinstance(value, (ast.Dict, ast.List, ast.Set)):
@@ -234,7 +235,7 @@ def _of_defaults(file: _File) -> Iterator[tuple[int, str]]:
 
 
 def _adopted(text: str) -> set[str]:
-    """`module.function` of all functions that registration.py passes to session.adopt."""
+    """`module.function` of each function that registration.py passes to session.adopt."""
     found = (call for call in _read(text).of(ast.Call) if ast.unparse(call.func) == "session.adopt")
     return {ast.unparse(value) for call in found for value in call.args}
 
@@ -247,7 +248,7 @@ def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int,
 
 
 def entries(files: Mapping[str, str]) -> list[str]:
-    """The names of all entries of the registry, in the order of the files."""
+    """The names of all entries that modules keep in the session, in the order of the files."""
     read = [_read(text) for path, text in files.items() if path != SESSION]
     return [
         ast.literal_eval(node.args[0])
@@ -259,7 +260,7 @@ def entries(files: Mapping[str, str]) -> list[str]:
 
 
 def found(files: Mapping[str, str]) -> list[str]:
-    """`path:line: reason` for all mutable state outside the registry.
+    """`path:line: reason` for all mutable state that is not kept in the session.
 
     Args:
         files: path below addon/risorius -> text, for all Python files of the add-on.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the phrases of phrases.toml in comments and docstrings."""
+"""Finds phrases that phrases.toml forbids in comments and docstrings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PATTERNS = {
 
 
 def files(root: Path) -> dict[str, str]:
-    """Path below root -> text of each source file of native and of the C++ tests."""
+    """Path below root -> text of each source file of `native` and of the C++ tests."""
     return {
         path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
         for folder, kinds in FOLDERS.items()
@@ -69,7 +69,7 @@ def _docstrings(text: str) -> Iterator[tuple[int, str]]:
 
 
 def found(path: str, text: str) -> list[str]:
-    """Each forbidden phrase of a file with its line and the advice."""
+    """A sentence for each forbidden phrase of a file, with its line and a better phrase."""
     out = []
     for first, block in prose(path, text):
         for name, pattern in _PATTERNS.items():
@@ -81,12 +81,12 @@ def found(path: str, text: str) -> list[str]:
 
 
 def room(path: str) -> str | None:
-    """The entry of rooms_to_rewrite that contains a file."""
+    """The entry of rooms_to_rewrite that contains a file; None: phrases are forbidden in it."""
     return next((entry for entry in TO_REWRITE if path.startswith(entry)), None)
 
 
 def findings(texts: Mapping[str, str]) -> tuple[list[str], set[str]]:
-    """The phrases in rewritten files, and the entries of rooms_to_rewrite with phrases."""
+    """Forbidden phrases in files outside rooms_to_rewrite; entries of this list with phrases."""
     out, open_rooms = [], set()
     for path, text in texts.items():
         entry = room(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds uses of POSIX functions that Windows lacks (posix_only.toml) in Python and C++."""
+"""Finds uses of POSIX functions, listed in posix_only.toml, that Windows does not have."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 POSIX = tomllib.loads((Path(__file__).parent / "posix_only.toml").read_text(encoding="utf-8"))
-# Function -> position of its argument `encoding`, from 0.
+# Function -> position of its argument `encoding`, counted from 0.
 ENCODING_AT = {"open": 3, "read_text": 0, "write_text": 1}
 
 
@@ -23,7 +23,7 @@ def _imports(node: ast.AST) -> Iterator[str]:
 
 
 def _opens_text(node: ast.Call, name: str) -> bool:
-    """Whether a call reads or writes text without an encoding; Windows would use its own."""
+    """Whether a call opens text without an encoding; on Windows it would use another one."""
     if name not in ENCODING_AT or (name == "open" and isinstance(node.func, ast.Attribute)):
         return False  # os.open, zipfile.open and similar functions read no text
     given = {keyword.arg: keyword.value for keyword in node.keywords}
@@ -47,7 +47,7 @@ def _call(node: ast.Call) -> Iterator[str]:
 
 
 def of_python(text: str) -> list[str]:
-    """Each use of what only POSIX has, as `line: what`."""
+    """`line: name` for each use in Python of functions that Windows lacks."""
     rules = POSIX["python"]
     modules, names = set(rules["modules"]), set(rules["names"])
     path = re.compile(rules["paths"])
@@ -71,7 +71,7 @@ def of_python(text: str) -> list[str]:
 
 
 def of_cpp(text: str) -> list[str]:
-    """`line: name` for each use in C++ of functions that Windows lacks, without comments."""
+    """`line: name` of each use of a POSIX function in C++; comments do not count."""
     rules = [re.compile(rule) for rule in POSIX["cpp"].values()]
     lines = enumerate((re.sub(r"//.*", "", line) for line in text.splitlines()), 1)
     return [
@@ -89,7 +89,7 @@ def of_file(path: str, text: str) -> list[str]:
 
 
 def unmarked(files: Mapping[str, str]) -> list[str]:
-    """`path:line: name` for uses in unmarked files; a sentence for marked files without uses."""
+    """`path:line: name` of uses in unmarked files; a sentence per marked file without uses."""
     used = {path: of_file(path, text) for path, text in files.items()}
     marked = POSIX["marked"]
     loose = [f"{path}:{use}" for path, uses in used.items() if path not in marked for use in uses]

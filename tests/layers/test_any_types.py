@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public types of the add-on do not contain Any, except names for types that Blender lacks."""
+"""Tests that public types of the add-on contain no Any, except for types Blender lacks."""
 
 import ast
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Docstrings of public functions explain two or more arguments, and the check can fail."""
+"""Tests that docstrings of public functions explain their arguments; the check can fail."""
 
 import ast
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Each error message of the package that Blender shows has a German row."""
+"""Tests that each error message of the package that Blender shows has a German row."""
 
 import re
 import tomllib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Labels of the add-on use title case, and each thing has one name."""
+"""Tests that labels of the add-on use title case, and that each thing has one German name."""
 
 import re
 from pathlib import Path
@@ -12,12 +12,12 @@ LABEL = re.compile(
     r"(?:Mode\(words\.say|words\.show\([^\"]{1,40}say|text=words\.say|bl_label = |heading=|"
     r'[( ]text=|status\.\w+, words\.say)\(?"([^"]+)"'
 )
-# German terms of the table, and terms that it must not contain.
+# Correct German term -> term that the translation table must not contain.
 NAMES = {"Tafel": "Brett", "Regler": "Schieberegler"}
 
 
 def lower_words(text):
-    """Words of the labels in a source that begin with a lower case letter, with their labels."""
+    """(word, label) of each word in a label of a source text that begins with a small letter."""
     for label in LABEL.findall(text):
         bare = re.sub(r"\([^)]*\)", "", label)
         if "{" in label or label.endswith((".", "?", ":", "…")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The files follow the plan of rooms.toml, and each rule of the check can fail."""
+"""Tests that files follow the plan rooms.toml, and that each rule of the check can fail."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +16,7 @@ def files_of(part):
 
 
 def planted(part, path, text):
-    """The check's sentences, without sizes of folders, after adding a file or a line to a part."""
+    """Sentences of the check after a file or lines are added to a part, except on folder sizes."""
     files = dict(files_of(part))
     files[path] = files.get(path, "") + "\n" + text + "\n"
     return [line for line in violations(part, files) if "are the most" not in line]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables in the READMEs list exactly the existing names; and the check detects errors."""
+"""Tests that tables in READMEs list exactly the names that exist, and that the check can fail."""
 
 import pytest
 from layers import ROOMS

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""No module and no class of the add-on has mutable state outside the registry."""
+"""No module and no class of the add-on has mutable state outside scene/base/session.py."""
 
 from collections import Counter
 from pathlib import Path

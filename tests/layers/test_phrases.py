@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Comments and docstrings of native avoid the phrases that docs/style.md forbids."""
+"""Tests that comments and docstrings avoid the phrases that docs/style.md forbids."""
 
 from functools import lru_cache
 from pathlib import Path

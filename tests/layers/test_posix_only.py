@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The product uses functions that Windows lacks only in files that posix_only.toml lists."""
+"""Tests that only files listed in posix_only.toml use functions that Windows does not have."""
 
 from pathlib import Path
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Only native/simd depends on the processor, and only core, simd and bytes depend on the system.
+"""Tests which folders of `native` depend on the processor or the system.
 
-So packaging/check/cross.sh need not compile the other folders for each system. risorius.h also
-tests for the system, because it is C for any compiler.
+Only simd depends on the processor, and only core, simd and bytes depend on the system, so that
+packaging/check/cross.sh need not compile the other folders for each system. risorius.h also tests
+for the system, because it is C for any compiler.
 """
 
 import re
@@ -11,24 +12,24 @@ from pathlib import Path
 import pytest
 
 NATIVE = Path(__file__).resolve().parents[2] / "native"
-# Macros and headers for processors, from the manuals of gcc and MSVC.
+# Macros and headers that exist for some processors only, from the manuals of gcc and MSVC.
 PROCESSOR = re.compile(
     r"\b(__x86_64__|__i386__|__aarch64__|__arm__|__ARM_\w+|__SSE\w*|__AVX\w*|__F16C__|__FMA__"
     r"|_M_X64|_M_IX86|_M_ARM64|_M_AMD64|__amd64__|immintrin\.h|arm_neon\.h)\b"
 )
 
 
-# Macros for systems and compilers, and headers outside the C++ standard.
+# Macros that name systems and compilers, and headers outside the C++ standard.
 SYSTEM = re.compile(
     r"\b(_WIN32|_WIN64|__APPLE__|__linux__|__unix__|_MSC_VER|__GLIBC__|__MINGW\w+|__ANDROID__)\b"
     r"|#include <[\w/]+\.h>"
 )
-# Headers of packages, which are the same on every system.
+# Headers of packages, which are the same on every system, so that SYSTEM must not match them.
 PACKAGES = re.compile(r"#include <(pybind11/[\w/]+|meshoptimizer/meshoptimizer|xxhash)\.h>")
 
 
 def that_ask(sources, words, folders):
-    """Sorted names of the sources outside given folders that contain a pattern.
+    """Sorted names of the sources outside some folders that contain a pattern.
 
     Args:
         sources: name -> text.

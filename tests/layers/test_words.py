@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The words of words.toml are defined in one place only, and a second definition is found."""
+"""Tests that the words of words.toml are defined in one place, and that the check can fail."""
 
 from functools import lru_cache
 from pathlib import Path

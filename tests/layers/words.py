@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds second definitions of the words that words.toml lists."""
+"""Finds second definitions of things that words.toml lists as words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KINDS = (".h", ".cpp", ".py", ".toml")
 
 
 def product_files(root: Path) -> dict[str, str]:
-    """Path below root -> text of each file of native, the package and the add-on."""
+    """Path below root -> text of each source file of native, the package and the add-on."""
     return {
         path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
         for folder in FOLDERS
@@ -24,7 +24,7 @@ def product_files(root: Path) -> dict[str, str]:
 
 
 def defines(word: Mapping, path: str, text: str) -> bool:
-    """Whether a file defines a word. Args: word  table of words.toml; path, text  the file."""
+    """Whether a file defines a word. Args: word  entry of words.toml; path, text  of the file."""
     if not path.endswith(word.get("in", "")):
         return False
     if "words" in word:
@@ -38,6 +38,6 @@ def _code(path: str, text: str) -> str:
 
 
 def second_definitions(word: Mapping, files: Mapping[str, str]) -> list[str]:
-    """The files that define a word but may not, and the files that should define it but do not."""
+    """Files that define a word but must not, and files that must define it but do not."""
     found = {path for path, text in files.items() if defines(word, path, text)}
     return sorted(found ^ {word["home"], *word.get("also", {})})

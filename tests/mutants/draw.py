@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws mutants of source lines, which the rules of universalmutator make, by a seed."""
+"""Draws mutants, source lines changed by the rules of universalmutator, by a seed."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ NO_CODE = ("#", "using ", "namespace ", "struct ", "class ", "template")
 SIGNATURE = re.compile(r"[\w:<>,&*\s]+[ *&][\w:]+\((const |bool |float |double |std::)")
 OPERATORS = "+-*/%<>=&|!"
 STATEMENT = re.compile(r"\*?[\w:.>\[\]()-]+(\s*[-+|&*/^]?=|\().*;$")
-# Words that a rule may replace.
+# Words that a mutant may replace by another word.
 WORDS = {"min", "max", "begin", "end", "any_of", "all_of", "none_of", "front_inserter",
          "back_inserter", "min_element", "max_element", "break", "continue"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A changed line of a file."""
+    """A source line with a change."""
 
     path: str  # from the root of the project
     line: int  # counted from 1
@@ -36,7 +36,7 @@ class Mutant:
     after: str
 
     def applied(self, source: str) -> str:
-        """The whole source with the one line replaced."""
+        """The source text with the changed line."""
         lines = source.splitlines(keepends=True)
         if lines[self.line - 1] != self.before:
             raise ValueError(f"{self.path}:{self.line} is no longer {self.before.strip()!r}")
@@ -100,13 +100,13 @@ def _differs(path: str, before: str, after: str) -> bool:
 
 
 def _same(before: str, after: str) -> int:
-    """The length of the common beginning of two texts."""
+    """The number of equal characters at the beginning of two lines."""
     pairs = enumerate(zip(before, after, strict=False))
     return next((i for i, (a, b) in pairs if a != b), min(len(before), len(after)))
 
 
 def _whole_words(before: str, after: str) -> bool:
-    """Whether a mutant replaces whole words.
+    """Whether a mutant changes no part of a word, apart from words that may be replaced.
 
     The rules also match `end` in `blend`, but an unknown name would fail at once.
     """
@@ -116,7 +116,7 @@ def _whole_words(before: str, after: str) -> bool:
 
 
 def _may_build(lines: list[str], number: int, after: str) -> bool:
-    """Whether a mutated line of C++ may compile, because the rules know neither words nor types.
+    """Whether a changed line of C++ may compile; the rules know neither words nor types.
 
     Operators must have spaces around them, as clang-format writes them. Statements must be removed
     as a whole. `break` and `continue` must be inside a loop.
@@ -168,7 +168,7 @@ def _brackets(code: str) -> int:
 
 
 def _bare(source: str) -> str:
-    """C++ without comments and white space."""
+    """C++ source text without comments and white space."""
     return re.sub(r"\s+", "", re.sub(r"//[^\n]*|/\*.*?\*/", "", source, flags=re.DOTALL))
 
 
@@ -188,7 +188,7 @@ def _tree(source: str) -> str:
 
 
 def _says_nothing(node: ast.AST) -> bool:
-    """Whether a statement has no effect: a string, `pass`, `__future__`, or a bare annotation."""
+    """Whether a statement has no effect: a string, `pass`, `__future__`, or imports for types."""
     text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     future = isinstance(node, ast.ImportFrom) and node.module == "__future__"
     types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"

@@ -38,8 +38,8 @@ HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parents[1]
 SEED = 15
 COUNTS = {"native": 80, "package": 60, "scene": 60}
-# Headers are left out, because a change rebuilds all files that include them. Bindings are left
-# out, because they are tables of names.
+# Part -> (patterns of files that get mutants, patterns of exceptions). Headers get none, because a
+# change rebuilds all files that include them. Bindings get none, because they are tables of names.
 SOURCES = {
     "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*", "native/web/*"]),
     "package": (["native/python/risorius/**/*.py", "native/python/risorius_people/**/*.py"], []),
@@ -48,7 +48,7 @@ SOURCES = {
 SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
 WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
 MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
-# No debug symbols and low optimisation, because each mutant is compiled and linked.
+# Without debug symbols and with low optimisation, because each mutant is compiled and linked.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -59,7 +59,7 @@ OPTIONS = [
 
 
 def sources(root: Path, part: str, under: Sequence[str] = ()) -> list[str]:
-    """Paths, relative to the root, of the files of a part that get mutants.
+    """Files of a part that get mutants, as paths relative to the root.
 
     Args:
         root: The project's folder.
@@ -84,7 +84,7 @@ def _lies_under(path: str, place: str) -> bool:
 
 
 def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
-    """The tests of a file, in the order of the table: those of all patterns that match its path."""
+    """The tests that the table lists for a file, in its order, from all patterns that match."""
     found: list[str] = []
     for pattern, tests in table.items():
         if fnmatch.fnmatch(path, pattern):
@@ -93,7 +93,7 @@ def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
 
 
 def programs(table: dict[str, list[str]]) -> list[str]:
-    """The GoogleTest programs among the tests of a part."""
+    """Names of the GoogleTest programs among the tests of a table."""
     named = {test.partition(":")[0] for tests in table.values() for test in tests}
     return sorted(name for name in named if "/" not in name)
 
@@ -102,7 +102,7 @@ class Copy:
     """A copy of the project's files in build/mutants, in which mutants are tested."""
 
     def __init__(self, part: str, targets: list[str]):
-        """Prepare the copy.
+        """Choose the folder of the copy, which refresh() fills.
 
         Args:
             part: native, package or scene.
@@ -119,7 +119,7 @@ class Copy:
         self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Copy changed files. Unchanged files keep their time stamps, so that Ninja skips them."""
+        """Copy changed files and build. Equal files keep their times, so that Ninja skips them."""
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
@@ -163,7 +163,10 @@ class Copy:
             sys.exit(f"{' '.join(command)}\n{text[-2000:]}")
 
     def try_one(self, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
-        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the test."""
+        """Test a mutant. Returns killed, slow, survived, unbuildable or unsure, and the last test.
+
+        Unsure means that the test also fails without the mutant.
+        """
         place = self.root / mutant.path
         source = place.read_text(encoding="utf-8")
         place.write_text(mutant.applied(source), encoding="utf-8")
@@ -182,7 +185,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; only then the failure counts."""
+        """Whether the failed test passes without the mutant; otherwise it proves nothing."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
@@ -197,7 +200,10 @@ class Copy:
         return self.outcome(test)[0] == "passed"
 
     def outcome(self, test: str) -> tuple[str, str]:
-        """Run a test on the present sources: passed, killed, slow or unbuildable; and a line."""
+        """Run a test on the present sources.
+
+        Returns: passed, killed, slow or unbuildable, and a line of the test's output about it.
+        """
         if "/" not in test.partition(":")[0]:
             target = test.partition(":")[0]
             if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:
@@ -230,7 +236,7 @@ class Copy:
 
         Args:
             command: program and arguments.
-            limit: CPU seconds of each process.
+            limit: CPU seconds that each process may use.
         """
         began = _seconds_of_children()
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as room:
@@ -281,13 +287,13 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def told(mutant: Mutant, outcome: str, said: str) -> str:
-    """The text of a mutant's result in three lines."""
+    """Three lines about a mutant: outcome and place, the line before, and the line after."""
     head = f"{outcome}: {mutant.path}:{mutant.line} {said}"
     return f"{head}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}"
 
 
 def summary(outcomes: list[str]) -> str:
-    """The last line of the output, with the counts."""
+    """The last line of the output, which contains the number of each outcome."""
     counts = Counter(outcomes)
     tried = sum(counts.values()) - counts["unbuildable"]
     return (
@@ -298,7 +304,7 @@ def summary(outcomes: list[str]) -> str:
 
 
 def main() -> None:
-    """Draw mutants, test them, and count the outcomes."""
+    """Draw mutants, test them, and print the number of each outcome."""
     parser = argparse.ArgumentParser()
     parser.add_argument("part", choices=SOURCES)
     parser.add_argument("--under", nargs="+", default=[], metavar="PATH", help="only of these")
@@ -308,7 +314,7 @@ def main() -> None:
     parser.add_argument("--survivors", action="store_true", help="try again those that lived")
     parser.add_argument("--programs", action="store_true", help="GoogleTest alone, for a first run")
     options = parser.parse_args()
-    # Background jobs of a shell ignore SIGINT, and tests' programs would inherit that.
+    # A shell's background jobs ignore SIGINT, and programs of tests would inherit this.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # child processes inherit it
     part, wanted = options.part, options.count or COUNTS[options.part]
@@ -319,7 +325,7 @@ def main() -> None:
             print(told(mutant, "drawn", ""))
         return
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
-    # With --programs, the Python module is not built, because that takes long.
+    # With --programs, the Python module is not built, because building it takes long.
     used = {"": [test for path in paths for test in tests_of(path, table)]}
     copy = Copy(part, programs(used) + ([] if options.programs else ["_native"]))
     copy.root.mkdir(parents=True, exist_ok=True)

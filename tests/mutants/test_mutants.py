@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every source file has tests in tests.toml, and sources() rejects unknown paths."""
+"""Tests that every source file has tests in tests.toml, and that sources() refuses bad paths."""
 
 import re
 import tomllib

@@ -11,21 +11,21 @@ import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
 GOLDEN = PROJECT / "tests" / "data" / "golden"
-# Folder with golden data; another one may hold files of other shapes from the same generator.
+# Folder with golden data. The variable can name a folder with other files of the same kind.
 GOLDEN_SET = Path(os.environ.get("RISORIUS_GOLDEN", GOLDEN))
 SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
 
 _not_run: set[str] = set()
 
-# A background job ignores Ctrl-C, and so would the commands that tests start and interrupt.
+# Background jobs ignore Ctrl-C, and so would the commands that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object]]]:
     """All evaluations of the golden set, or those with a tag: (rig, tag, content of its JSON).
 
-    Tags: "" for a complete load, ".quat" for quaternions, ".seq" for a sequence in time; others
-    were filtered on load.
+    Tags: "" for a complete load, ".quat" for quaternions, ".seq" for frames through time; other
+    tags mean files that were loaded with a LOD filter.
     """
     found = []
     for path in sorted(GOLDEN_SET.glob("*.eval*.json")):
@@ -51,7 +51,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip a test whose data are missing; the summary of the run names them."""
+    """Skip a test if `path` is missing; the summary of the run names the missing data (`what`)."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")
@@ -72,7 +72,7 @@ def standard_controls():
 
 @contextlib.contextmanager
 def no_room(size):
-    """Limit the size of files, which simulates a full disk."""
+    """Limit the size of files in bytes, which simulates a full disk."""
     import resource  # exists on POSIX only
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -10,7 +10,8 @@ namespace risorius::registering {
 namespace {
 
 TEST(Sparse, SolvesEverySide) {
-  // Rows 2 -1 0, -1 2 -1, 0 -1 2. Two entries sum to the middle 2; one entry is above the diagonal.
+  // The matrix has the rows 2 -1 0, -1 2 -1 and 0 -1 2. Two entries add up to the middle 2. The
+  // entry 99 is above the diagonal and must be ignored.
   const std::vector<std::int32_t> rows{0, 1, 1, 1, 2, 2, 0}, columns{0, 0, 1, 1, 1, 2, 2};
   const std::vector<double> values{2, -1, 1, 1, -1, 2, 99};
   const auto factors = SparseCholesky::make(rows, columns, values, 3).value();

@@ -22,14 +22,15 @@ TEST(Allocation, CounterSeesAnAllocation) {
   EXPECT_GT(allocations, before);
 }
 
-// Functions that must not throw are noexcept: an exception would end the program.
+// Whether a function is noexcept. Evaluation must never throw, because the caller's thread may not
+// be able to handle it.
 template <class F, class... Args>
 constexpr bool never_throws = std::is_nothrow_invocable_v<F, Args...>;
 using Evaluate = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
                           const PoseView&) noexcept;
 using EvaluatePose = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
                               Pose&) noexcept;
-// A pointer to a noexcept function accepts no other function.
+// These assignments compile only if the functions are noexcept.
 constexpr Evaluate kEvaluate = &evaluate;
 constexpr EvaluatePose kEvaluatePose = &evaluate;
 static_assert(never_throws<decltype(kEvaluate), const Rig&, const float*, std::uint32_t, bool,
@@ -44,7 +45,8 @@ static_assert(never_throws<decltype(&Instance::evaluate), Instance&, const float
 static_assert(never_throws<decltype(&Instance::set_lod), Instance&, std::uint32_t>);
 static_assert(never_throws<decltype(&Instance::set_mask), Instance&, std::size_t, float>);
 
-// A face with every part that is evaluated; networks run as operations or as a list.
+// A variant of the face with every part that is evaluated. operations: true: the networks are
+// operations of layer mlbe; false: the file has only a list of networks.
 struct Kind {
   const char* name;
   bool operations;
@@ -75,7 +77,7 @@ Rig full_rig(const Kind& kind) {
 
 constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and a partial one
 
-// [kFilm, 5]: at rest, usual, out of range, not finite, and usual again.
+// Frames [kFilm, 5]: at rest, usual values, out of range, NaN, infinite, and usual values again.
 std::vector<float> film() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   const float frames[][5] = {{0, 0, 0, 0, 1},

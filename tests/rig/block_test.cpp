@@ -42,7 +42,8 @@ dna::Dna face_with_everything() {
   return dna;
 }
 
-// Networks that read a solver, a solver that reads a corrective, setups, joints of networks.
+// A face with networks that read a solver, a solver that reads a corrective, a swing setup, and
+// joints that networks move.
 dna::Dna face_that_learns() {
   dna::Dna dna = make_face(5, 2, 4, 2);
   dna.definition.lod_joint_mapping.lods = {0, 0};
@@ -106,7 +107,8 @@ TEST(Block, EvaluatesAsTheRigThatItCameFrom) {
   }
 }
 
-// Compiled with other data on stack and heap each time: no byte is left uninitialised.
+// The same faces are compiled while stack and heap have other old content. Equal bytes show that no
+// byte is left uninitialised.
 TEST(Block, EqualFacesAreEqualBytes) {
   const auto dirty = [](int value) {
     volatile unsigned char stack[65536];
@@ -183,7 +185,8 @@ int damage_each_byte(const BlockBytes& whole) {
   return refused;
 }
 
-// If a changed byte has a corrected hash, the index check refuses it or evaluation is safe.
+// One byte after the other is changed and the hash corrected. The check of indices must reject the
+// bytes, or evaluation must be safe.
 TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   int refused = 0;
   for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {
@@ -192,7 +195,7 @@ TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   EXPECT_GT(refused, 500 / static_cast<int>(shared_steps().step));
 }
 
-// The first element of one of a Rig's arrays, in a copy of its block.
+// The first element of one of the rig's arrays, in a copy of its block.
 template <class T>
 T& first_of(BlockBytes& copy, const Rig& rig, std::span<const T> array) {
   const auto at = reinterpret_cast<const std::uint8_t*>(array.data()) - rig.block().data();
@@ -205,7 +208,7 @@ std::string refused_field(BlockBytes& changed) {
   return rig ? "taken" : rig.error().where;
 }
 
-// Rows that a LOD places without computing them would show an earlier frame.
+// A LOD that places rows which it does not compute would show an earlier frame.
 TEST(Block, RowsThatNothingComputesAreRefused) {
   const Rig rig = must_compile(face_with_everything());
   BlockBytes level = bytes_of(rig);
@@ -222,7 +225,8 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
-// Whole vectors are added to the rows of wide groups, so no other group's rows may lie in them.
+// Kernels add whole vectors to the rows of wide groups, so that a vector must not contain rows of
+// another group.
 TEST(Block, LongGroupsHaveWholeVectorsToThemselves) {
   constexpr std::uint16_t kLong = 18;
   std::vector<std::uint16_t> outputs(kLong);
@@ -254,7 +258,7 @@ TEST(Block, ColumnsByGroupStayInTheirMatrix) {
   EXPECT_EQ(refused_field(begin), "rig.joint_groups");
 }
 
-// A block outside of its group's range would keep the attributes of the frame before.
+// Begins, channels, inputs and rows beyond their arrays are rejected.
 TEST(Block, ChannelsAndRunsStayInWhatTheyCountIn) {
   dna::Dna dna = face_with_everything();
   dna.definition.blend_shape_channel_names = names("shape", 2);
@@ -290,7 +294,7 @@ TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   }
 }
 
-// Extra pieces are looked up by block.
+// Evaluation looks extra pieces up by block, so that they must be sorted.
 TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};
@@ -317,7 +321,7 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   }
 }
 
-// Counts without an array behind them: a small block must not demand a large workspace.
+// The number of regions has no array behind it. A small block must not demand a large workspace.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
   constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
@@ -328,7 +332,8 @@ TEST(Block, ScratchIsHeldAgainstTheBlock) {
   EXPECT_EQ(refused_field(forged), "rig.header");
 }
 
-// A network whose last layer has more rows than values of its own would overwrite another's values.
+// A network whose last layer has more rows than the operation has values would overwrite values of
+// another operation.
 TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   const Rig rig = must_compile(face_that_learns());
   BlockBytes changed = bytes_of(rig);
@@ -337,7 +342,8 @@ TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   for (std::size_t i = 0; i < rig.ml_operations.size(); ++i) {
     MlOperation& operation = operations[i];
     if (operation.kind == MlOperation::kMlp && networks++ == 0) operation.value_count -= 1;
-    // The total equals the number in the header.
+    // Another operation gets the removed value, so that the total still equals the number in the
+    // header.
     if (operation.kind == MlOperation::kScatter && scatters++ == 0) {
       operation.values_begin = 0, operation.value_count = 1;
     }

@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kHalf = 0.70710678f;  // sine and cosine of 45 degrees
 
-// y is up in the file and z in the other space: x stays, y becomes z, z becomes -y; centimetres.
+// Converts from a file with y up, in cm, to a space with z up, in m: x stays, y becomes z, and z
+// becomes -y.
 SpaceConvention y_up() {
   SpaceConvention convention;
   convention.axes = {1, 0, 0, 0, 0, -1, 0, 1, 0};

@@ -56,7 +56,8 @@ TEST(CheckControls, FindsEachAndNoMoreThanAsked) {
   EXPECT_EQ(find_non_finite(rig, raw.data(), 3, 2).size(), 2u);
 }
 
-// Two targets at 0 and 1 on a line, radius 2 (the format's degrees), linear: 1 - d / radius.
+// Two targets at 0 and 1 of one control, radius 2 and the linear function, which gives the weights
+// 1 - distance / 2.
 TEST(SolverPoses, GivesDistancesAndWeights) {
   dna::Dna dna = make_face(1, 0, 1);
   dna.descriptor.rotation_unit = 1;
@@ -80,7 +81,8 @@ TEST(SolverPoses, GivesDistancesAndWeights) {
   solver_poses(rig, 0, pose.controls.data(), work, distances, weights);
   EXPECT_DOUBLE_EQ(distances[0], 0.25);
   EXPECT_DOUBLE_EQ(distances[1], 0.75);
-  // 0.875 and 0.625 sum to 1.5; the second is halved by its scale and below the threshold.
+  // The values 0.875 and 0.625 are divided by their sum 1.5. The second weight is then halved by
+  // its scale, and is below the threshold.
   EXPECT_FLOAT_EQ(weights[0], 0.875f / 1.5f);
   EXPECT_EQ(weights[1], 0.0f);
   EXPECT_EQ(pose.controls[1], weights[0]);

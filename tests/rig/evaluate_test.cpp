@@ -59,8 +59,8 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
 }
 
-// Of four joints the first turns at both LODs, the second only at LOD 0, the third moves and the
-// fourth does nothing: each gets a w, whatever the memory held.
+// Of four joints the first rotates at both LODs, the second only at LOD 0, the third only moves and
+// the fourth does nothing. Each must get a w, whatever the memory of the pose contained.
 TEST(EvaluateJoints, EveryQuaternionHasItsW) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups =
@@ -115,7 +115,8 @@ TEST(EvaluateJoints, NanStaysInTheGroupsThatHaveItAsAColumn) {
 
 // ---- correctives
 
-// Control 2 is a corrective of 0 and 1 with the given entries.
+// Control 2 is a corrective of controls 0 and 1. In: columns, values  the factor and the value of
+// each entry
 Rig corrective_rig(std::vector<std::uint16_t> columns, std::vector<float> values) {
   dna::Dna dna = make_face(2, 1, 1);
   dna.behavior.psds.rows = std::vector<std::uint16_t>(columns.size(), 2);
@@ -152,8 +153,8 @@ TEST(EvaluateCorrectives, NanFactorSpoilsTheCorrective) {
   EXPECT_EQ(evaluate_once(rig, {kNan, 0.0f}).controls[2], 0.0f);
 }
 
-// Correctives 1, 2, 3 of one raw control, each half of the control that it reads; entries
-// interleaved.
+// Three correctives (controls 1 to 3) of one raw control. Entry i makes columns[i] a factor of the
+// corrective rows[i], with the value 0.5.
 dna::Dna chain(std::vector<std::uint16_t> rows, std::vector<std::uint16_t> columns) {
   dna::Dna dna = make_face(1, 3, 1);
   dna.behavior.psds.values = std::vector<float>(rows.size(), 0.5f);
@@ -186,7 +187,7 @@ TEST(EvaluateCorrectives, CycleStaysAtRest) {
 TEST(EvaluateCorrectives, CorrectiveThatNothingUsesAtTheLodStaysZero) {
   dna::Dna dna = chain({1, 2, 3}, {0, 0, 0});
   dna.behavior.joint_groups =
-      // 3 is unused, 2 is used at LOD 0 only.
+      // The joint group uses control 2 only at LOD 0, and does not use control 3.
       std::vector{make_group({2, 1}, {1, 2}, {0, 1}, {1, 0, 0, 1})};
   const Rig rig = must_compile(dna);
   EXPECT_EQ(evaluate_once(rig, {1.0f}, 0).controls, (std::vector{1.0f, 0.5f, 0.5f, 0.0f}));
@@ -280,7 +281,7 @@ TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
   EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
 }
 
-// A run that is skipped while its input rests adds nothing: compared with a loop over all rows.
+// A run of rows is skipped while its input is 0. The result must equal a loop over all rows.
 TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   constexpr std::uint16_t kRaw = 40, kMaps = 7;
   constexpr std::size_t kRows = 300;
@@ -294,7 +295,7 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   std::vector<std::uint16_t> inputs, outputs;
   std::vector<float> from, to, slope, cut;
   for (std::size_t i = 0; i < kRows; ++i) {
-    // Same input and output as the row before, so in its run.
+    // With the same input and output as the row before, the row belongs to its run.
     const bool same = i > 0 && random() % 2 == 0;
     inputs.push_back(same ? inputs.back() : static_cast<std::uint16_t>(random() % kRaw));
     outputs.push_back(same ? outputs.back() : static_cast<std::uint16_t>(random() % kMaps));
@@ -335,7 +336,8 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
 
 // ---- blend shapes
 
-// Controls may list their channels, or channels may read their controls.
+// With few active controls each lists its channels; with many, every channel reads its control. The
+// result must be the same.
 TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
   constexpr std::uint16_t kRaw = 64, kShapes = 150;
   std::mt19937 random(6);
@@ -406,7 +408,7 @@ TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
   EXPECT_TRUE(pose.controls.empty());
 }
 
-// Found by the evaluate and rig fuzz targets: pointer arithmetic on the null pointer of no joints.
+// A fault that fuzzing found: pointer arithmetic on the null pointer of a pose without joints.
 TEST(Evaluate, EmptyFaceHasNoQuaternions) {
   compile::CompileOptions options;
   options.rotation = compile::Rotation::kQuaternion;

@@ -56,7 +56,7 @@ class RigFile : public testing::Test {
   core::Result<Rig> open(const path& file, Trust trust, ReadBy by = ReadBy::kCopy) {
     return open_rig_file(file, trust, by, simd::scalar_kernels());
   }
-  // A refusal names the file and a field.
+  // Expects that a file is rejected with an error that names the file and a field.
   void expect_refused(const Bytes& bytes, Trust trust, const std::string& where,
                       const std::string& words = "") {
     const path file = write(bytes);
@@ -71,7 +71,8 @@ class RigFile : public testing::Test {
     out[at] = value;
     return out;
   }
-  // A face whose damage only the check of indices can find.
+  // The bytes of a face whose damage only the check of indices can find, because its hash is
+  // corrected.
   Bytes with_wild_index() const {
     Bytes out = bytes_;
     const auto* factor = reinterpret_cast<const std::uint8_t*>(rig_->psd_factors.data());
@@ -114,7 +115,8 @@ TEST_F(RigFile, PrefixesAndMoreBytesAreRefused) {
   for (const Trust trust : kTrusts) expect_refused(longer, trust, "rig.size", "expected");
 }
 
-// The header: magic 0, version 7, byte order 8, header size 12, size 16, hash 24, numbers 32.
+// The fields of the header begin at these bytes: magic 0, version 7, byte order 8, header size 12,
+// size 16, hash 24, numbers 32.
 TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   const auto flipped = [&](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at] ^ 1); };
   for (const Trust trust : kTrusts) {
@@ -131,7 +133,8 @@ TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   }
 }
 
-// Arrays begin on multiples of 64, so that every array and the gaps between them are hit.
+// Every 13th byte gets a flipped bit. Arrays begin on multiples of 64, so that each array and the
+// gaps between arrays are hit.
 TEST_F(RigFile, AFlippedBitOfOnesOwnFileIsFound) {
   const path file = folder_ / "face.rig";
   for (std::size_t at = 0; at < bytes_.size(); at += 13) {
@@ -184,7 +187,8 @@ TEST_F(RigFile, AFolderThatIsNotThereCannotBeWritten) {
 
 constexpr uid_t kNobody = 65534;
 
-// The owner of the file decides: only the full check refuses a wild index.
+// The wrong index shows which check was made: only the full check finds it. The rights of the file
+// decide about the check.
 TEST_F(RigFile, AFileThatOthersMayWriteGetsTheFullCheck) {
   const path file = write(with_wild_index());
   for (const ReadBy by : {ReadBy::kCopy, ReadBy::kMap}) {
@@ -204,7 +208,8 @@ TEST_F(RigFile, AFileOfAnotherUserGetsTheFullCheck) {
   if (::chown(file.c_str(), kNobody, static_cast<gid_t>(-1)) == 0) {
     EXPECT_FALSE(open(file, Trust::kOwner).has_value());
   } else {
-    // Only root may give files away, but a system file belongs to another user too.
+    // Only root may give a file to another user. Without that right, a system file serves as a file
+    // of another user.
     const auto other = bytes::read_file("/etc/passwd");
     ASSERT_TRUE(other.has_value());
     EXPECT_FALSE(other->is_own);

@@ -9,7 +9,7 @@ namespace {
 
 using namespace testing_support;
 
-// Corrective 1 equals the raw control, corrective 2 equals corrective 1.
+// Corrective 1 copies the raw control, corrective 2 copies corrective 1.
 Rig latency_rig() {
   dna::Dna dna = make_face(1, 2, 1);
   dna.behavior.psds.rows = {1, 2};
@@ -68,7 +68,8 @@ TEST(Instance, FacesOfOneRigKeepTheirOwnState) {
   EXPECT_EQ(a.evaluate(&half).controls[2], 0.5f);
 }
 
-// A network copies control 0; a corrective reads it; another network reads the corrective.
+// The first network copies control 0, a corrective copies its output, and the second network copies
+// the corrective.
 dna::Dna networks_around_a_corrective() {
   dna::Dna dna = make_face(1, 1, 1);
   dna.behavior.psds.rows = {1};
@@ -114,7 +115,8 @@ TEST(Instance, MaskedNetworkRests) {
   EXPECT_EQ(face.evaluate(&half).controls[2], 0.5f) << "any value but 0 is all of it";
 }
 
-// A network and a corrective that read each other.
+// A cycle: the first network reads the second network, which reads the corrective, which reads the
+// first network.
 TEST(Instance, CycleRestsWhenSettled) {
   dna::Dna dna = networks_around_a_corrective();
   dna.machine_learned_behavior.neural_networks[1].input_indices = {3};

@@ -15,8 +15,8 @@ using namespace testing_support;
 
 constexpr std::size_t kInputs = 12, kCorrectives = 40, kBones = 30, kLevels = 3;
 
-// Few channels of the first face have a control, so that in most frames every channel reads its
-// control. Many channels of the second face have one.
+// The first face has so few channels that in most frames every channel reads its control. The
+// second has so many that active controls list their channels.
 void add_channels(dna::Dna& dna, std::uint32_t seed) {
   const std::size_t count = seed == 1 ? 20 : 150;
   dna.definition.blend_shape_channel_names = names("shape", count);
@@ -30,7 +30,8 @@ void add_channels(dna::Dna& dna, std::uint32_t seed) {
   dna.behavior.blend_shape_channels.output_indices = std::move(outputs);
 }
 
-// A map of each raw control in two runs; every third one is not 0 at rest.
+// Each raw control drives two runs of rows of different maps. For every third control a map is not
+// 0 at rest.
 void add_maps(dna::Dna& dna) {
   dna.definition.animated_map_names = names("map", kInputs);
   dna::Conditionals& table = dna.behavior.animated_maps.conditionals;
@@ -53,8 +54,8 @@ void add_maps(dna::Dna& dna) {
   table.cut_values = std::move(cut);
 }
 
-// Correctives of two to four raw controls, and groups that all controls drive. The values are
-// random, the sizes are fixed.
+// A face with correctives of two to four raw controls, and joint groups that all controls drive.
+// The values are random, the sizes are fixed.
 dna::Dna correcting_face(std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);
@@ -69,7 +70,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       columns.push_back(static_cast<std::uint16_t>((first + f * (1 + p % 2)) % kInputs));
     }
   }
-  // A negative weight gives a corrective of -0 if a factor is 0.
+  // A negative weight makes a corrective -0 if a factor is 0.
   std::vector<float> weights(rows.size(), 1.25f);
   for (std::size_t i = 0; i < weights.size(); i += 5) weights[i] = -0.5f;
   psds.values = std::move(weights);
@@ -84,7 +85,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       outputs[r] = static_cast<std::uint16_t>(static_cast<std::size_t>(first) + r);
     }
     std::vector<float> values(inputs.size() * outputs.size());
-    // A third of the columns is empty, a different third in each face.
+    // In each face a third of the columns has only zeros; it is a different third.
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = (i % inputs.size() + seed) % 3 == 0 ? 0.0f : value(random);
     }
@@ -97,7 +98,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
   return dna;
 }
 
-// Frames that keep their active controls for a while, some of them negative or not finite.
+// Frames in which the same controls remain active for a while. Some values are negative or NaN.
 class Film {
  public:
   const std::vector<float>& next() {
@@ -118,7 +119,7 @@ class Film {
   std::vector<float> raw_ = std::vector<float>(kInputs);
 };
 
-// Compares bits, because NaN is not equal to itself.
+// Compares bits, because NaN does not equal itself.
 bool same_bits(std::span<const float> a, std::span<const float> b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
@@ -159,7 +160,8 @@ TEST(Kept, IsOfOneRigThoughAnotherTakesItsPlace) {
   Workspace work;
   std::vector<float> raw(kInputs, 0.5f);
   for (const std::uint32_t seed : {1u, 2u}) {
-    // The second rig may lie at the address of the first.
+    // The second rig may have the same address as the first one had, so that only Rig::number tells
+    // them apart.
     const Rig rig = must_compile(correcting_face(seed));
     if (seed == 1) work = make_workspace(rig);
     work.traversal = Traversal::kListed;

@@ -15,7 +15,7 @@ namespace {
 
 using namespace risorius;
 
-// Gives the same numbers everywhere, unlike the standard's distributions.
+// Random numbers that are the same everywhere, unlike the distributions of the standard library.
 class Numbers {
  public:
   explicit Numbers(std::uint64_t seed) : state_(seed * 2 + 1) {}
@@ -92,7 +92,7 @@ dna::JointGroup group(Numbers& numbers) {
   return g;
 }
 
-// Up to five factors each: raw controls, and correctives before it.
+// Correctives with up to five factors each: raw controls and earlier correctives.
 dna::Psds correctives(Numbers& numbers) {
   std::vector<std::uint16_t> rows, columns;
   std::vector<float> values;
@@ -161,7 +161,8 @@ bool add(const dna::Dna& dna, compile::Precision precision, Numbers& numbers, Ha
   return true;
 }
 
-// Some vertices of 0 to 15 influences on a chain of bones.
+// Adds the matrices of a chain of bones, and the deformed vertices with 0 to 15 influences each, to
+// the hash.
 bool add_skin(Numbers& numbers, Hash& hash) {
   constexpr std::uint32_t kBones = 20, kVertices = 200;
   std::vector<std::int32_t> parents;

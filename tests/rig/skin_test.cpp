@@ -32,7 +32,7 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return out;
 }
 
-// Gauss elimination with the largest pivot.
+// Inverts a matrix by Gauss-Jordan elimination with the largest pivot.
 Matrix inverse(Matrix m) {
   Matrix out = identity();
   for (std::size_t c = 0; c < 4; ++c) {
@@ -70,7 +70,7 @@ Matrix kept(const float* location, const float* rotation, const float* scale) {
   return m;
 }
 
-// A tree of bones in any order, and their transforms.
+// Bones in any order that form a tree, with their transforms.
 struct Armature {
   std::vector<std::int32_t> parents;
   std::vector<double> rest;
@@ -84,7 +84,8 @@ struct Armature {
     return m;
   }
 
-  // As in Blender: pose = pose of the parent * rest relative to the parent * transform.
+  // The pose of a bone as Blender defines it: pose of the parent * rest relative to the parent *
+  // transform.
   Matrix pose(std::size_t b) const {
     const Matrix own = kept(&location[b * 3], &rotation[b * 4], &scale[b * 3]);
     if (parents[b] < 0) return product(rest_of(b), own);
@@ -190,7 +191,7 @@ TEST(JointChain, WrongTreesAndMatricesAreErrors) {
 
 // ---- skin
 
-// Influences of vertices; some vertices have none.
+// The influences of a mesh's vertices, and its points. Some vertices may have no influence.
 struct Mesh {
   std::vector<std::uint32_t> offsets{0}, bones;
   std::vector<float> weights, points;
@@ -201,7 +202,7 @@ struct Mesh {
   }
 };
 
-// In: counts  numbers of influences, used for the vertices in turn
+// A mesh with random influences. In: counts  numbers of influences, which the vertices get in turn
 Mesh random_mesh(std::size_t vertices, std::span<const std::uint32_t> counts, std::uint32_t bones,
                  std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -228,7 +229,8 @@ std::vector<float> evaluated(const simd::Kernels& kernels, const Mesh& mesh,
   return out;
 }
 
-// Blender's formula in double: p + sum w (M p - p) / sum w, if sum w is above 0.0001.
+// The expected points by Blender's formula, in double: p + sum w (M p - p) / sum w, if sum w is
+// above 0.0001.
 std::vector<double> reference(const Mesh& mesh, const std::vector<float>& matrices) {
   std::vector<double> out(mesh.points.begin(), mesh.points.end());
   for (std::size_t v = 0; v < mesh.size(); ++v) {
@@ -297,7 +299,8 @@ TEST(Skin, WhatIsNotFiniteSpoilsTheVerticesOfItsBoneAlone) {
   const std::vector<std::uint32_t> counts{1, 2, 3, 5};
   Mesh mesh = random_mesh(500, counts, 50, 12);
   const std::vector<float> clean = evaluated(kernels(), mesh, matrices);
-  // The matrix of the bone that pads groups as 0.
+  // The matrix of bone 0 is NaN. Vertices must become NaN only if they have a weight on it,
+  // although groups are filled up with influences of weight 0.
   for (std::size_t i = 0; i < 12; ++i) matrices[i] = kNaN;
   mesh.points[0] = kNaN;
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);

@@ -21,7 +21,7 @@ using compile::CompileOptions;
 
 constexpr std::size_t kThreads = 8, kTurns = 40, kFramesEach = 11;
 
-// Two variants: linear with float16, quaternions with float32.
+// Two variants of compiling: Euler angles with float16, and quaternions with float32.
 std::vector<CompileOptions> ways() {
   CompileOptions halves, quaternions;
   halves.precision = compile::Precision::kFloat16;
@@ -35,7 +35,7 @@ Rig full_rig(const CompileOptions& options) {
   return std::move(rig).value();
 }
 
-// Frame n of a film: a jaw and a turning quaternion.
+// Frame n of an animation in which a jaw moves and a quaternion rotates.
 std::vector<float> frame(std::size_t n) {
   const float jaw = static_cast<float>(n % 5) / 4.0f;
   const float side = static_cast<float>(n % 3) * 0.48f;  // 0, 0.48, 0.96
@@ -48,7 +48,7 @@ bool same(const Pose& a, const Pose& b) {
          a.animated_maps == b.animated_maps && a.controls == b.controls;
 }
 
-// Runs body(thread) in all threads, which start together.
+// Runs body(thread) in kThreads threads, which begin at the same time.
 template <class Body>
 void together(const Body& body) {
   std::atomic<std::size_t> waiting{kThreads};
@@ -87,7 +87,7 @@ TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
 TEST(OneRig, GivesEveryInstanceItsOwnPast) {
   for (const CompileOptions& way : ways()) {
     const Rig rig = full_rig(way);
-    // The last pose of an Instance that evaluates the frames from `first` on.
+    // The last pose of an Instance that evaluates kTurns frames from `first` on.
     const auto film = [&rig](std::size_t first) {
       Instance face(rig);
       face.set_mask(0, static_cast<float>(first % 2));
@@ -160,7 +160,7 @@ TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
   EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
 }
 
-// A face of make_full_face and a mesh with many blocks.
+// The parts of a DirectFace for the rig of make_full_face, with two meshes of several blocks.
 FaceParts many_blocks(const Rig& rig) {
   constexpr std::uint32_t kVertices = 5 * kSkinBlock + 7;
   FaceParts parts;
@@ -218,7 +218,8 @@ TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
   EXPECT_NE(all[0][0], all[0][2]);  // a different frame
 }
 
-// Not in the tsan preset's OneRig, because exceptions pass between threads.
+// This test is not part of OneRig, which the tsan preset runs, because exceptions pass between
+// threads here.
 TEST(Parallel, WhatAThreadThrowsIsTheCallers) {
   std::atomic<std::size_t> done = 0;
   const auto body = [&](std::size_t begin, std::size_t end) {

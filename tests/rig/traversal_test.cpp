@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The orders in which columns of the joint groups are visited: only those of active controls,
-// listed or added one by one, or all of them.
+// The orders in which columns of the joint groups are visited: only the columns of active controls,
+// listed or added one by one, or all columns.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Groups of one row to many vectors, with fewer rows at each LOD. Some write the same attributes,
+// Joint groups of 1 to 90 rows, with fewer rows at each LOD. Some groups write the same attributes,
 // and some attributes between them have no row.
 dna::Dna many_groups() {
   std::mt19937 random(11);
@@ -53,7 +53,8 @@ std::vector<float> some_active(std::size_t n, std::uint32_t seed) {
   return raw;
 }
 
-// The exact value of a row by the file's own matrix in double, and the largest error of a sum.
+// The value of a row, computed in double from the matrix of the file, and the largest possible
+// error of a float32 sum.
 struct Expected {
   double value = 0, bound = 0;
 };
@@ -161,7 +162,8 @@ TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
   }
 }
 
-// A resting group beside a moving one must not show the frame before.
+// A group without active columns that shares a block with an active group must be 0, and not show
+// the frame before.
 TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_batch_workspace(rig), fresh = make_workspace(rig);
@@ -189,7 +191,8 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   }
 }
 
-// An Instance clears only the blocks that the frame before wrote.
+// An Instance sets only those blocks to 0 that the frame before wrote. Nothing of that frame may
+// remain.
 TEST_P(Traversals, OfAnInstanceLeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Instance face(rig);
@@ -229,12 +232,14 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   EXPECT_EQ(evaluate_by(rig, work, Traversal::kAdded, raw, 0).joints, clean.joints);
 }
 
-// The last block of attributes is incomplete at the end of the joints; it may need several pieces.
+// The last block of attributes is incomplete, because the joints end within it. It may need several
+// pieces.
 TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
   for (std::uint16_t joints = 1; joints < 4; ++joints) {
     const auto places = static_cast<std::uint16_t>(joints * 9);
     dna::Dna dna = make_face(2, 0, joints, 1);
-    // A piece is a run of consecutive rows. In descending order each row is a piece of its own.
+    // Consecutive rows for ascending attributes form one piece. In descending order each row is a
+    // piece of its own.
     std::vector<std::uint16_t> outputs;
     std::vector<float> values, expected(places);
     for (std::uint16_t p = places; p-- > 0;) {
@@ -273,9 +278,9 @@ INSTANTIATE_TEST_SUITE_P(Every, Traversals, testing::ValuesIn([] {
                          [](const auto& about) { return about.param; });
 
 TEST(Traversal, IsChosenByTheBytesThatItMoves) {
-  // Columns of 90 rows have 360 bytes; listing one moves 32. With 11 of 12 controls active, the
-  // bytes of the last column and the list of all, 360 + 12 * 8, exceed 11 * 32; with columns of two
-  // rows they do not.
+  // A column of 90 rows has 360 bytes; listing a column moves 32 bytes. With 11 of 12 controls
+  // active, reading all columns costs the bytes of the inactive column and of all entries, 360 + 12
+  // * 8, more than listing, 11 * 32. With columns of 2 rows it costs less.
   for (const auto& [rows, eleven] :
        {std::pair{std::uint16_t{90}, 0u}, std::pair{std::uint16_t{2}, 1u}}) {
     dna::Dna dna = make_face(12, 0, 10, 1);
@@ -298,7 +303,7 @@ TEST(Traversal, IsChosenByTheBytesThatItMoves) {
   }
 }
 
-// Controls are added if each group has fewer active columns than the kernels' limit.
+// Columns are added one by one if there are fewer active columns per group than the kernels' limit.
 TEST(Traversal, AddsTheColumnsOfFewControls) {
   constexpr std::uint16_t kControls = 80, kColumnRows = 90;
   dna::Dna dna = make_face(kControls, 0, 10, 1);

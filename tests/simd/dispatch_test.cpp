@@ -10,7 +10,7 @@
 namespace risorius::simd {
 namespace {
 
-// Sets RISORIUS_SIMD for one test and restores it afterwards.
+// Sets RISORIUS_SIMD while the object exists, and restores it afterwards.
 class Environment {
  public:
   explicit Environment(const char* value) {

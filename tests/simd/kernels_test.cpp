@@ -24,7 +24,8 @@ const Kernels& scalar_kernels_unoptimised();
 
 namespace {
 
-// Columns without padding; kernels may read a vector past the last one.
+// Columns without padding. After the last one there is a vector of further values, because kernels
+// may read it.
 template <class T>
 struct Matrix {
   std::size_t rows, columns;
@@ -57,7 +58,7 @@ std::vector<std::uint32_t> every_second(std::size_t n, std::size_t rows) {
   return offsets;
 }
 
-// Column i has weight i.
+// The first n columns, with weight number i for column i.
 std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, std::size_t n) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < n; ++i)
@@ -77,8 +78,9 @@ std::vector<std::string> all_kernels() {
 double value(float v) { return v; }
 double value(std::uint16_t v) { return from_half(v); }
 
-// The error of a sum of n products, rounded in any order, fused or not, is at most n * eps * sum|w
-// v| to first order; one more eps covers the second order at these n.
+// Expects that sums of n products have at most the error of rounding. In any order, fused or not,
+// it is at most n * eps * sum|w v| to first order; one more eps covers the second order for these
+// n.
 template <class T>
 void expect_sums(const Matrix<T>& m, const std::vector<std::uint32_t>& offsets,
                  const float* weights, std::size_t step, std::size_t n, const float* out) {
@@ -122,7 +124,8 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
   }
 }
 
-// Column by column or group by group: each row has the same terms in the same order.
+// Adding column by column must give the same bits as the sum of a group, because each row has the
+// same terms in the same order.
 TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
   constexpr std::size_t kCount = 9;
   constexpr float kOthers = 7.0f;
@@ -132,7 +135,8 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
     const Matrix<std::uint16_t> half = halves(m);
     const std::vector<float> weights = random_weights(kCount, random);
     const std::vector<Column> columns = columns_of(every_second(kCount, rows), kCount);
-    // The second of three runs; nothing is added to the others.
+    // The columns are added to the run of the group with index 1. Values before and after this run
+    // must not change.
     const std::size_t first = rounded_up(rows), end = first + rows;
     const Rows runs[] = {{0, 1},
                          {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(rows)}};
@@ -161,7 +165,8 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
   }
 }
 
-// A coarse LOD has none of the last groups: their runs are unknown and may be anywhere.
+// At a coarse LOD the last groups have no rows. Their columns must not be added: the runs of these
+// groups may contain any numbers.
 TEST_P(SimdKernels, AddNoColumnOfAGroupWithoutRows) {
   constexpr std::uint32_t kRowCount = 16;
   std::mt19937 random(13);
@@ -335,7 +340,7 @@ TEST_P(SimdKernels, PlaceMoreWithoutChangingOtherPlaces) {
   }
 }
 
-// Frames have gaps between them, which belong to something else.
+// Between the frames are gaps that must not be written.
 TEST_P(SimdKernels, PlaceEachFrameAsIfItWereAlone) {
   constexpr std::size_t kCount = 5, kPieces = 40, kRowStride = 700, kStride = kPieces * kPlaces + 3;
   std::mt19937 random(10);
@@ -364,7 +369,8 @@ struct Turn {
   float parity;
 };
 
-// The product of three turns about axes, in double precision.
+// The product of three rotations about axes, in double precision. In: angles  radians about x, y
+// and z
 std::array<double, 4> product_of_turns(const Turn& turn, const float* angles) {
   std::array<double, 4> q{0, 0, 0, 1};
   for (const std::uint8_t axis : turn.order) {
@@ -385,7 +391,7 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   std::mt19937 random(10);
   for (std::size_t t = 0; t < 2 * std::size(turns); ++t) {
     const Turn& turn = turns[t / 2];
-    // Large angles, and angles that need no reduction.
+    // Alternately large angles and angles that need no reduction.
     const float most = t % 2 == 0 ? 20.0f : 1.55f;
     std::uniform_real_distribution<float> angle(-most, most);
     for (const std::size_t count : {0u, 1u, 15u, 16u, 17u, 40u}) {
@@ -418,8 +424,8 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   }
 }
 
-// Rotations that turn are computed together with any others, large angles with small ones, and each
-// has the bits of a single one.
+// Rotations are computed together with others, large angles with small ones. Each must have the
+// bits that it has alone.
 TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
   constexpr std::size_t kCount = 700, kStride = 10;
   std::mt19937 random(12);
@@ -472,7 +478,8 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
   }
 }
 
-// Ten vertices of eight influences of a few bones, in three groups.
+// Skins ten vertices with eight influences each, in three groups. The three floats after the
+// vertices must not be written.
 std::vector<float> skinned(const Kernels& kernels) {
   std::mt19937 random(8);
   const Matrix<float> matrices = random_matrix(12, 5, random),
@@ -540,7 +547,7 @@ TEST(Half, EveryFiniteHalfSurvivesTheWayThroughAFloat) {
   }
 }
 
-// The value of a half by its definition: sign, exponent, fraction.
+// The expected value of a half float follows from its definition by exponent and fraction.
 TEST(Half, HasTheValueOfItsFields) {
   for (std::uint32_t bits = 0; bits < 0x8000; ++bits) {
     const int exponent = static_cast<int>(bits >> 10);

@@ -21,8 +21,9 @@ Doubles random(std::mt19937& random, std::size_t n, double low, double high) {
   return out;
 }
 
-/// How far x violates the conditions, relative to the size of the slopes.
-/// In: slope  gradient of the smooth part; kink  of the sparse part, added on either side of rest
+/// How far x violates the conditions of a minimum with bounds; 0: not at all.
+/// In: slope  gradient of the smooth part
+///     kink   slope of the sparse part on both sides of rest
 double violation(const Doubles& x, const Doubles& slope, const Doubles& low, const Doubles& high,
                  const Doubles& rest, const Doubles& kink) {
   double worst = 0.0;
@@ -59,7 +60,7 @@ TEST(LeastChange, MeetsTheConditionsOfTheLeast) {
   for (int i = 0; i < 60; ++i) {
     const std::size_t rows = 1 + static_cast<std::size_t>(i) % 9, columns = 40;
     const Doubles a = random(numbers, rows * columns, -1, 1);
-    // Half of the targets cannot be reached.
+    // In every second case the targets are too large to be reached.
     const Doubles b = random(numbers, rows, -1, 1.0 + 20.0 * (i % 2));
     const Doubles low = random(numbers, columns, -0.4, 0), high = random(numbers, columns, 0, 0.4);
     const double ridge = i % 3 == 0 ? 1.0 : 1e-6;
@@ -86,7 +87,7 @@ TEST(Descend, MeetsTheConditionsOfTheLeast) {
   std::mt19937 numbers(11);
   constexpr std::size_t kCount = 30;
   for (int i = 0; i < 40; ++i) {
-    // Nearly equal columns, like a jaw and its extreme.
+    // Columns 0 and 1 are nearly equal, like the controls of a jaw and of its extreme position.
     Doubles a = random(numbers, 50 * kCount, -1, 1);
     for (std::size_t r = 0; r < 50; ++r)
       a[r * kCount + 1] = a[r * kCount] + 0.01 * a[r * kCount + 1];

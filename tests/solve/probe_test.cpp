@@ -20,8 +20,9 @@ using testing_support::must_compile;
 
 constexpr double kRadians = 0.017453292519943295;
 
-/// Raw 0 turns the elbow, 10 units from the shoulder, by 90 degrees about z. Raw 1 is a shape that
-/// lifts vertex 0 by 2 along z before skinning. Their product moves the shoulder by 4 along x.
+/// An arm of two joints. Raw control 0 rotates the elbow, 10 units from the shoulder, by 90 degrees
+/// about z. Raw control 1 is a shape that lifts vertex 0 by 2 along z before skinning. The product
+/// of both controls moves the shoulder by 4 along x.
 dna::Dna arm() {
   dna::Dna dna = make_face(2, 1, 2, 1);
   dna.definition.joint_parents = {0, 0};
@@ -52,7 +53,8 @@ core::Result<Surface> surface_of(const dna::Dna& dna, std::uint32_t lod = 0) {
   return make_surface(dna, std::make_shared<rig::Rig>(must_compile(dna)), lod);
 }
 
-/// Computed by hand: the elbow is at (11, 2, 2) in the neutral pose.
+/// The position of a vertex, computed by hand from the two raw controls. The elbow is at (11, 2, 2)
+/// in the neutral pose.
 std::array<double, 3> expected(std::size_t vertex, double turn, double lift) {
   const double c = std::cos(90 * kRadians * turn), s = std::sin(90 * kRadians * turn);
   const double shift = 4 * turn * lift;
@@ -93,7 +95,7 @@ TEST(Probe, DerivativesCountCorrectives) {
   ASSERT_EQ(found.blocks[0].controls, (std::vector<std::uint32_t>{0, 1}));
   for (std::size_t c = 0; c < 2; ++c) {
     for (std::size_t p = 0; p < 2; ++p) {
-      // The same difference of the positions computed by hand.
+      // The expected derivative is the same difference quotient of positions computed by hand.
       const auto there = expected(p, 0.5 + (c == 0 ? kStep : 0), 0.25 + (c == 1 ? kStep : 0));
       const auto here = expected(p, 0.5, 0.25);
       for (std::size_t k = 0; k < 3; ++k) {
@@ -124,7 +126,7 @@ TEST(Probe, AShapeThatAStepTakesToNothingCounts) {
   const std::vector<Point> points{{0, 0}};
   Probe probe(surface, points);
   const auto step = static_cast<float>(kStep);
-  // No room above, so that the step goes down to 0.
+  // The control is at its highest value, so that the step must go down, to 0.
   const std::vector<float> raw{0, step}, high{1, step};
   const std::vector<std::uint8_t> free{0, 1};
   const Jacobian found = probe.jacobian(raw.data(), high.data(), free.data());

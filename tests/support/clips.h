@@ -36,9 +36,9 @@ inline clip::Clip make_clip(std::size_t controls, std::size_t frames) {
   return clip;
 }
 
-/// One control of each kind that the codec distinguishes, by exact arithmetic: 0 at rest, 1
-/// constant, 2 a line, 3 a polynomial, 4 held steps, 5 like 3, 6 any bits, 7 NaN payloads, -0 and
-/// denormals.
+/// One control of each kind that the codec distinguishes, computed by exact arithmetic: control 0
+/// is always 0, 1 is constant, 2 a line, 3 a polynomial, 4 steps, 5 equal to 3, 6 random bits, and
+/// 7 NaN payloads, -0 and denormals.
 inline clip::Clip make_all_kinds(std::size_t frames) {
   clip::Clip clip = make_clip(8, frames);
   std::mt19937 random(7);
@@ -69,7 +69,7 @@ inline clip::Clip make_full_clip(std::size_t frames) {
   return clip;
 }
 
-/// Corrects the checksums of damaged bytes, if their parts can be found.
+/// Corrects the checksum of each part of a damaged file (head, block, end) that can be found.
 inline void seal(Bytes& bytes) {
   const auto number = [&](std::size_t at) {
     std::uint32_t value = 0;
@@ -97,8 +97,9 @@ inline void seal(Bytes& bytes) {
   put_hash(at, bytes.size() - clip::kHashSize, bytes.size() - clip::kHashSize);
 }
 
-/// Reads bytes as a clip. Reading must give a clip that can be written and read again without a
-/// change, or an error with a part and an offset inside the file. Out: the broken promise, or empty
+/// Checks reading of any bytes as a clip. It must give a clip that can be written and read again
+/// without a change, or an error with a part and an offset inside the file. Out: the broken
+/// promise, or "" if none
 inline std::string reading_clip(View bytes, clip::Ends ends) {
   clip::Limits limits;
   limits.values = 1u << 15;
@@ -119,8 +120,8 @@ inline std::string reading_clip(View bytes, clip::Ends ends) {
   return is_same ? "" : "written and read again a clip is another";
 }
 
-/// Decodes bytes as a block's curves, which must give the same success for all curves together as
-/// for each curve alone. Out: the broken promise, or empty
+/// Checks decoding of any bytes as the curves of a block. Decoding all curves together must succeed
+/// exactly if each curve can be decoded alone. Out: the broken promise, or "" if none
 inline std::string reading_curves(View bytes, std::size_t controls, std::size_t frames) {
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
@@ -138,8 +139,8 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   return "";
 }
 
-/// Encodes bytes as float32 curves, which must preserve all bits and take little additional space.
-/// Out: the broken promise, or empty
+/// Checks encoding of any bytes as float32 curves. It must preserve all bits, and the result must
+/// not exceed the float32 values by more than one byte. Out: the broken promise, or "" if none
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

@@ -47,7 +47,8 @@ inline dna::Definition definition() {
   return d;
 }
 
-// Controls: 0 to 4 raw, 5 the corrective, 6 and 7 of networks, 8 of the RBF pose.
+// Controls 0 to 4 are raw controls, 5 is the corrective, 6 and 7 belong to networks, and 8 to the
+// RBF pose.
 inline dna::Behavior behavior() {
   dna::Behavior b;
   b.psd_count = 1;
@@ -172,8 +173,9 @@ inline dna::TwistSwingSetup setup(std::uint16_t axis) {
 
 }  // namespace full_face
 
-/// Two LODs, three joints, two meshes, and one or two of everything else; layers up to 2.8. Its
-/// behavior names only raw and corrective controls, so that it stays whole in older versions.
+/// A face with two LODs, three joints, two meshes, and one or two of everything else, in all layers
+/// up to version 2.8. Its behavior reads only raw and corrective controls, so that it remains
+/// complete when it is written for older versions.
 inline dna::Dna make_full_face() {
   dna::Dna dna;
   dna.descriptor = full_face::descriptor();

@@ -16,7 +16,8 @@ void __libc_free(void*);
 
 namespace {
 
-// The tests of this executable have one thread.
+// Bytes of heap memory in use, their maximum, and the bytes in use when counting began. The tests
+// of this executable have one thread.
 std::ptrdiff_t now = 0, most = 0, begin = 0;
 
 std::ptrdiff_t size_of(void* p) { return static_cast<std::ptrdiff_t>(malloc_usable_size(p)); }
@@ -27,7 +28,7 @@ void* added(void* p) {
   return p;
 }
 
-// Tests the flag that glibc stores before a block with its own memory mapping.
+// Whether a heap block has its own memory mapping, by the flag that glibc stores before the block.
 bool is_mapped(void* p) { return (static_cast<std::size_t*>(p)[-1] & 2) != 0; }
 
 }  // namespace

@@ -7,8 +7,9 @@
 
 namespace risorius::testing_support {
 
-/// Counts every malloc of this executable from its construction on, operator new included. A block
-/// that realloc copies counts twice during the copy; pages that the kernel moves do not.
+/// Counts the heap memory of this executable from its construction on: every malloc, operator new
+/// included. A block that realloc copies counts twice during the copy; pages that the kernel moves
+/// do not.
 class HeapCount {
  public:
   HeapCount();

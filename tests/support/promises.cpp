@@ -42,7 +42,7 @@ std::string broken(const std::string& promise, const core::Error& error) {
 
 // ---- sources that are not memory
 
-// Serves a file to the parser in pieces. From the given read on, every byte is changed.
+// A file that the parser can read only in pieces. From a given read on, every byte is changed.
 class PieceSource final : public bytes::Source {
  public:
   PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
@@ -110,7 +110,8 @@ float largest_joint_value(const Dna& dna) {
   return most;
 }
 
-// Factors of 10 and 100 at each of four layers stay far below the largest float.
+// Whether weights are at most 10 and there are at most four layers. Four layers that each multiply
+// by 10 and sum 100 terms stay far below the largest float.
 bool has_moderate_networks(const Dna& dna) {
   float most = 0;
   std::size_t layers = 0;
@@ -144,7 +145,8 @@ bool has_moderate_solvers(const Dna& dna) {
   return most <= 1000 && factors <= 4;
 }
 
-// The weights of one corrective multiply each other: above 1 they may overflow.
+// Whether the numbers of a face are so moderate that results must be finite. A corrective
+// multiplies its weights, so that weights above 1 could overflow.
 bool is_moderate(const Dna& dna) {
   float weights = 0, rows = 0;
   widen(weights, dna.behavior.psds.values);
@@ -167,7 +169,7 @@ bool all_finite(const rig::Pose& p) {
          all_finite(p.controls);
 }
 
-// The same bits, or both NaN.
+// Whether all pairs of numbers have the same bits or are both NaN.
 bool same(const float* a, const std::vector<float>& b) {
   for (std::size_t i = 0; i < b.size(); ++i) {
     const bool equal = std::bit_cast<std::uint32_t>(a[i]) == std::bit_cast<std::uint32_t>(b[i]);
@@ -181,8 +183,9 @@ bool same(const rig::Pose& a, const rig::Pose& b) {
          same(a.animated_maps.data(), b.animated_maps) && same(a.controls.data(), b.controls);
 }
 
-// n products of a value and a control, each sum rounded once: 2 n eps * sum |value * control|
-// bounds the effect of another order or a fused operation. Controls are below 2 here.
+// The largest difference between joint values that another order of additions or fused operations
+// may cause. For n products of a value and a control, with each sum rounded once, it is 2 n eps *
+// sum |value * control|. Controls are at most 2 here.
 float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
   const float n = static_cast<float>(rig.control_count) + 1;
   constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
@@ -200,11 +203,13 @@ rig::Pose pose_of(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return pose;
 }
 
-// A compiled rig gives the same pose every way. A forged rig only needs to be safe: its steps may
-// read values that no step wrote in this frame.
+// Whether a rig was compiled, or opened from changed bytes. A compiled rig must give the same pose
+// in every way of evaluation. A forged rig must only be safe: its steps may read values that no
+// step wrote in this frame.
 enum class Origin { kCompiled, kForged };
 
-// Compares frame n of a batch with the frame alone; the last frame has other controls.
+// Checks that the first and the last frame of a batch equal these frames evaluated alone; the last
+// frame has other controls.
 std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle,
                   Origin origin) {
   constexpr std::size_t kCount = simd::kFrames + 3;
@@ -233,8 +238,9 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return kKept;
 }
 
-// Visiting all columns or only those of active controls gives one pose. A product below the float
-// range may leave a sum at -0, which a column at rest makes 0.
+// Checks that all three ways to visit the columns of a joint group give the same joints. -0 equals
+// 0: a product below the float range may leave a sum at -0, which the column of a control at 0
+// changes to 0.
 std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Workspace work = rig::make_workspace(rig);
   rig::Pose listed = rig::make_pose(rig), whole = listed, added = listed;
@@ -265,7 +271,8 @@ std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod
   return kKept;
 }
 
-// Evaluates in every way at every LOD. Out: poses  the settled pose of each LOD
+// Evaluates a rig in every way, at LODs 0 to 3 and the last one. Out: poses  the settled pose of
+// each LOD
 std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses,
                          Origin origin = Origin::kCompiled) {
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
@@ -278,7 +285,7 @@ std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<r
   return kKept;
 }
 
-// The bytes of a Rig can be opened as a Rig.
+// Checks that the bytes of a rig can be opened as a rig with the same pose.
 std::string reopened(const rig::Rig& rig, const Controls& raw, const rig::Pose& expected) {
   const auto owner = core::allocate_pages(rig.block().size());
   std::ranges::copy(rig.block(), owner.get());
@@ -304,7 +311,7 @@ std::string evaluate_on(const Dna& dna, const compile::CompileOptions& options, 
   return kKept;
 }
 
-// The scalar kernels, and the kernels of another instruction set that this CPU supports.
+// The scalar kernels, and the kernels of one other instruction set that this CPU supports, or null.
 std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   std::vector<const simd::Kernels*> others;
   for (const char* name : {"sse4", "avx2", "avx512", "neon"}) {
@@ -314,8 +321,9 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   return {&simd::scalar_kernels(), others[choice % others.size()]};
 }
 
-// Compares poses only if their controls are equal: a control that differs in its last bits may
-// select another row of a table.
+// Compares the poses of scalar kernels `a` with the poses of `b`. SSE4 must give the same bits.
+// Other sets are compared only if the controls are equal, because a control that differs in its
+// last bits may select another row of a table.
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";
@@ -417,7 +425,7 @@ Result<Dna> parse_as(View bytes, const Filter& f, std::size_t honest_reads) {
   return dna::parse(source, f.options);
 }
 
-// Removes afterwards the layers that the options of parse leave out.
+// Removes from a completely loaded Dna the layers that `o` would have left out when loading.
 Dna without_layers(Dna dna, const ParseOptions& o) {
   const dna::ControlCounts controls = dna::control_counts(dna);
   const bool uncounted = !o.definition;
@@ -449,14 +457,16 @@ Dna without_layers(Dna dna, const ParseOptions& o) {
   return dna;
 }
 
-// Layers without the layer that they need are the caller's mistake: only safety is promised.
+// Whether every layer is loaded together with the layers that it needs. Otherwise the caller made a
+// mistake, and parsing must only be safe.
 bool is_comparable(const ParseOptions& o) {
   const bool some = o.behavior || o.geometry || o.machine_learned_behavior || o.rbf_behavior ||
                     o.joint_behavior_metadata || o.twist_swing_behavior;
   return (o.definition || !some) && (o.behavior || !o.rbf_behavior);
 }
 
-// Networks, poses and setups that need unloaded controls cannot be written.
+// Whether writing failed because a network, pose or setup needs an unloaded control, which is
+// allowed.
 bool lacks_controls(const Dna& dna, const core::Error& error) {
   return error.code == ErrorCode::kInvalidArgument &&
          !(dna.unread_controls == dna::UnreadControls{});
@@ -473,7 +483,8 @@ std::string compare_filtered(const Dna& full, const ParseOptions& o, const Resul
     return broken("a filtered load fails as the filter does", expected.error());
   }
   if (!filtered) return broken("a part of a file that is good is good", filtered.error());
-  // As JSON: writing closes the gaps of unloaded controls.
+  // They are compared as JSON, because writing a file renumbers the controls if some are not
+  // loaded.
   const Result<std::string> a = dna::to_json(*expected), b = dna::to_json(*filtered);
   if (!a) return broken("what was filtered is whole", a.error());
   if (!b) return broken("what was loaded filtered is whole", b.error());

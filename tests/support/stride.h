@@ -13,8 +13,9 @@
 
 namespace risorius::testing_support {
 
-// The sanitizers take four times as long and test every fifth byte. The plain build tests each
-// byte, and the fuzzers, which are sanitized too, test different bytes in each run.
+// The step between the bytes that a test changes. With sanitizers, which take four times as long,
+// it is every fifth byte; the plain build changes every byte, and the fuzzers change different
+// bytes in each run.
 #if defined(RISORIUS_STRIDE)  // an emulator takes forty times as long
 inline constexpr std::size_t kStride = RISORIUS_STRIDE;
 #elif defined(RISORIUS_SANITIZED)
@@ -23,13 +24,14 @@ inline constexpr std::size_t kStride = 5;
 inline constexpr std::size_t kStride = 1;
 #endif
 
-// The bytes of a file to change: from first, each step-th.
+// The bytes of a file that a test changes: every step-th byte from `first` on.
 struct Steps {
   std::size_t first, step;
 };
 
-// A test program runs once for each instruction set. Each run changes different bytes, so that
-// together they skip few; a changed byte has the same effect with every instruction set.
+// The bytes that a run of a test program changes. The program runs once for each instruction set,
+// and each run changes different bytes, so that together they omit few. A changed byte has the same
+// effect with every instruction set.
 inline Steps shared_steps() {
   constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
   constexpr std::size_t kOfOneProcessor = 4, kStep = std::max(kStride, kOfOneProcessor);
@@ -40,8 +42,9 @@ inline Steps shared_steps() {
   return {0, kStride};
 }
 
-// Offsets of the bytes of a file to change: all bytes, except three of four bytes that have the
-// same neighbours in another file whose bytes are all changed.
+// Offsets of the bytes of a file that a test changes. Where the other file has the same bytes
+// around an offset, only every fourth offset is used, because all bytes of the other file are
+// changed too.
 inline std::vector<std::size_t> bytes_to_change(const std::vector<std::uint8_t>& file,
                                                 const std::vector<std::uint8_t>& other) {
   constexpr std::size_t kBefore = 24, kAround = 40;

@@ -5,9 +5,10 @@ The package knows no languages: its messages are finished English sentences. err
 has a row for each message, with {names} for the values in it. A message is compared with the rows,
 and its values are put into the translation.
 
-A row of little text, such as "{range} was expected, found {found}", matches many messages, and a
-message can have places before it: "take.csv, line 3: a number was expected". So all rows that match
-the message, or its end after places, are tried, and the one that translates most letters is taken.
+A row with few words, such as "{range} was expected, found {found}", matches many messages. A
+message can begin with places of the error: "take.csv, line 3: a number was expected". So each row
+is compared with the whole message, and also with the rest of the message after one or more places.
+The matching row that translates the most letters is used.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from . import tables
 
 _SLOT = re.compile(r"\{(\w+)\}")
 _DEEPEST = 4  # messages inside a message: a file, a row, a cell, a reason
-_MOST_PLACES = 5  # before a message
+_MOST_PLACES = 5  # most places, such as a file and a line, before a message
 _LONGEST = 1000  # letters of a message; the time grows faster than its length
 
 
@@ -40,7 +41,7 @@ class _Found(NamedTuple):
 
 
 def local(message: str, language: str) -> str:
-    """A message of the package in a language; what has no row stays English.
+    """Translate a message of the package; text without a row in the table stays English.
 
     Args:
         message: the English message.
@@ -51,12 +52,14 @@ def local(message: str, language: str) -> str:
 
 @lru_cache(maxsize=512)  # panels show the same message at each redraw
 def best(message: str, language: str, depth: int) -> _Found:
-    """The translation of most letters; one word, which is a name or a number, has none.
+    """Find the translation that translates the most letters of a message.
+
+    A message of a single word stays as it is, because the word is a name or a number.
 
     Args:
-        message: as of `local`.
-        language: as of `local`, not "".
-        depth: number of messages around this one.
+        message: the English message.
+        language: a language of `tables.languages`, not "".
+        depth: number of messages that contain this message as a value or place.
     """
     found = _Found(message)
     if " " not in message or len(message) > _LONGEST or depth > _DEEPEST:
@@ -78,7 +81,7 @@ def best(message: str, language: str, depth: int) -> _Found:
 
 @cache
 def rows(language: str) -> list[_Row]:
-    """The rows of a language. Args: language: as of `local`, not ""."""
+    """All rows of errors_<language>.toml. Args: language  of `tables.languages`, not ""."""
     return [_row(*row) for row in tables.error_rows(language).items()]
 
 

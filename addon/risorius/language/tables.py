@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the tables of words that lie beside this file.
+"""Reads the tables of descriptions and translations in this file's folder.
 
-controls_<language>.toml has a row for each control, with * for its side; interface_<language>.toml
-the words of panels, dialogs and reports by their English ones; errors_<language>.toml the error
-messages of the package by the English ones. A new language is three files.
+controls_<language>.toml describes each control; * in a control's name stands for L and R.
+interface_<language>.toml translates the texts of panels, dialogs and reports from English.
+errors_<language>.toml translates the package's error messages from English. A new language needs
+these three files.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 from ..logic.base.control_words import ControlWords, expand
 
-CONTEXT = "Risorius"  # Blender's own words have others: our Face is no polygon
+CONTEXT = "Risorius"  # translations apart from Blender's, in which Face means a polygon
 TOOLTIPS = "*"  # Blender looks for tooltips without a context
 ENGLISH = "en"
 _HERE = Path(__file__).parent
@@ -34,19 +35,19 @@ def controls(language: str = ENGLISH) -> ControlWords:
 
 @cache
 def error_rows(language: str) -> dict[str, str]:
-    """Error messages of the package with {names} of values: English -> the language."""
+    """English error message, with {names} in place of values -> its translation."""
     return _read(f"errors_{language}")
 
 
 @cache
 def languages() -> tuple[str, ...]:
-    """The languages beside English, as Blender calls them without a country."""
+    """All languages except English, as Blender's codes without a country, such as "de"."""
     return tuple(sorted(p.stem.partition("_")[2] for p in _HERE.glob("interface_*.toml")))
 
 
 @cache
 def search_words() -> dict[str, str]:
-    """Control -> the words in all languages that it is found by."""
+    """Name of a control without its prefix -> its search words in all languages, in one text."""
     tables = [controls(language) for language in (ENGLISH, *languages())]
     return {name: " ".join(table.searched(name) for table in tables) for name in tables[0].rows}
 
@@ -60,7 +61,7 @@ def language_of(locale: str) -> str:
 
 @cache
 def translation(language: str) -> dict[tuple[str, str], str]:
-    """The words of a language for Blender: (context, English) -> what is shown."""
+    """The translations that Blender shows: (context, English text) -> text in the language."""
     words = {
         (context, key): text
         for context, table in _read(f"interface_{language}").items()

@@ -1,3 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Code without Blender: names, groups of controls, spaces, plans. It imports neither bpy nor the
-native module."""
+"""Names, groups of controls, coordinate spaces and plans of Blender data.
+
+The code imports neither bpy nor the native module, so it runs without Blender.
+"""

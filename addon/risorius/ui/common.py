@@ -58,7 +58,7 @@ def proposed_file(name: str, ending: str) -> str:
 
 
 def usable(cls: type[Operator]) -> bool:
-    """Poll: whether the native module is available; otherwise set the reason."""
+    """Poll: whether the native module is available; if not, set the poll message."""
     trouble = native.problem()
     if trouble:
         cls.poll_message_set(say(trouble))
@@ -122,7 +122,7 @@ class FaceOperator(OperatorBase):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the active face is suitable; otherwise set the reason."""
+        """Whether the active face is suitable; if not, set the poll message."""
         if not usable(cls):
             return False
         rig = parts.active_rig(context)

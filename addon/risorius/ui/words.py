@@ -27,7 +27,12 @@ class Ruler:
     """Computes which labels fit completely into a share of the sidebar's width."""
 
     def __init__(self, context: Context, share: float) -> None:
-        """Args: context  context with the region, or a new sidebar is assumed; share  0 to 1."""
+        """Measure the sidebar; without one, the width of a newly opened sidebar is used.
+
+        Args:
+            context: context with the sidebar's region.
+            share: part of the width for the label, 0 to 1.
+        """
         preferences, region = context.preferences, context.region
         width: float = _SIDEBAR
         if region is not None and region.type == "UI" and region.width > 1:
@@ -122,7 +127,7 @@ def say(text: str, **values: object) -> str:
 
 
 def _local_value(name: str, value: object) -> object:
-    """A value of a sentence: a Sentence and an error message of the package are translated."""
+    """The value; a Sentence or an error message of the package is translated."""
     if isinstance(value, Sentence):
         return say(value)
     if name in _REASONS and isinstance(value, str):
@@ -137,7 +142,7 @@ def name_of_new(text: str) -> str:
 
 
 def of_error(error: Exception) -> str:
-    """The text of an error, translated if it has a Sentence."""
+    """The text of an error, translated if it is a Sentence or a known message of the package."""
     first = error.args[0] if error.args else ""
     if isinstance(first, Sentence):
         return say(first)

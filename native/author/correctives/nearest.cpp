@@ -23,7 +23,8 @@ bool passes(const Vec3& from, const Vec3& inverse, const Vec3& low, const Vec3& 
   return std::max(a.cwiseMin(b).maxCoeff(), 0.0) <= a.cwiseMax(b).minCoeff();
 }
 
-/// Where a ray meets a triangle: the shares of b and c, and how many times `way` it is from `from`.
+/// Where a ray meets a triangle: the barycentric coordinates of b and c, and the distance from
+/// `from` in lengths of `way`. Nothing if the ray misses the triangle.
 /// Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997)
 std::optional<Vec3> meeting(const Vec3& from, const Vec3& way, const Vec3& a, const Vec3& b,
                             const Vec3& c) {

@@ -16,7 +16,8 @@ namespace risorius::author::detail {
 
 using Vec3 = Eigen::Vector3d;
 
-/// A surface at its present positions. The tree refers to both spans, which must live longer.
+/// A search tree over the triangles of a surface. It refers to the triangles and positions that its
+/// constructor gets, so that these must outlive the tree.
 class Nearest {
  public:
   struct Hit {
@@ -30,7 +31,7 @@ class Nearest {
 
   /// Whether a ray meets a triangle. In: direction  of any length
   bool is_blocked(const Vec3& from, const Vec3& direction) const;
-  /// The first triangle on a ray, seen from either side, that is nearer than `reach`.
+  /// The first triangle that a ray meets, at its front or back, if it is nearer than `reach`.
   /// In: direction  of length 1
   std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, double reach) const;
   /// The nearest triangle that `takes` accepts and that is nearer than `reach`.
@@ -54,7 +55,7 @@ class Nearest {
   std::vector<Box> boxes_;
 };
 
-/// Shares of the corners a, b and c in the point of their triangle that is nearest to p.
+/// Barycentric coordinates of the point of triangle a, b, c that is nearest to p.
 /// Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5
 Vec3 nearest_shares(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 

@@ -13,29 +13,36 @@ namespace risorius::author::detail {
 
 namespace {
 
-// Numbers of steps in which a part of the pose is faded out.
+// A part of the pose is faded out in at most kFades rounds. Each round undoes 1 / kSteps more of
+// its motion at a fault.
 constexpr std::size_t kFades = 9, kSteps = 6;
 constexpr double kUndone = 2.0;  // cost of undoing the whole motion; all faults of one kind cost 1
-// At or below this cost no other way is tried. A candidate with any fault left pays it in addition.
+// A repair with at most this cost ends the search for a better one. A repair that leaves any fault
+// costs kEnough more.
 constexpr double kEnough = 0.15;
 constexpr double kWhole = 2.0;   // mm around a fault in which the motion is undone completely
 constexpr double kNarrow = 5.0;  // mm, the radius tried first because it undoes less of the pose
 constexpr std::size_t kRounds = 6;
-// Weights of the goals against smoothness: places, edge vectors, flatness, no displacement.
+// Weights of the goals in the linear system, relative to smoothness: places of vertices, edge
+// vectors, flatness at folds, no displacement.
 constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
-// Share of kDepth: a repaired vertex ends well within the tolerance.
+// Goal for the depth of a repaired vertex as a share of the tolerance kDepth, so that the vertex
+// ends well within the tolerance.
 constexpr double kBeyond = 0.5;
-// Vertices without a fault get back up to kKept of their motion. A vertex near a fault that this
-// causes gets kLess less in each of kBacks rounds.
+// After a repair, vertices without a fault get back up to the share kKept of their motion. If this
+// causes a fault, the motion that vertices near this fault get back is reduced by the share kLess,
+// in each of at most kBacks rounds.
 constexpr double kKept = 0.91, kLess = 0.2;
 constexpr std::size_t kBacks = 12;
-// The deepest vertex of all may become deeper by kDeeper mm, the widest face wider by kWider.
+// A repair may move the deepest vertex of the skin deeper by kDeeper mm, and multiply the largest
+// stretch of a face by kWider.
 constexpr float kDeeper = 0.09f, kWider = 1.005f;
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Goals for the displacement x, in mm: a place for a vertex, a difference for an edge, and a place
-/// nearer to its neighbours' middle for a vertex at a fold.
+/// Goals for the displacement x, in mm. places: the displacement of a vertex; edges: the difference
+/// of the displacements of an edge's two vertices; even: a displacement of a vertex at a fold that
+/// brings it nearer to the mean of its neighbours.
 struct Asked {
   std::map<std::uint32_t, Vec3> places;
   std::map<std::array<std::uint32_t, 2>, Vec3> edges;
@@ -48,7 +55,8 @@ struct Work {
   const Placed& pose;
   const SolidSurfaces& solids;
   SkinFaults allowed;
-  // Largest in the pose, allowed faults included; widest: kStretch at least.
+  // The largest depth in mm and the largest stretch in the pose before the repair, allowed faults
+  // included. `widest` is at least kStretch.
   float deepest = 0.0f, widest = 0.0f;
   std::vector<std::uint32_t> active;  // vertices that may move
   std::vector<std::uint32_t> place;   // [V] index in active, or kStill
@@ -104,7 +112,7 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
   return out;
 }
 
-/// Lets the vertices near a fault move: those within SkinChecker::kAround.
+/// Lets the vertices move that are within SkinChecker::kAround of a fault.
 void mark(Work& work, const std::vector<std::uint32_t>& faults) {
   const auto& neutral = work.topology.neutral;
   work.place.assign(neutral.size(), Work::kStill);
@@ -142,8 +150,8 @@ void ask_contacts(Work& work, const Look& look) {
   for (const auto& [v, sum] : sums) work.asked.places[v] = work.x[v] + sum.first / sum.second;
 }
 
-/// Asks for shorter edges of faces that are stretched too far, or further than any face of the
-/// pose.
+/// Sets shorter edges as goals for two kinds of faces: faces stretched beyond the allowed stretch,
+/// and faces stretched more than every face was before the repair.
 void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t f = 0; f < topology.face_count(); ++f) {
@@ -173,8 +181,8 @@ Vec3 beside(const Topology& topology, const std::vector<Vec3>& positions, std::u
   return out;
 }
 
-/// Opens a fold: each vertex is drawn towards the mean of its neighbours, but keeps the distance
-/// that it has in the neutral pose, up to half of the present one.
+/// Opens a fold: each vertex is drawn towards the mean of its neighbours. The goal for its distance
+/// from the mean is half of the smaller of its neutral and its present distance.
 void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t h = 0; h < topology.hinges.size(); ++h) {
@@ -238,8 +246,10 @@ void solve(Work& work, const std::vector<Vec3>& base) {
   for (const std::uint32_t v : work.active) work.x[v] = base[v] + found.row(at(v)).transpose();
 }
 
-/// Whether no sum is worse, and neither the deepest vertex nor the widest face of all. A fault of
-/// one part alone is allowed, but undoing the other part must not cause it.
+/// Whether a repair worsens neither a sum of faults nor, beyond small tolerances, the deepest
+/// vertex and the most stretched face of the skin. The sums leave out the faults that a part of the
+/// pose has if it is applied alone, because these faults are allowed. But undoing another part must
+/// not cause them.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&
@@ -249,7 +259,8 @@ bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
          std::ranges::max(now.faults.stretch) <= kWider * work.widest;
 }
 
-/// How much of the faults is left: a sum of shares, one for each kind; 0 if none is left.
+/// The share of the faults that a repair leaves, added up over volume, stretched faces and folded
+/// edges; 0 if no fault is left.
 double share_left(const FaultSums& now, const FaultSums& before) {
   double out = before.volume > 0.0 ? now.volume / before.volume : 0.0;
   if (before.stretched > 0) out += double(now.stretched) / double(before.stretched);
@@ -257,19 +268,22 @@ double share_left(const FaultSums& now, const FaultSums& before) {
   return out;
 }
 
-/// The share of an undoing at a vertex: 1 at a fault, 0 at the distance `reach`.
+/// The share of a motion that is undone at a vertex: 1 for vertices up to kWhole from a fault, 0
+/// for vertices `reach` or more from it.
+/// In: distance  from the vertex to the fault, in mm
+///     reach     mm
 double fading(double distance, double reach) {
   const double t = std::clamp((distance - kWhole) / (reach - kWhole), 0.0, 1.0);
   return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
-/// The best repair so far: few faults left, and little undone.
+/// The cheapest repair so far. Faults that are left and motion that is undone add to the cost.
 struct Best {
   std::vector<Vec3> x;
   FaultSums sums;
   double left = 0.0, cost = 0.0;
-  // The cheapest displacement, even if it makes some faults worse. Pushing its faults out may give
-  // the best result.
+  // The cheapest displacement, even if it makes some faults worse: removing these faults from it
+  // may give the best result.
   std::vector<Vec3> any;
   double any_cost = 0.0;
 
@@ -294,8 +308,9 @@ struct Best {
   }
 };
 
-/// Undoes a part of the pose around its faults, more in each round, until no fault is left.
-/// In: reach  mm around a fault
+/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
+/// In: undo   [V] the displacement in mm that undoes the part everywhere
+///     reach  mm from a fault at which nothing is undone
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;
@@ -320,8 +335,8 @@ void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double r
   }
 }
 
-/// The displacements that undo a part: a mix at each vertex that prefers the parts that do least
-/// there, so that the main motion stays; each part alone; the mean of all parts.
+/// The displacements that undo parts of the pose: at each vertex a mix that prefers the parts that
+/// move it least, so that the main motion remains; each part alone; the mean of all parts.
 /// In: without  the positions of the skin without each of the parts
 std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
                                          const std::vector<std::vector<Vec3>>& without) {
@@ -342,7 +357,8 @@ std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
   return out;
 }
 
-/// Pushes the remaining faults out softly. In: base  the displacement to start from
+/// Removes the remaining faults by rounds of least squares solves.
+/// In: base  the displacement to start from
 void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& best) {
   work.x = base;
   work.asked = {};
@@ -358,8 +374,9 @@ void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& 
   }
 }
 
-/// The motion that vertices without a fault lack to reach kKept of it. In: x  their displacement
-/// Out: [V], all 0 if nothing is lacking
+/// The displacement that brings each vertex without a fault back to the share kKept of its motion.
+/// In: x  [V] the displacements of the repair
+/// Out: [V], 0 for a vertex that keeps enough motion
 std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& faults,
                           const std::vector<Vec3>& x) {
   std::vector<Vec3> out(x.size(), Vec3::Zero());
@@ -372,8 +389,8 @@ std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& fa
   return out;
 }
 
-/// A corrective should undo nothing where there is no fault. Its soft edge is taken back at such
-/// vertices, unless that causes a new fault.
+/// A corrective should undo nothing at vertices without a fault. The undoing that fades out around
+/// a fault is taken back at these vertices, unless that causes a new fault.
 void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
                Best& best) {
   const Topology& topology = work.topology;
@@ -398,7 +415,8 @@ void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& 
   }
 }
 
-/// The best of all ways, checked in the work's region. Out: x is empty if no way helps
+/// The best repair that fading and least squares solves find, checked only in the work's region.
+/// Out: x is empty if no repair helps
 Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
           const std::vector<std::vector<Vec3>>& ways) {
   Best best;
@@ -418,8 +436,9 @@ Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& fault
   return best;
 }
 
-/// Whether nothing is worse in the whole skin. A full check is needed because the moved vertices
-/// may go into skin outside the region. In: allowed  the faults that the caller allows
+/// Whether the best repair makes nothing worse in the whole skin. A full check is needed because
+/// the moved vertices may enter skin outside the region.
+/// In: allowed  the faults that the caller allows
 bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {
   work.x = best.x;
   const Look look = look_at(work, work.topology.whole);
@@ -428,7 +447,7 @@ bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best
   return true;
 }
 
-/// Limits the allowed faults of one part to the worst fault of the pose.
+/// Limits each allowed depth and stretch to the largest depth and stretch of the pose.
 void limit(Work& work, const SkinFaults& first) {
   work.deepest = std::ranges::max(first.depth);
   work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));

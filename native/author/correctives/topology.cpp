@@ -116,7 +116,7 @@ void find_shown(Topology& out) {
   }
 }
 
-/// Keeps the deepest contact of each vertex.
+/// Stores a contact, unless `best` already has a deeper contact of the same vertex.
 void keep_deeper(std::vector<Contact>& best, const Contact& found) {
   if (found.depth > best[found.vertex].depth) best[found.vertex] = found;
 }
@@ -138,7 +138,8 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
           hit->share[static_cast<Eigen::Index>(k)] * normals[solid.triangles[hit->triangle][k]];
     }
     if ((p - hit->point).dot(normal) >= 0.0) continue;
-    // The way out leads to the surface. On the surface it is the normal.
+    // The vertex leaves the solid towards the nearest point of its surface. At distance 0 this
+    // direction is undefined, and the normal replaces it.
     const Vec3 out = hit->point - p;
     keep_deeper(best, {v,
                        static_cast<float>(hit->distance),
@@ -149,8 +150,8 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// Finds contacts of the skin with itself: lips with lips, a lid with the other. A vertex that lies
-/// behind the other surface in the neutral pose does not touch it: the skin is thin there.
+/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A vertex that
+/// lies behind the other surface in the neutral pose does not touch it: the skin is thin there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
@@ -176,7 +177,8 @@ void touch_skin(const Topology& topology, const Region& region, const std::vecto
     const Vec3 normal =
         (skin[other[1]] - skin[other[0]]).cross(skin[other[2]] - skin[other[0]]).normalized();
     const double depth = (hit->point - skin[v]).dot(normal);
-    // Beside the rim of the triangle its normal does not tell on which side the vertex is.
+    // If the nearest point is on the rim of the triangle and the vertex lies sideways of it, the
+    // triangle's normal does not show whether the vertex is inside.
     if (depth < 0.7 * hit->distance || depth <= 0.0) continue;
     keep_deeper(best, {v, static_cast<float>(depth), normal, true, other, hit->share});
   }

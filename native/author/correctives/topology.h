@@ -12,7 +12,7 @@
 
 namespace risorius::author::detail {
 
-/// Two faces at an edge.
+/// Two faces and the edge that they share.
 struct Hinge {
   std::array<std::uint32_t, 2> faces;
   std::array<std::uint32_t, 2> edge;
@@ -55,14 +55,14 @@ struct Contact {
   Vec3 share = Vec3::Zero();
 };
 
-/// A pose in millimetres.
+/// The positions of a skin and its solids in one pose, in mm.
 struct Placed {
   std::vector<Vec3> skin;
   std::vector<std::vector<Vec3>> solids;
 };
 
-/// The solids of a pose with a search tree each. They refer to topology and pose, which must live
-/// longer.
+/// The solids of a pose with a search tree each. The trees refer to topology and pose, so that both
+/// must outlive this object.
 class SolidSurfaces {
  public:
   SolidSurfaces(const Topology& topology, const Placed& pose);
@@ -70,9 +70,9 @@ class SolidSurfaces {
   std::vector<Nearest> trees;              // [solids]
 };
 
-/// All shown vertices and all triangles.
+/// The region of all vertices that can be seen, and all triangles.
 Region whole_region(const Topology& topology);
-/// Some vertices, and the triangles whose place in a pose is near them.
+/// The region of the given vertices and of all triangles near them in the pose.
 Region region_around(const Topology& topology, const Placed& pose,
                      const std::vector<std::uint32_t>& vertices);
 
@@ -80,6 +80,7 @@ Region region_around(const Topology& topology, const Placed& pose,
 std::vector<Contact> find_contacts(const Topology& topology, const Region& region,
                                    const SolidSurfaces& solids, const std::vector<Vec3>& skin);
 
+/// Computes the areas and normals of all faces.
 /// Out: areas [F] in mm2, normals [F]
 void face_shapes(const Topology& topology, const std::vector<Vec3>& positions,
                  std::vector<double>& areas, std::vector<Vec3>& normals);
@@ -89,7 +90,7 @@ SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
 
 FaultSums sum_faults(const Topology& topology, const SkinFaults& faults, const SkinFaults& allowed);
 
-/// Whether an entry is a fault beyond the allowed one.
+/// Whether a vertex is deeper, a face more stretched or an edge more folded than allowed.
 inline bool is_deep(const SkinFaults& f, const SkinFaults& allowed, std::size_t v) {
   return f.depth[v] > allowed.depth[v] + SkinChecker::kDepth;
 }
@@ -103,6 +104,7 @@ inline bool is_folded(const SkinFaults& f, const SkinFaults& allowed, std::size_
   return f.fold[hinge] < SkinChecker::kFold && allowed.fold[hinge] >= SkinChecker::kFold;
 }
 
+/// Repairs a pose as SkinChecker::repair does.
 /// In: without  the positions of the skin without each of the pose's parts
 Repair repair_pose(const Topology& topology, const Placed& pose, const SkinFaults& allowed,
                    const std::vector<std::vector<Vec3>>& without);

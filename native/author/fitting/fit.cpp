@@ -24,15 +24,16 @@ using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
 constexpr std::size_t kRoundsOfMotions = 8;  // Gauss-Newton steps
-// Joints leave an expression in two steps, so that the others take over before more joints leave.
+// Shares of least_effect below which a joint leaves an expression. There are two steps, so that
+// other joints take over before more joints leave.
 constexpr double kThinning[] = {0.5, 1.0};
-/// In the last rounds joints lie at their pivots, and the overshoot of momentum is corrected.
-/// Before, a joint lies in the middle of its vertices, because a turn about a far pivot is solved
-/// less exactly.
+/// In the last rounds, joints are placed at their pivots and momentum is 0, so that its overshoot
+/// is corrected. In earlier rounds a joint is in the middle of its vertices, because a rotation
+/// about a far pivot is solved less exactly.
 constexpr std::size_t kLastRounds = 4;
 constexpr double kMomentum = 0.6;
-/// Nearby joints that a vertex tries when joints cannot move. The joints it needs may be further
-/// away than its neighbours' joints.
+/// How many of the nearest joints a vertex tries when joints cannot move. The joints it needs may
+/// be further away than its neighbours' joints.
 constexpr std::size_t kNearOfGiven = 12;
 /// [V] the square of each vertex's largest error in any expression, weighted by the caller's
 /// importance.
@@ -98,7 +99,7 @@ Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
   return out;
 }
 
-/// The number of joints after each step of growing.
+/// The total numbers of joints after each step of adding joints; the last one is `joints`.
 std::vector<std::size_t> stages(std::size_t joints) {
   std::vector<std::size_t> out{joints};
   while (out.back() > 30) out.push_back(out.back() * 2 / 3);
@@ -126,7 +127,7 @@ void improve(const Problem& problem, State& state, std::vector<float>& left) {
   detail::find_residual(problem, state, left);
 }
 
-/// The sum of squared residuals, all vertices alike.
+/// The sum of squared residuals. All vertices have the same weight.
 double squares(const std::vector<float>& left) {
   double sum = 0.0;
   for (const float x : left) sum += double{x} * double{x};
@@ -192,7 +193,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
   detail::take_pivots(options.pivots, problem);
   State state = detail::start(problem, options.given, shapes.expressions);
   std::vector<float> left;
-  // Given joints get the vertices that they move before other joints are added.
+  // Before other joints are added, the given joints get the vertices that they move.
   if (!options.given.empty()) {
     for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
   }
@@ -216,7 +217,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
     problem.momentum = last ? 0.0 : kMomentum;
     improve(problem, state, left);
     if (problem.to_pivots) best.take(problem, state, left);
-    // The last two rounds only even out the new importance.
+    // The last two rounds only adapt to the last change of importance.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
     const double now = squares(left);
     if (now > before) state.solved.clear();  // momentum overshot: start it again
@@ -275,8 +276,8 @@ core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint
   problem.near = kNearOfGiven;
   State state = detail::start(problem, joints, shapes.expressions);
   RISORIUS_TRY(detail::take_start(start_weights, state));
-  // Neighbours tell each other which joints to try; each round reaches one ring of vertices
-  // further.
+  // In each round a vertex tries the joints of its neighbours, so that a joint spreads by one ring
+  // of vertices.
   for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
   return pack(problem, state, shapes.expressions);
 }

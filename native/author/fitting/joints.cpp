@@ -30,12 +30,13 @@ std::vector<double> errors(const Problem& problem, const std::vector<float>& lef
   return out;
 }
 
-/// The mean distance between two joints if all joints were spread over the moving vertices.
+/// The mean distance between neighbouring joints, as a share of the mesh's size, if all joints were
+/// spread evenly over the moving vertices.
 double spacing(const Problem& problem, std::size_t joints) {
   double moving = 0.0;
   const double most = *std::max_element(problem.motion.begin(), problem.motion.end());
   for (const double m : problem.motion) moving += m > 0.02 * most ? 1.0 : 0.0;
-  // The surface of a head is about three times its squared size.
+  // The surface area of a head is about three times its squared size.
   const double area = 3.0 * moving / static_cast<double>(problem.vertices);
   return std::sqrt(area / static_cast<double>(std::max<std::size_t>(joints, 1)));
 }
@@ -49,7 +50,8 @@ Joint make_joint(const Problem& problem, const Vec3& position, std::uint32_t mir
   return out;
 }
 
-/// Gives a new joint a part of the weights around it, falling to 0 at `reach`.
+/// Gives a new joint a share of the weights of the vertices around it: 0.7 at the joint, falling to
+/// 0 at `reach`.
 void take_weights(const Problem& problem, State& state, std::uint32_t joint, double reach) {
   const Vec3& centre = state.joints[joint].position;
   for (std::size_t v = 0; v < problem.vertices; ++v) {

@@ -18,15 +18,17 @@ namespace {
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-/// Work is split into this many ranges: given joints cost nothing, a far turned expression costs as
-/// much as ten others.
+/// Work is split into this many ranges, because costs differ: given joints cost nothing, an
+/// expression that rotates joints far costs as much as ten others.
 constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms are used
-// Ridges as shares of the joints' mean stiffness. They keep joints that share vertices from turning
-// against each other. Tried from 1e-4 to 10 on a head with 52 expressions, and on four others.
+// Regularisation of rotations and translations, as shares of the joints' mean stiffness. It keeps
+// joints that share vertices from turning against each other. Tried from 1e-4 to 10 on a head with
+// 52 expressions, and on four others.
 constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
-// Conjugate gradients stop at this share of a step's energy; at 1e-2 some rounds worsened the fit.
+// Conjugate gradients stop when their residual energy falls to this share of its first value; at
+// 1e-2 some rounds worsened the fit.
 constexpr double kEnough = 1e-6;
 constexpr double kTurnAtPivot = 0.01;  // at a pivot a joint should turn and not shift
 constexpr double kShiftAtPivot = 0.01;
@@ -37,7 +39,8 @@ Mat3 cross_matrix(const Vec3& a) {
   return m;
 }
 
-/// Sums of s, s v, s v v^T over the vertices that two joints share.
+/// Sums of s, s v, s v v^T over the vertices v that two joints share. s is a vertex's importance
+/// times its weights of both joints.
 struct Moments {
   double zeroth = 0.0;
   Vec3 first = Vec3::Zero();
@@ -50,7 +53,8 @@ struct Moments {
   }
 };
 
-/// Sums over the vertices that two joints share, with arms p = v - a and q = v - b.
+/// Sums over the vertices v that two joints share, with arms p = v - a and q = v - b from the
+/// joints' positions a and b.
 struct Shared {
   int column = 0;  // of the other joint
   std::uint32_t joint = 0;
@@ -69,7 +73,9 @@ Shared share(const Moments& m, const Vec3& a, const Vec3& b) {
   return out;
 }
 
-/// Stiffness of two joints against each other; s holds the arms at rest.
+/// The 6 x 6 block of the stiffness matrix that couples two joints.
+/// In: s            sums with the arms at rest
+///     turn, other  present rotations of the two joints
 Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
   const Mat3 qp = other * s.qp * turn.transpose();
   Mat6 out;
@@ -82,7 +88,8 @@ Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// A matrix that is factored once: densely if that is faster.
+/// Factors a symmetric matrix once and solves with it. A small matrix is factored as a dense
+/// matrix, because that is faster.
 class Factor {
  public:
   void compute(const Sparse& lower) {
@@ -150,8 +157,8 @@ class System {
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       for (const Shared& s : rows_[j]) {
         if (s.joint != j) continue;
-        // The stiffness is taken about the middle of the vertices: with the long arms from a far
-        // pivot it would be too large.
+        // The mean stiffness is computed about the middle of the vertices: the long arms from a far
+        // pivot would make it too large.
         const Vec3 off = state.joints[j].place - state.joints[j].position;
         const double own = s.qp.trace() - 2.0 * off.dot(s.p) + off.squaredNorm() * s.mass;
         turn_ += 2.0 / 3.0 * own / std::max(1, n);
@@ -170,8 +177,10 @@ class System {
   }
   const Factor& at_rest() const { return solver_; }
 
-  /// The lower half of the stiffness of some joints in their present rotations, as a full matrix.
-  /// In: at  by joint: its index among them, ascending, or -1
+  /// The lower half of the stiffness matrix of some joints in their present rotations, as a dense
+  /// matrix.
+  /// In: at     [joints] the joint's index among these joints, ascending, or -1
+  ///     count  number of these joints
   template <class Turn>
   Eigen::MatrixXd among(const std::vector<int>& at, int count, const Turn& turn) const {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(6 * count, 6 * count);
@@ -186,7 +195,8 @@ class System {
     return out;
   }
 
-  /// The stiffness in the present rotations. In: turn(joint)  the joint's rotation
+  /// The stiffness matrix of all joints in their present rotations. In: turn(joint)  the joint's
+  /// rotation
   template <class Turn>
   Sparse matrix(const Turn& turn) const {
     std::vector<Eigen::Triplet<double>> entries;
@@ -220,8 +230,9 @@ void gradient(const Problem& problem, const Joint& joint,
               const std::vector<ByJoint::Entry>& weights, const std::vector<float>& left,
               std::vector<Vec6>& out) {
   const std::size_t count = problem.expressions;
-  // Sums of r and of (v - c) r^T; the torque of the turned arm follows from the second. Each of the
-  // four sums has one row of all expressions for each axis of r.
+  // Sums of r and of (v - c) r^T over the joint's vertices v, with residual r and joint position c.
+  // The torque of the rotated arm follows from the second sum. For each axis of r there are four
+  // rows of all expressions: the three axes of v - c, then r.
   std::vector<float> sums(12 * count, 0.0f);
   for (const auto& entry : weights) {
     const double s = problem.importance[entry.vertex] * entry.weight;
@@ -275,8 +286,8 @@ void update_motion(Joint& joint, std::size_t e) {
 
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left) {
   const std::size_t count = problem.expressions, joints = state.joints.size();
-  // [J][12][E] the motions that move vertices; a row of all expressions for each number of the
-  // matrix.
+  // [J][12][E] the matrices of the joints' motions: for each number of the matrix a row of all
+  // expressions.
   std::vector<float> motions(joints * 12 * count);
   for (std::size_t j = 0; j < joints; ++j) {
     if (state.joints[j].rests) continue;
@@ -324,7 +335,7 @@ std::vector<double> energies(const Problem& problem, const std::vector<float>& l
   return out;
 }
 
-/// Takes the step in each expression, halved as long as the error grows.
+/// Takes the step in each expression, and shortens it in expressions whose error grows.
 /// Out: left  the new residual
 void take_step(const Problem& problem, State& state, const System& system,
                const Eigen::MatrixXd& step, std::vector<float>& left) {
@@ -387,9 +398,9 @@ Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t 
   return out;
 }
 
-/// The step of an expression that turns joints far, by conjugate gradients on the stiffness there.
-/// The start is the solution with the stiffness at rest, expressed in the joints' own axes: that is
-/// exact if neighbours turn alike.
+/// The step of an expression that rotates joints far, by conjugate gradients on the stiffness in
+/// their present rotations. The preconditioner is the stiffness at rest, applied in the joints'
+/// rotated axes: it is exact if neighbouring joints have equal rotations.
 Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
                              const Eigen::VectorXd& right) {
   const Sparse matrix = system.matrix([&](std::size_t j) { return state.joints[j].rotations[e]; });

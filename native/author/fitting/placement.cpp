@@ -10,7 +10,7 @@ namespace risorius::author::detail {
 
 namespace {
 
-/// The square of how far a joint moves a vertex by its weight. In: p  the vertex times the weight
+/// The squared distance by which a joint moves a vertex. In: p  the vertex times its weight
 double moved_square(const Affine& motion, const Vec3& p, double weight) {
   return (motion.leftCols<3>() * p + weight * motion.col(3)).squaredNorm();
 }
@@ -53,7 +53,8 @@ void leave_expressions(const Problem& problem, State& state, double least) {
 
 namespace {
 
-/// The pivot of the expressions that hold a good part of a joint's motion, or -1.
+/// The pivot whose expressions hold the largest share of a joint's motion, or -1 if no share
+/// exceeds 0.3.
 int pivot_of(const Problem& problem, const Joint& joint,
              const std::vector<ByJoint::Entry>& weights) {
   if (problem.pivots.empty() || !problem.to_pivots) return -1;
@@ -82,7 +83,7 @@ int pivot_of(const Problem& problem, const Joint& joint,
   return best;
 }
 
-/// Moves a joint without changing its motion.
+/// Moves a joint's position and changes its translations so that its vertices move as before.
 void place_at(const Problem& problem, const Vec3& to, Joint& joint) {
   const Vec3 arm = to - joint.position;
   for (std::size_t e = 0; e < problem.expressions; ++e) {

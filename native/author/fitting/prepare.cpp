@@ -14,7 +14,8 @@ namespace {
 
 using core::ErrorCode;
 
-/// Share of the mean square of motion that gives weights as smooth as Dem Bones' default.
+/// The smoothness that gives weights as smooth as Dem Bones' default, as a share of the vertices'
+/// mean squared motion.
 constexpr double kSmoothness = 0.18;
 
 void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
@@ -33,8 +34,8 @@ void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
   }
 }
 
-/// Displacements in the fit's unit. An expression without a partner on the other side gets a
-/// mirrored one, so that the middle and both sides have the same goals.
+/// Converts displacements to the fit's unit. An expression without a partner on the other side gets
+/// a mirrored copy, so that the middle and both sides have the same goals.
 void take_displacements(const Shapes& shapes, Problem& problem) {
   std::vector<std::uint32_t> alone;
   if (!problem.mirror.empty()) {
@@ -113,8 +114,8 @@ void set_motion(const Problem& problem, const JointMotion& from, std::size_t e, 
   update_motion(joint, e);
 }
 
-/// Converts a given joint. In an added mirrored expression it takes the mirrored motion that its
-/// counterpart has in the original expression: see pair_given.
+/// Converts a given joint. Its motions in the added mirrored expressions are set later, by
+/// pair_given.
 Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t number) {
   Joint out;
   const Vector3& p = given.position;
@@ -134,8 +135,8 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
                 std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
-  // Several joints may lie at one place, such as the joints of a lid in the middle of the eye.
-  // Their motions then tell the pairs. A joint mirrors at most one other joint.
+  // Several joints may have the same position, such as the joints of a lid in the middle of the
+  // eye. The pairs are then found by comparing motions. A joint mirrors at most one other joint.
   std::vector<bool> taken(joints.size(), false);
   for (std::uint32_t j = 0; j < joints.size(); ++j) {
     taken[j] = j < given.size() && given[j].mirrored != GivenJoint::kUnknown;
@@ -174,7 +175,8 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
   }
 }
 
-/// Finds the given joint that alone matches a vertex's motion best, if it matches well.
+/// For each vertex, finds the given joint that alone reproduces the vertex's motion best, if its
+/// squared error is below half of the squared motion.
 void find_nearest_given(Problem& problem, const std::vector<Joint>& joints) {
   problem.nearest_given.assign(problem.vertices, Mirror::kNone);
   core::parallel_for(problem.vertices, problem.threads, [&](std::size_t from, std::size_t to) {
@@ -224,7 +226,7 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
       problem.pivots[i].mirrored = k;
       problem.pivots[k].mirrored = i;
     }
-    // A pivot without a counterpart lies in the middle.
+    // A pivot without a mirrored pivot that is near the plane x = 0 is moved into it.
     if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
       problem.pivots[i].position.x() = 0.0;
     }

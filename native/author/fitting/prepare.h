@@ -14,14 +14,13 @@ namespace risorius::author::detail {
 /// Fails: as fit_joints
 core::Status check(const Shapes& shapes, const FitOptions& options);
 
-/// The problem without its pivots. In: shapes, options  checked
+/// The problem without its pivots. In: shapes, options  must have been checked
 Problem make_problem(const Shapes& shapes, const FitOptions& options);
-/// The pivots in the fit's unit, each with the pivot of the other side.
+/// Adds the pivots, in the fit's unit, each with the pivot of the other side.
 void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
-/// The state with the given joints. If none of them rests, a resting joint, the head, is added. The
-/// resting joint gets all vertices.
+/// The state with the given joints. If all of them move, a joint without motion, the head, is
+/// added. The first joint without motion gets all vertices. Also fills problem.nearest_given.
 /// In: own  number of expressions without the added mirrored ones
-/// Out: problem.nearest_given
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own);
 /// Sets the initial weights. Fails: see fit_weights
 core::Status take_start(const StartWeights& start, State& state);

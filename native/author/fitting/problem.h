@@ -36,20 +36,20 @@ struct Problem {
   std::vector<Pivot> pivots;
   bool to_pivots = false;  // whether joints are placed at their pivots
   double smoothness = 0.0;
-  /// The share of the last change by which weights continue, because consecutive rounds mostly go
-  /// the same way.
+  /// The share of a weight's last change that is added to the weight again, because consecutive
+  /// rounds mostly change it in the same direction.
   double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] weight of a vertex's squared error, mean 1
   std::vector<double> asked;       // [V] the part of `importance` that the caller gave
-  /// [V] the given joint that alone matches the vertex's motion best, or Mirror::kNone.
+  /// [V] the given joint that alone reproduces the vertex's motion best, or Mirror::kNone.
   std::vector<std::uint32_t> nearest_given;
 
   const float* of_vertex(std::size_t v) const { return displacements.data() + v * expressions * 3; }
   bool is_representative(std::size_t v) const { return mirror.empty() || mirror.vertices[v] >= v; }
 };
 
-/// Displacement of a vertex p by a joint in an expression: matrix * (p, 1), without p itself.
+/// The displacement of a vertex p by a joint in an expression is this matrix times (p, 1).
 using Affine = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
 struct Joint {
@@ -87,13 +87,14 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
 /// Removes each joint for good from the expressions in which it moves every vertex by less than
 /// `least`.
 void leave_expressions(const Problem& problem, State& state, double least);
-/// Out: [V][3][E] displacements minus the joints' part
+/// Computes the displacements that the joints do not reproduce.
+/// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Adds joints where the present ones leave the largest error, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);
 /// Moves the neutral position of each joint to the middle of its vertices, or to the pivot of the
-/// expressions in which it mostly moves. Given joints stay.
+/// expressions in which it mostly moves. Given joints do not move.
 void move_joints(const Problem& problem, State& state);
 
 void rest(Joint& joint, std::size_t expressions);

@@ -14,9 +14,9 @@ namespace {
 
 constexpr int kCandidates = 22;  // joints that a vertex tries at most
 constexpr double kLeast = 1e-4;  // smaller weights are dropped
-// The smoothness goal of a vertex is this share of its own weights and the rest of its neighbours'
-// mean. Without its own share momentum would make neighbours swing against each other. Tried from 0
-// to 0.7.
+// For smoothness, weights are drawn to a mean of their present value, with this share, and the mean
+// of the neighbours. With share 0, momentum would make the weights of neighbours oscillate. Tried
+// from 0 to 0.7.
 constexpr double kOwn = 0.4;
 constexpr double kLeastOnward = 0.1;  // share of a weight that momentum leaves at least
 
@@ -41,7 +41,7 @@ double at(const Products& m, const Vec3& p) {
          m[8] * p.y() + m[9] * p.z();
 }
 
-/// Products of the pairs of joints that some vertex compares.
+/// Products of the motions of each pair of joints that are candidates of the same vertex.
 class Pairs {
  public:
   Pairs(const State& state, const std::vector<std::vector<Influence>>& candidates,
@@ -87,7 +87,8 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
-  // A joint without motion is a candidate once: several such joints would fill all candidate slots.
+  // Only one joint without motion is a candidate: several such joints would fill the candidate
+  // slots.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (!state.joints[j].rests) continue;
     note(j, 100.0);
@@ -125,8 +126,9 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
 class Simplex {
  public:
   Simplex(Matrix gram, Column right) : gram_(std::move(gram)), right_(std::move(right)) {
-    // Two joints that move alike get equal shares, and the small ridge keeps rounding from making
-    // one negative. The sum is a row of its own, weighted so heavily that it holds to rounding.
+    // The small ridge gives two joints that move alike equal weights, and keeps rounding errors
+    // from making one negative. The sum is a further row of the least squares, weighted so heavily
+    // that it is 1 up to rounding.
     gram_.diagonal().array() += 1e-7 * gram_.diagonal().maxCoeff();
     const double heavy = 1e4 * (gram_.diagonal().maxCoeff() + 1e-30);
     gram_.array() += heavy;
@@ -134,7 +136,7 @@ class Simplex {
     weights_ = Column::Zero(right_.size());
   }
 
-  /// In: start  candidates that are tried first
+  /// In: start  candidates that are in the first passive set
   void solve(const std::vector<int>& start) {
     passive_ = start;
     for (const int c : start) weights_[c] = 1.0 / static_cast<double>(start.size());
@@ -155,7 +157,8 @@ class Simplex {
     }
   }
 
-  /// Removes the cheapest candidates until at most `count` are left.
+  /// Removes candidates one by one, always the candidate whose removal adds the least error, until
+  /// at most `count` are left.
   void limit(std::size_t count) {
     while (passive_.size() > count) {
       const auto n = static_cast<Eigen::Index>(passive_.size());
@@ -192,7 +195,8 @@ class Simplex {
     return out;
   }
 
-  /// The optimum of the passive set; candidates that would become negative leave it.
+  /// Solves for the candidates of the passive set; a candidate that would get a negative weight
+  /// leaves the set.
   void inner() {
     while (!passive_.empty()) {
       const auto n = static_cast<Eigen::Index>(passive_.size());
@@ -286,8 +290,8 @@ std::vector<Influence> mirrored(const State& state, std::vector<Influence> row) 
   return row;
 }
 
-/// Makes the row of a vertex in the middle symmetric: the mean of it and its mirror, of at most
-/// `count` joints.
+/// Makes the weights of a vertex in the middle symmetric: the mean of the weights and their mirror,
+/// with at most `count` joints.
 std::vector<Influence> balanced(const State& state, const std::vector<Influence>& row,
                                 std::size_t count) {
   std::vector<Influence> both = row;
@@ -337,7 +341,7 @@ double weight_of(const std::vector<Influence>& row, std::uint32_t joint) {
   return found == row.end() ? 0.0 : found->weight;
 }
 
-/// Continues a row in the direction in which it went since the round before.
+/// Continues a vertex's weights in the direction of their change since the previous round.
 std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Influence>& before,
                               double momentum) {
   double sum = 0.0;
@@ -350,7 +354,7 @@ std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Infl
   return row;
 }
 
-/// Adds momentum to the solved weights (Nesterov 1983), on both sides alike.
+/// Adds momentum to the solved weights (Nesterov 1983), equally on both sides of the mesh.
 void go_on(const Problem& problem, State& state, std::vector<std::vector<Influence>> solved) {
   state.weights = solved;
   if (!state.solved.empty()) {

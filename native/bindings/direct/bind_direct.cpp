@@ -11,7 +11,8 @@ namespace risorius::bindings {
 
 namespace {
 
-/// Only one thread at a time evaluates a face. The lock is taken without the interpreter lock.
+/// A face that only one thread evaluates at a time. A thread waits for the lock without the
+/// interpreter lock.
 struct PyDirectFace {
   std::unique_ptr<rig::DirectFace> face;
   std::mutex lock;
@@ -83,7 +84,8 @@ void forget_meshes(PyDirectFace& face) {
   face.face->forget();
 }
 
-// The memory for vertices: an array, which is kept alive, or (address, vertices).
+// The memory that receives a mesh's vertices. In: value  an array, which `kept` keeps alive, or
+// (address, vertices)
 float* target_argument(const py::handle& value, py::ssize_t vertices,
                        std::vector<py::object>& kept) {
   if (!py::isinstance<py::tuple>(value)) {
@@ -107,7 +109,7 @@ float* target_argument(const py::handle& value, py::ssize_t vertices,
   return reinterpret_cast<float*>(address);
 }
 
-/// The arguments of a call, and the objects that keep their memory alive.
+/// The arguments of evaluate_faces, and the Python objects that keep their memory alive.
 struct Request {
   std::vector<FacePtr> faces;
   std::vector<rig::FaceFrame> frames;
@@ -143,7 +145,8 @@ struct Request {
 
   const rig::FaceParts& parts(std::size_t f) const { return faces[f]->face->parts(); }
 
-  // {mesh: memory for its vertices}
+  // Adds the memory that receives the vertices of a face's meshes. In: object  {mesh: array or
+  // (address, vertices)}
   void add_targets(std::size_t f, const py::object& object) {
     if (!py::isinstance<py::dict>(object)) {
       throw py::value_error("targets: {mesh: array or (address, vertices)} was expected for each");
@@ -192,7 +195,7 @@ struct Request {
     rig::evaluate_faces(all, frames, threads);
   }
 
-  // Lists the meshes that were written.
+  // The numbers of the meshes whose vertices the evaluation wrote.
   py::tuple written(std::size_t f) const {
     py::list meshes;
     for (const rig::Target& t : frames[f].targets) {
@@ -238,7 +241,7 @@ py::list deform_faces(const std::vector<FacePtr>& faces, const py::sequence& joi
                                   {static_cast<py::ssize_t>(rig.joint_count), py::ssize_t{9}});
     pose.blend_shapes =
         vector_argument(py::object(blend_shapes[f]), "blend_shapes", rig.blend_shape_count);
-    // Only read here.
+    // The evaluation only reads these arrays.
     request.frames[f].pose.joints = const_cast<float*>(pose.joints.data());
     request.frames[f].pose.blend_shapes = const_cast<float*>(pose.blend_shapes.data());
   }

@@ -13,7 +13,8 @@ namespace {
 
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-// `from_python` takes only indices, and -1 means no parent.
+// The parents of bones as int32. `from_python` cannot convert them, because it rejects -1, which
+// means no parent.
 std::vector<std::int32_t> parents_argument(const py::object& object) {
   const py::array any = py::array::ensure(object);
   if (!any || any.ndim() != 1 ||
@@ -24,7 +25,7 @@ std::vector<std::int32_t> parents_argument(const py::object& object) {
   std::vector<std::int32_t> parents;
   for (py::ssize_t i = 0; i < wide.size(); ++i) {
     const std::int64_t parent = wide.data()[i];
-    // make_joint_chain refuses the clamped number of a parent that does not fit 32 bits.
+    // A parent that does not fit 32 bits is clamped; make_joint_chain rejects the clamped number.
     parents.push_back(static_cast<std::int32_t>(
         std::clamp<std::int64_t>(parent, std::numeric_limits<std::int32_t>::min(),
                                  std::numeric_limits<std::int32_t>::max())));

@@ -11,7 +11,7 @@ struct PoseArrays {
   FloatArray joints, blend_shapes, animated_maps, controls;
 };
 
-/// The arrays of one frame, uninitialised.
+/// Uninitialised arrays for the pose of one frame.
 inline PoseArrays new_pose(const rig::Rig& rig) {
   const auto n = [](std::uint32_t count) { return static_cast<py::ssize_t>(count); };
   return {FloatArray({n(rig.joint_count), n(rig.joint_stride)}),

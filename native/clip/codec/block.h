@@ -16,13 +16,15 @@ namespace risorius::clip {
 
 inline constexpr std::size_t kMostBlockFrames = 4096;
 
-// The first byte of a block's curves, and of a chunk that is stored instead of coded.
+// The first byte of a block's curves is kCodedBlock or kStoredBlock. The first byte of a curve's
+// chunk is kStoredChunk or the order of its predictor.
 inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
 
-/// The form of a control in the list of controls, or of several that rest.
+/// How a block describes a curve: all zeros, one constant value, a repetition of an earlier curve,
+/// or a coded chunk. Neighbouring constant curves share an entry.
 enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
 
-/// Curves [controls, frames] that lie `stride` values apart.
+/// Curves [controls, frames]; the rows begin `stride` values apart.
 struct BlockCurves {
   const float* values = nullptr;
   std::size_t stride = 0, controls = 0, frames = 0;
@@ -40,7 +42,7 @@ void encode_curves(const BlockCurves& curves, Bytes& out);
 class EncodedCurves {
  public:
   /// Reads the table of parts. bytes must outlive the result.
-  /// Fails: kInvalidValue, kTruncated; the offset counts in bytes
+  /// Fails: kInvalidValue, kTruncated; the error's offset counts from the first of the bytes
   static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
 
   EncodedCurves(EncodedCurves&&) noexcept;
@@ -52,7 +54,7 @@ class EncodedCurves {
   /// Fails: kInvalidValue. In: controls of this block
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
-  /// Whether a control rests in the whole block. Out: value  its value, if it rests
+  /// Whether a control has one value in the whole block. Out: value  this value; set only if true
   bool is_resting(std::size_t control, float& value) const {
     if (parts_[control].kind != Part::kConstant) return false;
     value = std::bit_cast<float>(parts_[control].bits);

@@ -17,11 +17,11 @@ using core::fail;
 
 // The meaning of the next bits of a chunk, packed into one word:
 // bits 0-5    number of bits of the code and its extra bits together
-// bit 6       a rest; bit 7: no code begins with these bits
+// bit 6       the symbol repeats the last value; bit 7: no code begins with these bits
 // bits 8-11   length of the code; 16-20: number of extra bits
-// bit 14      the error has the opposite sign of the one before
+// bit 14      the prediction error has the opposite sign of the one before
 // bit 15      the 1 above the extra bits
-// bits 24-27  the code of the next symbol
+// bits 24-27  number of the prefix code of the next symbol
 using Entry = std::uint32_t;
 constexpr Entry kIsRest = 1u << 6, kIsNone = 1u << 7;
 
@@ -38,7 +38,7 @@ constexpr std::size_t kSpare = 8;  // bytes that a load may read past a chunk
 class BitReader {
  public:
   BitReader(const std::uint8_t* bytes, std::size_t size) : bytes_(bytes), end_(8 * size) {}
-  // At least 57 bits; bits behind the end are undefined.
+  // At least the next 57 bits, the first in the lowest bit; bits behind the end are undefined.
   std::uint64_t peek() const {
     std::uint64_t word;
     std::memcpy(&word, bytes_ + (at_ >> 3), sizeof word);
@@ -76,7 +76,8 @@ class Lane {
   bool is_done() const { return out_ == end_; }
   bool is_whole() const { return bits_.is_at_end(); }
 
-  // Reads a value, or the length of a rest. False if the bits are neither.
+  // Decodes the next symbol: a value, or a repetition of the last value. False if no code begins
+  // with these bits, or they go beyond the chunk or its frames.
   bool step() {
     if (bits_.is_beyond()) [[unlikely]]
       return false;
@@ -115,7 +116,7 @@ class Lane {
   std::uint32_t sign_ = 0;  // of the last error that was not 0
 };
 
-// Out: true if the chunk held every frame and nothing more
+// Decodes the remaining frames of a curve. Out: true if the chunk had every frame and nothing more
 template <int kOrder>
 bool finish(Lane<kOrder>& lane) {
   while (!lane.is_done()) {
@@ -124,7 +125,7 @@ bool finish(Lane<kOrder>& lane) {
   return lane.is_whole();
 }
 
-// Decodes two curves in turns: while one waits for its table, the other continues.
+// Decodes two curves in turns: while one waits for a read of its table, the other continues.
 template <int kOrder>
 std::array<bool, 2> finish_both(Lane<kOrder> a, Lane<kOrder> b) {
   while (!a.is_done() && !b.is_done()) {
@@ -206,7 +207,7 @@ core::Status EncodedCurves::read_parts(Cursor& in, std::size_t controls) {
   return core::ok();
 }
 
-// Chunks at the very end are read from a copy, which has spare bytes behind it.
+// Copies the chunks at the very end of the block, so that spare bytes follow them.
 void EncodedCurves::keep_tail() {
   tail_begin_ = bytes_.size();
   for (Part& part : parts_) {
@@ -257,7 +258,7 @@ core::Status EncodedCurves::refuse(std::size_t control, const char* message) con
               parts_[control].offset);
 }
 
-// Fills a control that needs no decoding. Out: false if the control is coded
+// Writes all frames of a control to `out` if its curve is not coded. Out: false if it is coded
 core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
   const Part& part = parts_[control];
   if (part.kind == Part::kConstant) {

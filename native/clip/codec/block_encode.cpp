@@ -71,7 +71,7 @@ Coded best_tokens(std::span<const float> curve) {
   return best;
 }
 
-// The prefix codes of a block.
+// The prefix codes of a block, and the symbols that choose between them.
 struct Codes {
   std::vector<std::uint8_t> bounds;  // the largest preceding symbol of each code except the first
   std::vector<Code> codes;
@@ -92,7 +92,8 @@ Codes make_codes(const std::vector<Coded>& all) {
       if (token.symbol < kRest) ++values[token.symbol], ++total;
     }
   }
-  // Each code gets an equal share of the symbols that follow.
+  // The bounds divide the value symbols into about equally frequent groups, one for each code: the
+  // group of a symbol chooses the code of the next symbol.
   const std::size_t wanted = std::clamp<std::size_t>(total / 250, 1, kMostCodes - 1);
   std::uint64_t seen = 0;
   for (std::uint32_t symbol = 0; symbol < kRest - 1; ++symbol) {
@@ -147,7 +148,7 @@ Bytes chunk_of(const Coded& coded, const Codes& codes) {
   return out;
 }
 
-// The form of a control in a block.
+// How a block describes a control's curve.
 struct Choice {
   PartKind kind;
   std::size_t index = 0;  // of the control that it repeats, or in the list of coded curves
@@ -187,7 +188,8 @@ void put_part(Bytes& out, PartKind kind, std::uint64_t number) {
   put_count(out, number << 2 | static_cast<std::uint64_t>(kind));
 }
 
-// Writes the form of each control; neighbours that rest at the same value share an entry.
+// Writes how the block describes each control. Neighbouring controls with the same constant value
+// share an entry.
 void put_parts(Bytes& out, const BlockCurves& curves, const std::vector<Choice>& choices,
                const std::vector<Bytes>& chunks) {
   for (std::size_t i = 0; i < choices.size();) {

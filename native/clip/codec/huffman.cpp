@@ -27,7 +27,8 @@ bool Code::assign() {
 
 namespace {
 
-// Computes the depths of the leaves of a Huffman tree over the symbols that occur.
+// Computes the depths of the leaves of a Huffman tree over the symbols that occur. Out: the largest
+// depth
 std::uint8_t measure(std::span<const std::uint32_t> counts, Code& code) {
   struct Node {
     std::uint64_t weight;
@@ -69,7 +70,8 @@ Code make_code(std::span<const std::uint32_t, kMostSymbols> counts) {
   Code code;
   std::array<std::uint32_t, kMostSymbols> weights{};
   std::copy(counts.begin(), counts.end(), weights.begin());
-  // Flatter weights give shorter codes; the loss is far below a percent.
+  // If a code is too long, the weights are made more equal, which shortens it; the loss is far
+  // below a percent.
   while (measure(weights, code) > kLongestCode) {
     for (std::uint32_t& weight : weights) weight = weight == 0 ? 0 : weight / 2 + 1;
   }

@@ -17,19 +17,21 @@ struct Code {
   std::array<std::uint8_t, kMostSymbols> lengths{};  // bits; 0: the symbol does not occur
   std::array<std::uint16_t, kMostSymbols> bits{};    // the first bit of a code is the lowest
 
-  /// Assigns bits by the lengths. False if there are more codes than the lengths allow.
+  /// Assigns the bits of each code from its length. False if there are more codes than the lengths
+  /// allow.
   bool assign();
 };
 
-/// The code that makes a text with counts[i] symbols i shortest.
+/// The prefix code that needs the fewest bits for a text in which symbol i occurs counts[i] times,
+/// with no code longer than kLongestCode.
 Code make_code(std::span<const std::uint32_t, kMostSymbols> counts);
 
-/// Appends the lengths of all codes, half a byte each. Behind a zero stands the number of further
-/// zeros.
+/// Appends the code lengths of all symbols of all codes, half a byte each. After a length of 0
+/// follows the number of further zeros, at most 15.
 void put_lengths(Bytes& out, std::span<const Code> codes);
 
-/// Reads the result of put_lengths.
-/// Out: all codes; false if the bytes are not valid codes
+/// Reads the result of put_lengths. Fills all codes.
+/// Out: false if the bytes are not valid codes
 bool get_lengths(Cursor& in, std::span<Code> codes);
 
 }  // namespace risorius::clip

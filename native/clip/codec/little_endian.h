@@ -22,7 +22,8 @@ void put(Bytes& out, T value) {
   out.insert(out.end(), first, first + sizeof value);
 }
 
-/// Seven bits per byte, the lowest first; the top bit is set if more bytes follow.
+/// Appends an integer of variable length: seven bits per byte, the lowest bits first; the top bit
+/// of a byte is set if more bytes follow.
 inline void put_count(Bytes& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
   out.push_back(static_cast<std::uint8_t>(value));
@@ -33,8 +34,7 @@ inline void put_text(Bytes& out, const std::string& text) {
   out.insert(out.end(), text.begin(), text.end());
 }
 
-/// Appends the number of bytes that a text shares with the beginning of the text before it, then
-/// the rest.
+/// Appends the number of leading bytes that `text` shares with `before`, then its remaining bytes.
 inline void put_next_text(Bytes& out, const std::string& before, const std::string& text) {
   std::size_t same = 0;
   while (same < before.size() && same < text.size() && before[same] == text[same]) ++same;

@@ -9,11 +9,12 @@
 
 namespace risorius::clip {
 
-/// The predictor of order n continues the polynomial through the last n + 1 values.
+/// Number of predictors, of orders 0 to 4. Order n continues the polynomial through the last n + 1
+/// values.
 inline constexpr int kOrders = 5;
 
-/// Maps the bits of a float to an integer so that ascending floats give ascending integers; its own
-/// inverse.
+/// Maps the bits of a float to an integer so that ascending floats give ascending integers. It is
+/// its own inverse.
 inline std::uint32_t in_order(std::uint32_t bits) {
   return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
 }
@@ -23,7 +24,7 @@ inline std::uint32_t sign_of(std::uint32_t difference) {
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
 }
 
-/// The last values of a curve, newest first.
+/// The last kOrder + 1 values of a curve, newest first, and the prediction of the next one.
 template <int kOrder>
 class History {
  public:
@@ -34,13 +35,13 @@ class History {
     last_ = bits;
     if constexpr (kOrder > 0) values_[0] = std::bit_cast<float>(bits);
   }
-  /// Equals n calls of add(bits).
+  /// Has the same effect as n calls of add(bits).
   void rest(std::uint32_t bits, std::size_t n) {
     for (std::size_t i = 0; i < n && i <= kOrder; ++i) add(bits);
   }
   std::uint32_t last() const { return last_; }
 
-  /// in_order of the predicted value.
+  /// The predicted next value, as in_order maps it.
   std::uint32_t next() const {
     if constexpr (kOrder == 0) return in_order(last_);
     double p = 0.0;
@@ -48,8 +49,8 @@ class History {
     if constexpr (kOrder == 2) p = 3 * (v(0) - v(1)) + v(2);
     if constexpr (kOrder == 3) p = 4 * (v(0) + v(2)) - 6 * v(1) - v(3);
     if constexpr (kOrder == 4) p = 5 * (v(0) - v(3)) - 10 * (v(1) - v(2)) + v(4);
-    // The prediction is 0 where processors could differ: beyond a float's range, for denormals and
-    // NaN.
+    // Outside of 2^-60 to 2^100 the prediction is 0, because processors could differ there: they
+    // round denormals differently, and NaN has several bit patterns.
     const double size = std::fabs(p);
     if (!(size >= 0x1p-60 && size <= 0x1p100)) return 0;
     return in_order(std::bit_cast<std::uint32_t>(static_cast<float>(p)));
@@ -62,8 +63,8 @@ class History {
   float values_[kOrder + 1] = {};
 };
 
-/// During the life of an object of this class, the processor rounds and treats denormals as at the
-/// start of a process, even if the host program has changed that.
+/// While an object of this class exists, the processor rounds and treats denormals as at the start
+/// of a process, even if the host program has changed that.
 class DefaultArithmetic {
  public:
   DefaultArithmetic() {

@@ -11,17 +11,17 @@
 
 namespace risorius::clip {
 
-// Symbol 0: the value equals the prediction. Symbols 2 b - 1 and 2 b: the error of the prediction
-// has b bits; its sign equals the sign of the last error other than 0 (2 b - 1) or is opposite to
-// it (2 b). The b - 1 bits below the highest bit are the extra bits.
+// Symbol 0: the value equals the prediction. Symbols 2 b - 1 and 2 b: the magnitude of the
+// prediction error has b bits; its sign equals the sign of the last error other than 0 (2 b - 1) or
+// is opposite to it (2 b). The b - 1 bits below the highest bit are stored as extra bits.
 // Symbol kRest + k: the last value is repeated 2^k to 2^(k + 1) - 1 times; the k bits below the
-// highest bit of that count are the extra bits.
+// highest bit of that count are stored as extra bits.
 inline constexpr std::uint32_t kRest = 65;
 inline constexpr std::uint32_t kRests = 13;  // up to kMostBlockFrames
 static_assert(kRest + kRests <= kMostSymbols);
 
-/// A block has several prefix codes; the symbol before decides which one is used: code 0 after a
-/// repetition, after a value the first code i > 0 whose bounds[i] is at least that symbol.
+/// A block has up to this many prefix codes. The previous symbol chooses the code: code 0 after a
+/// repetition; after a value, the first code i > 0 whose bounds[i] is at least the value's symbol.
 inline constexpr std::size_t kMostCodes = 9;
 
 constexpr std::uint32_t extra_bits(std::uint32_t symbol) {
@@ -48,7 +48,7 @@ inline Token value_token(std::uint32_t error, std::uint32_t& sign) {
   sign = own;
   return {2 * static_cast<std::uint32_t>(std::bit_width(size)) - 1 + is_other, size};
 }
-/// The token of a repetition. In: count above 0.
+/// The token of a repetition. In: count  number of repeated values, above 0
 inline Token rest_token(std::uint32_t count) {
   return {kRest + static_cast<std::uint32_t>(std::bit_width(count)) - 1, count};
 }

@@ -17,7 +17,7 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// Refuses sizes that a reader would refuse.
+// Rejects names and metadata that are more or longer than a reader accepts.
 core::Status check_sizes(const Head& head) {
   const Limits limits;
   if (head.names.size() > limits.controls || head.metadata.size() > limits.metadata) {
@@ -162,7 +162,7 @@ void Encoder::put_block(const float* curves, std::size_t stride, std::span<const
   if (frames > 0) encode_curves({curves, stride, head_.names.size(), frames}, out_);
   const auto size = static_cast<std::uint32_t>(out_.size() - begin - kBlockStart);
   std::memcpy(out_.data() + begin + 4, &size, sizeof size);
-  // Computed with 0 in the place of the hash.
+  // The hash is computed while its own bytes are 0.
   const std::uint64_t hash = core::xxh64(View(out_).subspan(begin));
   std::memcpy(out_.data() + begin + kBlockStart - kHashSize, &hash, sizeof hash);
   blocks_.push_back({written_ + begin, size, static_cast<std::uint32_t>(frames)});

@@ -23,13 +23,14 @@ class Encoder {
   /// Fails: kInvalidArgument with the field (a repeated name, a rate that is not above 0)
   static core::Result<Encoder> create(Head head, std::size_t block_frames = kDefaultBlockFrames);
 
+  /// Appends frames.
   /// In: frames [n, controls]; times [n] if the clip has them, else empty: finite and ascending
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { pending_.push_back(std::move(event)); }
-  /// Encodes the remaining frames and the index; the encoder accepts no more.
+  /// Encodes the remaining frames and the index. Afterwards no frame may be appended.
   void finish();
 
-  /// Removes and returns the finished bytes.
+  /// Removes the bytes that are finished and returns them.
   Bytes take();
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_ + filled_; }
@@ -54,7 +55,7 @@ class Encoder {
   Bytes out_;
 };
 
-/// A clip as a file. Fails: kInvalidArgument with the field.
+/// Encodes a clip as the bytes of a .rzc file. Fails: kInvalidArgument with the field.
 core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames = kDefaultBlockFrames);
 
 }  // namespace risorius::clip

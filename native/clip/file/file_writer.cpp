@@ -14,8 +14,8 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// The name without its last characters, to make room for a suffix; cuts only whole UTF-8
-// characters.
+// The path with the last 12 bytes of the file's name removed, to make room for a suffix. No UTF-8
+// character is cut.
 std::filesystem::path shortened(const std::filesystem::path& path) {
   constexpr std::size_t kRoom = 12;
   std::u8string name = path.filename().u8string();
@@ -47,7 +47,8 @@ core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, H
   return writer;
 }
 
-// Never overwrites the remains of an interrupted recording.
+// Opens PATH.part. If this file exists, it may be the rest of an interrupted recording, so
+// PATH.2.part and so on is opened instead.
 std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   constexpr int kMostParts = 100;
   std::filesystem::path base = path_;
@@ -66,7 +67,7 @@ std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   return error;
 }
 
-// Hands finished bytes to the system, so that they outlive this process.
+// Writes the finished bytes to the file, so that they are not lost if this process ends.
 core::Status FileWriter::write_ready() {
   const Bytes bytes = encoder_.take();
   if (const std::error_code error = file_->write(bytes)) return failure(part_, error);

@@ -16,6 +16,7 @@ namespace risorius::clip {
 /// Ends::kMayBeCut.
 class FileWriter {
  public:
+  /// Opens the .part file.
   /// Fails: kInvalidArgument as Encoder; kIoWrite with the system's reason.
   static core::Result<FileWriter> create(
       const std::filesystem::path& path, Head head, std::size_t block_frames = kDefaultBlockFrames,
@@ -25,8 +26,8 @@ class FileWriter {
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { encoder_.add(std::move(event)); }
   /// Writes the remaining frames and the index, and renames the file to PATH, replacing an existing
-  /// one. Fails: kIoWrite. Then, and after a failed append, PATH is unchanged, the written bytes
-  /// stay in part(), and every later call fails with the same error.
+  /// file. Fails: kIoWrite. After a failure, here or in append, PATH is unchanged, the written
+  /// bytes remain in part(), and every later call fails with the same error.
   core::Status close();
 
   bool is_open() const { return file_.has_value(); }
@@ -43,7 +44,8 @@ class FileWriter {
   Encoder encoder_;
   std::filesystem::path path_, part_;
   std::optional<bytes::NewFile> file_;
-  // Set if bytes are missing, because a continued file would be no valid clip.
+  // The first failed write, which every later call returns: bytes are missing from the file, so
+  // that it would be no valid clip if it were continued.
   core::Status trouble_ = core::ok();
 };
 

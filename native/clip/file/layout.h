@@ -18,16 +18,19 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// Bytes of magic, version and size of the body; the body and its hash follow.
+// Bytes at the start of a file: mark (4), version (4), and number of bytes of the head that
+// follows (4).
 inline constexpr std::size_t kHeadStart = 12;
-// Bytes of a block's head: mark, size of the bytes behind the hash, frames, first frame (8), hash
-// (8) of these fields and of the bytes that follow.
+// Bytes of a block's head: mark (4), number of bytes after the head (4), frames (4), first frame
+// (8), and the hash (8) of these fields and of the bytes after the head.
 inline constexpr std::size_t kBlockStart = 28;
-// Bytes of the end: offset of the index (8), its size, mark, and the hash (8) of these fields.
+// Bytes of the end of a file: offset of the index (8), size of the index (4), mark (4), and the
+// hash (8) of the index and these fields.
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 
-// Times are 8-byte floats mapped to ordered integers, stored as second differences.
+// Maps the bits of a time, a double, to an integer so that ascending times give ascending integers.
+// The file stores second differences of these integers.
 inline std::uint64_t time_in_order(std::uint64_t bits) {
   return bits ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(bits) >> 63) >> 1;
 }
@@ -42,7 +45,7 @@ inline void put_events(Bytes& out, const std::vector<Event>& events) {
   }
 }
 
-/// Reserves no memory for a count that the bytes cannot hold.
+/// Reads events. Allocates memory only for events that were read, because the count may be wrong.
 inline std::vector<Event> get_events(Cursor& in) {
   std::vector<Event> events;
   const std::uint64_t count = in.count();

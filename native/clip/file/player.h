@@ -10,16 +10,16 @@
 
 namespace risorius::clip {
 
-/// Keeps the block of the last frame decoded, so that a following frame only costs a copy of the
-/// moving curves.
+/// Plays a clip frame by frame. The block of the most recently read frame stays decoded, so that
+/// another frame of this block only costs a copy of the moving curves.
 class Player {
  public:
   explicit Player(Reader reader);
 
   /// Values of all controls [controls], in the order of the clip's names; valid until the next
   /// call.
-  /// Fails: as Reader::read. Cost: reads, decodes and allocates when the frame lies in another
-  ///        block than the last one; otherwise allocates nothing
+  /// Fails: as Reader::read. Cost: reads, decodes and allocates if the frame is in another block
+  ///        than the frame of the previous call; otherwise allocates nothing
   core::Result<std::span<const float>> frame(std::uint64_t index);
 
   const Reader& reader() const { return reader_; }

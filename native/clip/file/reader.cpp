@@ -19,7 +19,7 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// The bytes from offset on, or nullopt if there are fewer.
+// The `size` bytes from `offset` on, or nullopt if the source has fewer.
 std::optional<Bytes> read_bytes(bytes::Source& source, std::uint64_t offset, std::uint64_t size) {
   if (offset > source.size() || size > source.size() - offset) return std::nullopt;
   Bytes bytes(static_cast<std::size_t>(size));
@@ -34,7 +34,7 @@ T number_at(View bytes, std::size_t offset) {
   return value;
 }
 
-// Out: whether the last bytes are the hash of the others
+// Whether the last 8 bytes are the hash of the bytes before them.
 bool is_sealed(View bytes) {
   const std::size_t size = bytes.size() - kHashSize;
   return number_at<std::uint64_t>(bytes, size) == core::xxh64(bytes.first(size));
@@ -55,7 +55,7 @@ bool get_times(Cursor& in, std::size_t frames, std::vector<double>& times) {
 
 }  // namespace
 
-// A loaded block; its curves point into its bytes.
+// A loaded block. `curves` refers to `bytes`.
 struct Reader::Loaded {
   std::size_t block = 0;
   Bytes bytes;
@@ -98,7 +98,7 @@ core::Status Reader::read_head(const Limits& limits) {
   return read_names(View(*bytes).subspan(kHeadStart, size), limits);
 }
 
-// In: body  of the head
+// Reads rate, start, control names and metadata. In: body  the bytes of the head
 core::Status Reader::read_names(View body, const Limits& limits) {
   Cursor in(body);
   const auto refuse = [&](ErrorCode code, std::string where, std::string message) {
@@ -122,7 +122,8 @@ core::Status Reader::read_names(View body, const Limits& limits) {
   std::uint64_t length = 0;
   for (std::uint64_t i = 0; i < controls && !in.failed(); ++i) {
     head_.names.push_back(in.next_text(head_.names.empty() ? "" : head_.names.back()));
-    // A name may repeat the one before in a few bytes: the decoded length counts.
+    // The limit holds for the decoded names: in the file a name may repeat most of the previous
+    // name in a few bytes.
     length += head_.names.back().size();
     if (length > limits.head_bytes) {
       return refuse(ErrorCode::kLimitExceeded, "head.names",
@@ -173,7 +174,8 @@ core::Status Reader::read_index() {
   return read_blocks(View(*bytes).first(length), offset);
 }
 
-// In: index  the bytes at offset
+// Reads the table of blocks and the events. In: index  the index's bytes; offset  their place in
+// the file
 core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   Cursor in(index);
   const auto refuse = [&](ErrorCode code, std::string message) {
@@ -202,7 +204,7 @@ core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   return core::ok();
 }
 
-// Out: whether a complete block lies at offset; then it is loaded
+// Loads the block at `offset` and adds it to the list. Out: false if no complete block is there
 bool Reader::take_block(std::uint64_t offset, Block& block) {
   const auto start = read_bytes(*source_, offset, kBlockStart);
   if (!start || number_at<std::uint32_t>(*start, 0) != kBlockMark) return false;
@@ -318,7 +320,8 @@ core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uin
   if (count == frames) {
     RISORIUS_TRY(decode(controls, out, stride));
   } else {
-    // Decodes a few controls at a time and keeps only the wanted frames.
+    // The wanted frames are a part of the block. A few controls at a time are decoded completely,
+    // and only the wanted frames are copied.
     constexpr std::size_t kAtOnce = 16;
     std::vector<float> curves(kAtOnce * frames);
     for (std::size_t i = 0; i < controls.size(); i += kAtOnce) {

@@ -13,7 +13,7 @@
 
 namespace risorius::clip {
 
-/// Upper limits for a file.
+/// Upper limits for a file and for one read.
 struct Limits {
   std::uint32_t controls = 1u << 16;
   std::uint64_t frames = std::uint64_t{1} << 32;
@@ -25,7 +25,7 @@ struct Limits {
 /// Whether a file without a valid end, such as an interrupted recording, is accepted.
 enum class Ends { kMustBeWhole, kMayBeCut };
 
-/// A file that is read in parts. Several threads need a Reader each.
+/// A clip file that is read in parts. It is not thread-safe: each thread needs its own Reader.
 class Reader {
  public:
   /// Reads the head and the index, but no curve.
@@ -38,22 +38,23 @@ class Reader {
   const std::vector<Event>& events() const { return events_; }
   /// Bytes of the file that belong to the clip; more bytes follow only if the file was cut.
   std::uint64_t byte_count() const { return end_; }
-  /// First frame of each block, and the frame behind the last.
+  /// First frame of each block, followed by the number of frames.
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }
 
-  /// Fails if read() would refuse the range. Call it before allocating memory for the result.
+  /// Fails if read() would reject the range. Call it before allocating memory for the result.
   core::Status may_read(std::uint64_t begin, std::uint64_t end,
                         std::span<const std::uint32_t> controls) const;
 
   /// Writes the curves of controls to out [controls.size(), end - begin], and the times to
-  /// out_times [end - begin] unless it is null. The last block stays in memory for the next call.
+  /// out_times [end - begin] unless it is null. The last block that was read stays in
+  /// memory for the next call.
   /// In: begin <= end <= frame_count(), valid controls
   /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
                     float* out, double* out_times);
 
-  /// Writes the values of a block's resting controls to `values` [controls], and appends the other
-  /// controls to `moving`. Fails: as read.
+  /// Writes the values of the controls that are constant in a block to `values` [controls], and
+  /// appends the numbers of the other controls to `moving`. Fails: as read.
   core::Status resting(std::size_t block, std::span<float> values,
                        std::vector<std::uint32_t>& moving);
 
@@ -84,7 +85,7 @@ class Reader {
   std::shared_ptr<Loaded> loaded_;
 };
 
-/// A whole file. Fails: as Reader.
+/// Decodes a whole file. Fails: as Reader.
 core::Result<Clip> decode(View bytes, Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
 }  // namespace risorius::clip

@@ -8,7 +8,8 @@ namespace risorius::clip {
 
 namespace {
 
-// A smaller share of a frame or of a repeat is a rounding error.
+// Frame numbers and repeats that differ from an integer by less than this, relative to its size,
+// are rounded to it.
 constexpr double kLost = 1e-9;
 
 double snapped(double x) noexcept {
@@ -73,7 +74,7 @@ LayerCurves::Place LayerCurves::place(double time) const noexcept {
   return {static_cast<std::size_t>(first), static_cast<float>(at - first)};
 }
 
-/// The weight and the clip time of a layer at a time.
+/// The weight and the clip time, in seconds, of a layer at a scene time.
 struct Mixer::Moment {
   float weight;
   double clip_time;
@@ -104,7 +105,8 @@ bool Mixer::moment(const Layer& layer, double time, Moment& out) noexcept {
     out.clip_time = layer.warp.at(t);
   } else {
     const double length = (layer.last - layer.first) * layer.scale;
-    // The end itself is rounded: at large times the last repeat would be lost.
+    // At the layer's end the number of repeats is not computed from t, because at large times
+    // rounding would make it too small.
     const double turns =
         t >= layer.end ? layer.repeat : std::min(snapped((t - layer.start) / length), layer.repeat);
     double part = turns - std::floor(turns);

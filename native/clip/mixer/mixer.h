@@ -26,8 +26,8 @@ struct CurvesView {
   std::span<const double> times;  // [frames], ascending seconds; empty: start + i / rate
 };
 
-/// How a layer is combined with the layers below it: v is its value, b the value below, m its
-/// weight times its mask.
+/// How a layer is combined with the layers below it: v is the layer's value, b the value below, and
+/// m the layer's weight times its mask.
 enum class Blend : std::uint8_t {
   kOverride,  // b * (1 - m) + v * m
   kAdditive,  // b + v * m
@@ -42,15 +42,16 @@ enum class Extend : std::uint8_t {
   kRepeat,  // repeated before the start and after the end
 };
 
-/// A polyline, constant outside of its points. One point is a constant.
+/// A polyline y(x). Before its first and after its last point it is constant. One point is a
+/// constant.
 struct Line {
   std::vector<double> x, y;  // x ascending
   double at(double x) const noexcept;
 };
 
-/// The curves of a layer that the mixer has and the mask lets through, prepared for playing: frame
-/// by frame, in the mixer's order, with constant curves kept apart. Immutable; layers and mixers
-/// share it.
+/// The curves of a layer, prepared for playing: values frame by frame, controls in the mixer's
+/// order, and constant curves separate. Curves that the mixer has no control for, or whose mask is
+/// 0, are left out. Immutable, so that several layers and mixers can share one object.
 class LayerCurves {
  public:
   /// In:    controls  the names of the mixer's controls
@@ -67,7 +68,7 @@ class LayerCurves {
 
  private:
   friend class Mixer;
-  /// A run of controls that are consecutive both in the mixer and here.
+  /// Controls that are consecutive both in the mixer and in the columns of this layer.
   struct Run {
     std::uint32_t control, column, count;
   };
@@ -174,17 +175,18 @@ class Mixer {
   /// Fails: kInvalidIndex, kInvalidValue.
   core::Status set_rules(std::vector<Yield> yields, std::vector<Opposites> opposites);
 
-  /// Fires a reaction. If max_fired are active, it replaces the one that ended first.
+  /// Fires a reaction. If max_fired reactions are stored, it replaces the one that ended first.
   /// In:   reaction  below the number of reactions
   ///       time      seconds, finite
   ///       strength  in [0, 1]
-  /// Out:  false, and nothing happens, if none has ended
+  /// Out:  false, and nothing happens, if all stored reactions are still active
   /// Cost: no allocation
   bool fire(std::size_t reaction, double time, float strength) noexcept;
   void clear_fired() noexcept { voice_count_ = 0; }
 
-  /// The controls at a time. The result depends only on the time, the base and the fired reactions.
-  /// In:    base  float[controls] or null: 0
+  /// Computes the controls at a time. The result depends only on the time, the base and the fired
+  /// reactions.
+  /// In:    base  float[controls], or null for 0
   /// Out:   out   float[controls], may be base
   /// Cost:  allocates nothing. Not thread-safe, because it has a workspace
   void evaluate(double time, const float* base, float* out) noexcept;

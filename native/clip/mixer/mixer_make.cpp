@@ -55,7 +55,7 @@ core::Status check(const CurvesView& curves, std::size_t controls, std::span<con
 
 }  // namespace
 
-/// Sorts curves by the controls that they drive, and into moving, constant and zero ones.
+/// Sorts a layer's curves by control, separately for moving, constant and zero curves.
 struct LayerCurves::Sorter {
   struct Row {
     std::uint32_t control;

@@ -17,7 +17,7 @@ std::array<std::size_t, 3> axis_order(std::uint32_t sequence) {
   return kOrders[sequence];
 }
 
-// R times the rotation about one axis.
+// Multiplies R by the rotation about one axis. In: angle  radians
 void rotate(Matrix& r, std::size_t axis, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -39,23 +39,25 @@ Matrix conjugated(const Basis& basis, const Matrix& r) {
   return out;
 }
 
-// The angles of R = Ri Rj Rk. The middle angle comes from both its sine and its cosine, because
-// asin alone loses half of the digits near gimbal lock.
+// The angles, in radians, of R = Ri Rj Rk. The middle angle is computed from both its sine and its
+// cosine, because asin alone loses half of the digits near gimbal lock.
 Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
   const auto [i, j, k] = order;
   const double parity = j == (i + 1) % 3 ? 1.0 : -1.0;
   const double cosine = std::hypot(r[i][i], r[i][j]);
   Vec3 out{};
   out[j] = std::atan2(-parity * r[i][k], cosine);
-  // Below this cosine the outer angles are noise (1e-16 / 1e-9 is the rounding of a float). Only
-  // their sum or difference is known; the first angle gets it.
+  // Below this cosine the outer angles have rounding errors of 1e-16 / 1e-9, as large as the
+  // rounding errors of a float. Then only the sum or the difference of the outer angles is known;
+  // it is stored in the first outer angle.
   if (cosine < 1e-9) {
     out[i] = std::atan2(-parity * r[k][j], r[j][j]);
   } else {
     out[i] = std::atan2(parity * r[j][k], r[k][k]);
     out[k] = std::atan2(parity * r[i][j], r[i][i]);
   }
-  // cos(90 degrees) in double is not exactly 0; the remainder would keep a row of zeros.
+  // cos(90 degrees) in double is not exactly 0. Without this, a row of angles that should be 0
+  // would have tiny values.
   for (double& angle : out) {
     if (std::abs(angle) < 1e-14) angle = 0;
   }
@@ -103,7 +105,7 @@ Rotation::Rotation(const System& source, const System& target, const Basis& basi
     same_order_ = same_order_ && basis.to[from_[i]] == into_[i];
     to_radians_[i] = in * source.ext.rotation_sign[i];
     from_radians_[j] = target.ext.rotation_sign[j] / out;
-    // If the basis mirrors, a rotation about an unchanged axis turns the other way.
+    // If the basis mirrors, a rotation about an axis that keeps its direction reverses its sense.
     factor_[i] = basis.determinant * basis.sign[i] * source.ext.rotation_sign[i] *
                  target.ext.rotation_sign[j] * unit_;
   }

@@ -13,7 +13,7 @@ namespace risorius::dna::detail {
 
 using Vec3 = std::array<double, 3>;
 
-/// The conventions of a file's numbers.
+/// The conventions of the numbers in a file: axes, rotations, winding order and units.
 struct System {
   CoordinateSystem axes;
   DescriptorExt ext;
@@ -25,7 +25,7 @@ bool spans_space(const CoordinateSystem& axes);
 
 /// The matrix C: component i of the source becomes component to[i], times sign[i].
 struct Basis {
-  /// In: axes that span space
+  /// In: source, target  each with three axes in different dimensions
   Basis(const CoordinateSystem& source, const CoordinateSystem& target);
 
   bool keeps_places() const { return to == std::array<std::size_t, 3>{0, 1, 2}; }
@@ -37,22 +37,23 @@ struct Basis {
   double determinant = 1;  // -1: one system is the mirror image of the other
 };
 
-/// Converts stored angles to stored angles.
+/// Converts Euler angles from the source's convention and unit to the target's.
 class Rotation {
  public:
   /// In: valid systems
   Rotation(const System& source, const System& target, const Basis& basis);
 
-  /// Angles change place, sign and unit, but do not mix.
+  /// Whether the axes keep their order of rotation. Each angle then only changes its place, sign
+  /// and unit.
   bool same_order() const { return same_order_; }
   bool identity() const { return same_order_ && basis_.identity() && factor_ == Vec3{1, 1, 1}; }
-  /// The factor of an angle about a source axis. If the order stays it holds for any rotation,
-  /// otherwise for rotations about one axis.
+  /// The factor of an angle about a source axis. It holds for any rotation with same_order,
+  /// otherwise only for rotations about a single axis.
   double factor(std::size_t source_axis) const { return factor_[source_axis]; }
   double unit() const { return unit_; }
 
-  /// Without same_order the middle angle ends within 90 degrees; in gimbal lock the last angle is
-  /// 0.
+  /// The converted angles. Without same_order, a rotation about several axes gets a middle angle
+  /// within 90 degrees; in gimbal lock the last angle is 0.
   Vec3 operator()(const Vec3& stored) const;
 
  private:

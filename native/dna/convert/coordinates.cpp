@@ -49,7 +49,8 @@ System system_of(const CoordinateTarget& target, System s) {
   return s;
 }
 
-// Errors name a field of the file or an argument.
+// Checks a coordinate system. In: of_file  true: errors name a field of the file; false: errors
+// name an argument of the conversion
 Status check_system(const System& s, bool of_file) {
   const ErrorCode code = of_file ? ErrorCode::kInvalidValue : ErrorCode::kInvalidArgument;
   const std::string d = of_file ? "descriptor." : "", e = of_file ? "descriptor_ext." : "";
@@ -157,7 +158,8 @@ struct RotationRows {
   std::size_t first = 0, last = 0;
 };
 
-// By joint. Of two rows with one output the last wins, as in the evaluation.
+// The rotation rows of each joint. If two rows write the same output the last one counts, as in the
+// evaluation.
 std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size_t row_count) {
   std::map<std::size_t, RotationRows> out;
   for (std::size_t r = 0; r < row_count; ++r) {
@@ -171,18 +173,20 @@ std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size
   return out;
 }
 
-// Rows that no LOD uses are ignored: converted together with used rows, they would become used.
+// The number of leading rows that any LOD uses. Further rows are dropped: if they were converted
+// together with used rows of the same joint, they would change the pose.
 std::size_t used_rows(const JointGroup& g) {
   return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
 }
 
-// A group under construction.
+// The rows of a converted joint group.
 struct Rows {
   std::vector<std::size_t> outputs;
   std::vector<float> values;
 };
 
-// Converts one row to one row: translations, scales, and angles whose order stays.
+// Converts a row to one row. This is possible for translations, for scales, and for angles if the
+// order of rotation stays.
 void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& out) {
   const std::size_t columns = g.input_indices.size(), output = g.output_indices[row];
   const std::size_t kind = output % kAttributes / 3, axis = output % 3;
@@ -195,7 +199,7 @@ void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& o
   }
 }
 
-// Converts three rotation rows to three; rows of zeros are dropped.
+// Converts the rotation rows of a joint, at most three, to three rows. Rows of zeros are dropped.
 void mix_rows(const Conversion& c, const JointGroup& g, const RotationRows& joint, Rows& out) {
   const std::size_t columns = g.input_indices.size();
   const std::size_t output = g.output_indices[joint.first], rx = output - output % 3;
@@ -268,7 +272,7 @@ bool cuts_rotation(const JointGroup& g) {
   return false;
 }
 
-// How the groups turn a joint.
+// The axes about which a joint rotates, and the groups that rotate it.
 struct Turns {
   bool driven = false, split = false;
   std::size_t group = 0;
@@ -294,7 +298,9 @@ std::vector<Turns> turns_of(const Dna& dna) {
   return out;
 }
 
-// Warns of joints whose angles add up to different rotations in the two orders of axes.
+// Warns of joints whose rotation cannot be converted exactly to the new order of axes: they add
+// angles about several axes, several groups rotate them, or a LOD uses only some of their rotation
+// rows.
 void warn_of_mixed_rotations(const Dna& dna, Warnings& warnings) {
   const auto& metadata = dna.joint_behavior_metadata.joint_representations;
   const std::string where = "behavior.joint_groups";
@@ -342,8 +348,8 @@ bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// All distance methods except the Euclidean one compare quaternions. For that one the control names
-// decide, as everywhere in the format.
+// Whether a solver's inputs are quaternions. They are for all distance methods except the Euclidean
+// one, for which the names of the controls decide, as everywhere in the format.
 bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_control_names) {
   if (s.raw_control_indices.size() % 4 != 0) return false;
   if (s.distance_method != 0) return true;
@@ -363,7 +369,7 @@ Array<float> converted_quaternions(const Basis& basis, const Array<float>& value
   return out;
 }
 
-// A twist about an axis equals a twist about the opposite axis.
+// The sign of the axis is ignored, because a twist about the opposite axis is treated alike.
 void convert_axis(const Basis& basis, std::uint16_t& axis) {
   if (axis < 3) axis = static_cast<std::uint16_t>(basis.to[axis]);
 }
@@ -380,8 +386,8 @@ void convert_control_rotations(const Conversion& c, Dna& dna) {
   for (TwistSwingSetup& s : dna.twist_swing_behavior.swings) convert_axis(c.basis, s.twist_axis);
 }
 
-// Warns if tables or networks read single components of a rotation, because no change of basis
-// preserves them.
+// Warns if correctives, joint groups, channels, maps or networks read single components of a
+// quaternion, because no change of basis preserves them.
 void warn_of_components(const Dna& dna, Warnings& warnings) {
   const auto check = [&](const char* where, const auto& controls) {
     for (const auto control : controls) {
@@ -405,7 +411,8 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// The numbers stay; keys 3 to 9 name the coordinate system that they refer to.
+// The numbers of the networks are not converted. Instead, keys 3 to 9 of MlJoints name the
+// coordinate system to which the numbers refer.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;
@@ -461,7 +468,7 @@ void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
 }
 
 void set_system(const System& target, Dna& dna) {
-  // Only version 2.8 stores all fields of dsce.
+  // The layer dsce stores all of these fields only in version 2.8.
   if (dna.descriptor_ext != target.ext && dna.version < 8) dna.version = 8;
   dna.descriptor.coordinate_system = target.axes;
   dna.descriptor.translation_unit = target.translation_unit;

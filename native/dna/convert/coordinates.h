@@ -23,17 +23,18 @@ struct CoordinateTarget {
 };
 
 /// The same character in the target's axes, rotation order, signs, winding and units. Numbers are
-/// computed in double and rounded once. Numbers that change only place and sign stay exact, and a
+/// computed in double and rounded once. Numbers that change only place and sign are exact, and a
 /// target equal to the source changes no bit.
 ///
-/// If the order of the rotation axes stays the same, each angle and each row of a joint group goes
-/// to one place, and every pose of the result is the converted pose. Otherwise a rotation becomes
-/// angles of which the middle one is within 90 degrees (in gimbal lock the last one is 0), and the
-/// rotation rows of a joint are converted together, column by column, as the reference does; rows
-/// that no LOD uses are dropped. Scale deltas keep their sign.
+/// If the order of the rotation axes is the same in both systems, each angle and each row of a
+/// joint group has one counterpart, and every pose of the result is the converted pose. Otherwise a
+/// rotation becomes angles of which the middle one is within 90 degrees (in gimbal lock the last
+/// one is 0), and the rotation rows of a joint are converted together, column by column, as the
+/// reference evaluator does; rows that no LOD uses are dropped. Scale deltas keep their sign.
 ///
 /// Raw controls that carry a rotation (inputs of RBF solvers, twists and swings) refer to the new
-/// axes afterwards. Networks that move joints keep their numbers; the layer names their axes.
+/// axes afterwards. The numbers of networks that move joints are not converted; their layer names
+/// the old axes.
 /// In/out: warnings  gets an entry for each field that the format cannot express in the new system
 /// Fails: kInvalidArgument (an invalid target), kInvalidValue (the file's own system is invalid, or
 ///        a joint group would not fit the format), and as validate

@@ -22,7 +22,7 @@ using core::PlanarArray;
 using core::Status;
 using Indices = std::vector<std::uint16_t>;
 
-// Looks indices up in their maps and remembers the first invalid one.
+// Tells whether an IndexMap keeps an index, and remembers the first index that is out of range.
 class Lookup {
  public:
   bool keeps(const IndexMap& map, std::size_t index, const Where& where, const char* space) {
@@ -101,7 +101,7 @@ std::vector<bool> kept_of(const IndexMap& map) {
   return keep;
 }
 
-// The entries of a list with one entry per LOD, for the kept LODs.
+// Reduces a list with one entry per LOD to the kept LODs.
 Array<std::uint16_t> cut_lods(const LodPlan& plan, const Array<std::uint16_t>& lods) {
   Indices out;
   for (const std::uint16_t lod : plan.lods) {
@@ -132,7 +132,7 @@ LodMapping cut_mapping(const LodPlan& plan, const LodMapping& mapping, const Ind
   }
   for (const std::uint16_t lod : plan.lods) {
     if (lod >= mapping.lods.size()) continue;
-    // An invalid row stays invalid: validate names it.
+    // A LOD with an invalid row gets an invalid row, so that validate reports it.
     lods.push_back(static_cast<std::uint16_t>(has_row(lod) ? row_to[mapping.lods[lod]] : 65535));
   }
   out.lods = std::move(lods);
@@ -200,8 +200,9 @@ void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& looku
   g.joint_indices = std::move(joints);
 }
 
-// Entries in order of LOD, each with an output index: the first lods[0] entries are kept, without
-// entries whose output is dropped.
+// Which entries of channels or maps remain: the first lods[0] entries, which the finest kept LOD
+// uses, except entries whose output is dropped.
+// In/out: lods  number of entries that each LOD uses, reduced to the kept LODs
 std::vector<bool> kept_entries(const LodPlan& plan, const IndexMap& map,
                                const Array<std::uint16_t>& outputs, const Where& where,
                                const char* space, Lookup& lookup, Array<std::uint16_t>& lods) {
@@ -286,7 +287,8 @@ void apply_to_targets(const LodPlan& plan, const Where& where, Lookup& lookup, M
   if (std::ranges::find(keep, false) != keep.end()) select(m.blend_shape_targets, keep);
 }
 
-// Renumbers the networks: those that a kept LOD runs, and those that operations of mlbe name.
+// Renumbers the networks. A network is kept if a kept LOD lists it or if an operation of layer mlbe
+// runs it at a kept LOD.
 void apply_to_networks(const LodPlan& plan, Lookup& lookup, Dna& dna) {
   MachineLearnedBehavior& ml = dna.machine_learned_behavior;
   std::vector<bool> keep = needed(plan, ml.lod_neural_network_mapping, ml.neural_networks.size());
@@ -321,7 +323,8 @@ void apply_to_networks(const LodPlan& plan, Lookup& lookup, Dna& dna) {
   }
 }
 
-// The rows per layer and LOD of a network operation (layer-major), reduced to the kept LODs.
+// Reduces the row table of a network operation to the kept LODs. The table has a number of rows for
+// each layer and LOD, all LODs of a layer together.
 void cut_row_table(const LodPlan& plan, std::size_t lod_count, MlOperation& op) {
   constexpr std::uint16_t kMlp = 3;
   const std::size_t table = op.parameters.empty() ? 0 : op.parameters.size() - 1;
@@ -425,7 +428,7 @@ void apply_to_extensions(const LodPlan& plan, std::size_t lod_count, Lookup& loo
 
 }  // namespace
 
-// Drops channels together with their entries.
+// Drops channels together with the entries that drive them.
 Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna) {
   Lookup lookup;
   BlendShapeChannels& s = dna.behavior.blend_shape_channels;
@@ -499,7 +502,7 @@ Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna) {
 
 }  // namespace detail
 
-// Uses a plan that keeps everything except some channels.
+// The plan keeps all LODs and drops only channels.
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   std::vector<Warning> unused;
   RISORIUS_TRY(validate(dna, unused));
@@ -557,7 +560,7 @@ core::Status check_parts(const Dna& dna, const std::vector<bool>& joints,
   return core::ok();
 }
 
-// Channels that remain: a channel is dropped if only dropped correctives drive it.
+// Which channels remain: a channel is dropped if all controls that drive it are dropped.
 std::vector<bool> kept_channels(const Dna& dna, const std::vector<bool>& controls) {
   const BlendShapeChannels& s = dna.behavior.blend_shape_channels;
   std::vector<bool> keep(dna.definition.blend_shape_channel_names.size(), true);

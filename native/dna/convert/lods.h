@@ -14,8 +14,8 @@
 
 namespace risorius::dna {
 
-/// LODs count from 0, the most detailed. max_lod is the finest LOD and therefore the smaller
-/// number.
+/// The LODs to keep. LODs count from 0, the most detailed. max_lod is the finest LOD to keep and
+/// therefore the smaller number.
 struct LodSelection {
   std::vector<std::uint16_t> lods;  // these LODs, in any order; empty: max_lod to min_lod
   std::uint16_t max_lod = 0, min_lod = 65535;
@@ -24,9 +24,9 @@ struct LodSelection {
 };
 
 /// A copy with the selected LODs only. Joints, meshes, channels, maps, networks, operations and
-/// solvers that no kept LOD uses are removed, and all indices are renumbered (design ruling 1; the
-/// reference keeps the numbers of channels, maps and networks). Joints that LOD 0 does not list are
-/// kept, as in the reference, and so are the ancestors of every kept joint, so that nothing moves.
+/// solvers that no kept LOD uses are removed, and all indices are renumbered (the reference library
+/// keeps the numbers of channels, maps and networks). Joints that LOD 0 does not list are kept, as
+/// in the reference library, and so are the ancestors of every kept joint, so that no joint moves.
 /// A selection of all LODs changes nothing.
 /// Fails: kInvalidArgument (the file has none of the selected LODs), kInvalidIndex
 core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection);
@@ -51,38 +51,40 @@ namespace detail {
 struct LodPlan {
   std::vector<std::uint16_t> lods;  // ascending, each once
   IndexMap joints, blend_shape_channels, animated_maps, meshes;
-  // New index of the first root; it gets vertices that lost all their joints.
+  // New index of the first root joint. A vertex gets it if all its joints were dropped.
   std::uint16_t root = 0;
 };
 
-/// Nullopt if the selection keeps every LOD. In: definition  one that validate accepts
+/// The plan of a selection; nullopt if it keeps every LOD. In: definition  one that validate
+/// accepts
 core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
                                                const Definition& definition,
                                                const LodSelection& selection);
 
-/// Out: [count] whether the mapping lists the element at a kept LOD
+/// Which of `count` elements the mapping lists at a kept LOD.
 std::vector<bool> needed(const LodPlan& plan, const LodMapping& mapping, std::size_t count);
 
-/// Out: keep  set to true for the networks that operations of kept LODs run
+/// Marks the networks that operations run at kept LODs. Out: keep  true for these networks
 void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehaviorExt& ext,
                                 std::vector<bool>& keep);
 
-/// The number of leading rows that the finest kept LOD uses. Out: lods and output_indices cut to
-/// the plan
+/// Reduces a joint group's lods and output_indices to the plan.
+/// Out: number of leading rows that the finest kept LOD uses; the caller cuts the values
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
 
-/// Renumbers a vertex's joints. Influences of dropped joints are removed, and the others grow to
-/// the same sum.
-/// In: joints that are in the plan. Out: number of influences left; finite is set to false if a
-///     weight overflowed
+/// Renumbers a vertex's joints. Influences of dropped joints are removed, and the other weights
+/// grow to the same sum.
+/// In: joints  [n] below the number of joints of the file
+/// Out: number of influences left; finite is set to false if a weight overflowed
 std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* joints,
                            std::size_t n, bool* finite);
 
-/// Drops the channels that the plan drops, and the entries that are not kept.
+/// Drops the channels that the plan drops, and the entries for which `entries` is false.
 core::Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna);
 
-/// Applies the plan to the whole Dna. In: cut_while_reading  cut_rows and cut_influences were
-/// called for everything already
+/// Applies the plan to the whole Dna.
+/// In: cut_while_reading  cut_rows and cut_influences were already called for all groups and
+///                        vertices
 core::Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna);
 
 }  // namespace detail

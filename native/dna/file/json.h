@@ -19,9 +19,9 @@ namespace risorius::dna {
 /// Fails: as validate.
 core::Result<std::string> to_json(const Dna& dna);
 
-/// Reads such a text. Members of an object may come in any order, each once. "signature", "size"
-/// and "offset" are ignored; any other unknown member is an error. Allocates at most about 64 times
-/// the text.
+/// Reads the output of to_json. Members of an object may come in any order, each once. "signature",
+/// "size" and "offset" are ignored; any other unknown member is an error. Allocates at most about
+/// 64 times the size of the text.
 /// Fails: kNotDna (not JSON, with the byte), kInvalidValue (a member that is missing, repeated, of
 ///        another type or out of range, with its path), kLimitExceeded, and as validate
 core::Result<Dna> from_json(std::string_view text, const Limits& limits = {});

@@ -11,7 +11,8 @@ using core::ErrorCode;
 using core::fail;
 using core::Result;
 
-// The first position that exceeds the nesting limit; found before anything is built from the text.
+// The position of the first bracket that exceeds the nesting limit. It is found before the library
+// builds any value.
 std::optional<std::size_t> find_too_deep(std::string_view text, std::size_t limit) {
   std::size_t depth = 0;
   bool in_text = false;
@@ -31,7 +32,8 @@ std::optional<std::size_t> find_too_deep(std::string_view text, std::size_t limi
   return std::nullopt;
 }
 
-// The library's exception for a number beyond float quotes the number but has no position.
+// The position of a number beyond the range of float. The library's exception quotes the number but
+// has no position, so that the quote is searched for in the text.
 std::optional<std::uint64_t> find_quoted(std::string_view text, std::string_view message) {
   const std::size_t begin = message.find('\''), end = message.rfind('\'');
   if (begin == end) return std::nullopt;
@@ -41,7 +43,7 @@ std::optional<std::uint64_t> find_quoted(std::string_view text, std::string_view
 
 Result<Json> parse_text(std::string_view text) {
   try {
-    // The library takes a zero byte as the end of the text.
+    // The library would treat a zero byte as the end of the text.
     const std::size_t zero = text.find('\0');
     if (zero != std::string_view::npos) {
       return fail(ErrorCode::kNotDna, "", "not JSON: the text has a zero byte", zero);

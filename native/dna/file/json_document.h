@@ -18,7 +18,8 @@ struct RepeatedMember {
   std::string name;
 };
 
-// An object that rejects a repeated member, because readers differ in which of the two they use.
+// An object that rejects a repeated member: JSON readers differ in whether the first or the last of
+// the two counts.
 template <class Key, class Value, class Less, class Allocator>
 struct UniqueMap : std::map<Key, Value, Less, Allocator> {
   using std::map<Key, Value, Less, Allocator>::map;
@@ -34,6 +35,7 @@ struct UniqueMap : std::map<Key, Value, Less, Allocator> {
 using Json = nlohmann::basic_json<UniqueMap, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, float>;
 
+/// Parses a JSON text.
 /// Fails: kNotDna (not JSON, with the byte), kInvalidValue (a repeated member, a number beyond
 ///        float), kLimitExceeded
 core::Result<Json> parse_document(std::string_view text, const Limits& limits);

@@ -42,7 +42,8 @@ class Reader {
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
 
   void error(const std::string& message, ErrorCode code = ErrorCode::kInvalidValue);
-  // Runs body with `json` as the object that holds the fields' members; every member must be used.
+  // Runs `body`, which reads the members of object `json`. A member that body does not read is an
+  // error.
   void object(const Json& json, FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void(const Json&)> body);
   bool has(const std::string& name) const { return object_->contains(name); }
@@ -155,7 +156,8 @@ class Reader {
  private:
   void named(Name name, FunctionRef<void(const Json&)> body);
   bool is_list(const Json& json);
-  // There are millions of numbers: their path is built only for a wrong one.
+  // Reads a list of numbers. There may be millions, so that the path of a number is only built for
+  // an error.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
     if (!is_list(json)) return;

@@ -15,13 +15,13 @@ namespace risorius::dna::detail {
 
 inline constexpr const char* kAxes3[] = {"xs", "ys", "zs"};
 inline constexpr const char* kAxes2[] = {"us", "vs"};
-/// The name of a plane of a PlanarArray.
+/// The JSON name of plane p of a list of vectors: xs, ys, zs, or us, vs.
 template <std::size_t kPlanes>
 const char* axis(std::size_t p) {
   return kPlanes == 3 ? kAxes3[p] : kAxes2[p];
 }
 
-/// The name of a member.
+/// The JSON name of a member: the field's name in camelCase, unless it has a special name.
 inline std::string json_name(const Name& name) {
   if (name.json != nullptr) return name.json;
   std::string out;
@@ -37,7 +37,7 @@ inline std::string json_name(const Name& name) {
   return out;
 }
 
-/// The name of a layer: its id and version.
+/// The JSON name of a layer: its id and version.
 inline std::string layer_name(const KnownLayer& layer) {
   return std::string(layer.id) + std::to_string(layer.version >> 16) + "." +
          std::to_string(layer.version & 0xFFFF);
@@ -55,7 +55,7 @@ inline std::string to_hex(const void* data, std::size_t size) {
   return out;
 }
 
-/// Nullopt if the text is not pairs of hex digits.
+/// Converts hex digits to bytes. Nullopt if the text is not pairs of hex digits.
 inline std::optional<std::string> from_hex(std::string_view text) {
   if (text.size() % 2 != 0) return std::nullopt;
   std::string out(text.size() / 2, '\0');

@@ -36,7 +36,8 @@ class Writer {
 
   void object(FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void()> body);
-  // Writes an array with its members on lines of their own (structs) or in one line (numbers).
+  // Writes an array. In: lines  true: each item is on a separate line, for structs; false: all
+  // items are on one line, for numbers
   template <class Items, class Each>
   void array(const Items& items, bool lines, Each each) {
     begin_array();
@@ -94,7 +95,8 @@ class Writer {
     char text[24];
     out_.append(text, std::to_chars(text, text + sizeof(text), v).ptr);
   }
-  // Signs are stored as u32, and other tools of the format print them so.
+  // Rotation signs are stored as uint32 in the file, and other tools of the format print them as
+  // such.
   void value(std::int32_t v) { value(static_cast<std::uint32_t>(v)); }
   void value(float v);
   void value(const std::string& v);
@@ -150,8 +152,8 @@ class Writer {
   bool first_ = true;
 };
 
-// Functions that every field calls are not templates, so that they are compiled once and not for
-// each of about 150 fields.
+// The following functions are called for every field. They are not templates, so that they are
+// compiled once and not for each of about 150 fields.
 void Writer::object(FunctionRef<void()> body) {
   out_ += '{';
   ++depth_;

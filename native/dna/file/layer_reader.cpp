@@ -11,7 +11,8 @@ using core::ErrorCode;
 using core::List;
 using core::PlanarArray;
 
-// The file counts each plane; the counts must agree.
+// Reads a list of vectors, which is stored as two or three planes. Each plane has a count of its
+// own, and the counts must agree.
 template <std::size_t kPlanes>
 PlanarArray<kPlanes> LayerReader::planes() {
   const std::uint64_t first = r_.position();
@@ -56,8 +57,8 @@ std::vector<bool> LayerReader::wanted(const List<T>*, const LodMapping* mapping,
   return keep;
 }
 
-// Reads a list and skips elements that no kept LOD uses: they stay empty until apply() removes
-// them.
+// Reads a list whose elements have their sizes in the file, and skips elements that no kept LOD
+// uses. Skipped elements remain empty until apply() removes them.
 template <class T>
 void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
   const std::uint64_t layer_end = r_.end();
@@ -74,7 +75,8 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     Field item(r_, name.dna, i);
     const std::uint64_t at = r_.position();
     note(at);
-    // The element may be shorter than 4 bytes.
+    // Of an element that may be skipped only the size is read, which may be shorter than 4 bytes in
+    // a cut file.
     if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));
     const std::uint32_t mark = r_.u32();
     if (r_.failed()) break;
@@ -135,8 +137,8 @@ void LayerReader::matrix(Name name, JointGroup& g) {
 
 namespace {
 
-// Reserves room for `more` values of element i of n, and extrapolates to all n elements, but never
-// beyond the bytes left in the file.
+// Makes room for `more` values of element i. The buffer grows to the size that n elements would
+// need if all were like the first i + 1, but never beyond the bytes left in the file.
 template <class T>
 void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t n,
             std::uint64_t bytes_left) {
@@ -150,7 +152,7 @@ void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t 
 
 }  // namespace
 
-// Reads a list of lists as one flat list and offsets: no allocation per face or vertex.
+// Reads the faces as one flat list of corners and offsets, which needs no allocation per face.
 void LayerReader::faces(Mesh& m) {
   Field field(r_, "faces");
   note(r_.position());
@@ -205,7 +207,8 @@ void LayerReader::skin(Mesh& m) {
   m.skin_joint_indices = std::move(joints);
 }
 
-// Cuts the influences of the vertex that was just read.
+// Removes the influences of dropped joints from the vertex that was just read. Out: number of
+// influences left
 std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     if (joints[i] < plan->joints.size() || r_.failed()) continue;
@@ -222,8 +225,9 @@ bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
   return channel >= channels.size() || channels.keeps(channel);
 }
 
-// Peeks at the channel index at the end of the target. If all lists are as long as the first, one
-// look is enough; if the channel is not wanted, the lists are skipped with their real lengths.
+// Reads ahead the channel index at the end of a blend shape target. It assumes first that all lists
+// are as long as the first one. If the channel found there is not wanted, the lists are skipped one
+// by one to the true end.
 bool LayerReader::target_is_wanted() {
   const std::uint64_t begin = r_.position();
   const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };
@@ -263,7 +267,7 @@ void LayerReader::targets(Mesh& m) {
 void LayerReader::add_place(const Place& place) { places->note(r_.where(), place); }
 
 std::optional<std::uint64_t> Places::find(std::string where) const {
-  // The index of the first element that had to be cut off the path.
+  // The index of the first list element that was removed from the end of the path.
   std::optional<std::size_t> index;
   while (!where.empty()) {
     if (const auto at = places_.find(where); at != places_.end()) {

@@ -24,8 +24,8 @@ struct Place {
   std::uint32_t plane = 0;         // numbers in each plane of a vector list; 0: no planes
 };
 
-/// Records only the fields that findings name, and the fields around them: recording all fields of
-/// a large file would take many times its size.
+/// Records the positions of the fields that findings name, and of the structs and lists that
+/// contain them. Recording all fields of a large file would take many times its size.
 class Places {
  public:
   explicit Places(std::set<std::string> fields) : fields_(std::move(fields)) {}
@@ -33,7 +33,7 @@ class Places {
     const auto at = fields_.lower_bound(where);
     if (at != fields_.end() && at->starts_with(where)) places_.insert({where, place});
   }
-  /// The position in the file of an error about `where` (a field of validate).
+  /// The byte offset in the file of the value that `where` names, in the form of validate's errors.
   std::optional<std::uint64_t> find(std::string where) const;
 
  private:

@@ -90,7 +90,7 @@ class LayerWriter {
   void element(const T& v) {
     describe(*this, v);
   }
-  // Writes a list of lists from its flat form.
+  // Writes a list of lists that is stored as one flat list and offsets.
   template <class Item>
   void rows(const core::Array<std::uint32_t>& offsets, Item item) {
     const std::size_t n = offsets.empty() ? 0 : offsets.size() - 1;

@@ -67,8 +67,8 @@ Status read_header(ByteReader& r, const Limits& limits, Dna& dna) {
   return core::ok();
 }
 
-// One pass over a file. If `findings` is set (check), a failing layer is reported and the next one
-// is read; otherwise the first error ends the pass.
+// Reads a file once. If `findings` is set, as by check(), a failing layer is reported and the next
+// one is read; otherwise the first error ends the reading.
 class Parser {
  public:
   Parser(bytes::Source& source, const ParseOptions& options, detail::Places* places,
@@ -98,7 +98,7 @@ class Parser {
  private:
   using Body = void (Parser::*)();
 
-  // Reads one layer. Out: false if reading cannot continue
+  // Reads one layer. Out: false if parsing must stop
   template <class Read>
   bool read(const char* name, std::uint64_t offset, std::uint64_t size, Read body) {
     if (r_.failed() || error_) return false;
@@ -120,7 +120,8 @@ class Parser {
     return [this, &layer] { describe(layer_, layer); };
   }
 
-  // The plan needs a valid definition.
+  // Makes the plan of the LOD selection. The definition must be valid for that, and is checked
+  // first.
   void make_plan() {
     if (options_.lods.everything() || r_.failed() || error_) return;
     std::vector<Warning> unused;
@@ -147,7 +148,8 @@ class Parser {
       for (std::uint32_t& offset : offsets) offset = r_.u32();
     }
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges{{0, r_.position()}};
-    // A section ends where the next one begins, so that unwanted sections are not read.
+    // Sections have no sizes in this version: a section ends where the next one begins. Unwanted
+    // sections are then not read.
     const auto end_of = [&](std::uint64_t begin) {
       std::uint64_t end = std::max(begin, file_end);
       for (const std::uint64_t other : offsets) {
@@ -202,8 +204,8 @@ class Parser {
   void parse_indexed() {
     read_index();
     if (r_.failed() || error_) return;
-    // desc and defn first, wherever the index lists them, because the other layers refer to them.
-    // mlbe before mlbh, because its operations tell which networks are needed.
+    // desc and defn are read first, wherever the index lists them, because the other layers refer
+    // to them. mlbe is read before mlbh, because its operations name the networks that are needed.
     dna_.descriptor.coordinate_system = {0, 0, 0};  // the values of a file without a descriptor
     const bool go_on =
         known("desc", "descriptor", true, describe_into(dna_.descriptor)) &&
@@ -317,14 +319,16 @@ class Parser {
     });
   }
 
-  // 16 bytes up to 2.7, 17 from 2.8 on, under one layer version: only the size tells.
+  // The layer has 16 bytes up to 2.7 and 17 from 2.8 on, with the same layer version: only the size
+  // tells them apart.
   void read_descriptor_ext() {
     const bool has_winding = r_.left() >= 17;
     describe(layer_, dna_.descriptor_ext);
     if (has_winding) layer_.field("face_winding_order", dna_.descriptor_ext.face_winding_order);
   }
 
-  // Layers that are not loaded still count in the control space: only their counts are read.
+  // Reads only the numbers of controls of layers that are not loaded, because these controls still
+  // take part in the numbering of controls.
   void count_unread_controls() {
     const auto names = [&](const char* id, bool loaded, std::uint32_t& count) {
       const IndexEntry* e = loaded ? nullptr : find(id);
@@ -396,7 +400,8 @@ Result<Dna> run_parser(bytes::Source& source, const ParseOptions& options, detai
   return dna;
 }
 
-// Parses the bytes again and records the positions of fields, which only an error needs.
+// Adds the byte offset to an error. The bytes are parsed again for it, because positions of fields
+// are not recorded in the first pass.
 Error with_offset(bytes::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places({error.where});
@@ -427,7 +432,8 @@ Result<Dna> parse(bytes::Source& source, const ParseOptions& options) {
   Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
   if (Status valid = detail::validate(*dna, known, dna->warnings); !valid) {
-    // With a LOD filter the field's index counts kept elements only and does not fit the file.
+    // With a LOD filter, indices in the error's field count only kept elements, so that they do not
+    // fit the file.
     if (!options.lods.everything()) return std::move(valid).propagate();
     dna = std::move(valid).propagate();  // free the first Dna before the second parse
     return core::Unexpected{with_offset(source, options, dna.error())};
@@ -450,8 +456,8 @@ std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   for (const Warning& w : dna->warnings) {
     findings.push_back({false, {ErrorCode::kInvalidValue, w.offset, w.where, w.message}});
   }
-  // A layer that could not be read is empty: errors about indices into it would only repeat the
-  // error.
+  // If a layer could not be read it is empty, and errors about indices into it would only repeat
+  // that error.
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;

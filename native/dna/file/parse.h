@@ -21,7 +21,7 @@ struct Limits {
   std::uint32_t max_nesting = 32;                    // levels of JSON
 };
 
-/// The layers to read; the rest of the file is not read. The descriptor is always read. The other
+/// The parts of the file to read; other parts are skipped. The descriptor is always read. The other
 /// layers need the definition, and rbf_behavior also needs the behavior.
 struct ParseOptions {
   bool definition = true;

@@ -65,14 +65,14 @@ std::vector<std::uint8_t> write_sections(const Dna& dna) {
   return w.take();
 }
 
-// A layer to write: a known one with its table entry, or unknown bytes.
+// A layer to write. Either `known` or `unknown` is set.
 struct PlannedLayer {
   const detail::KnownLayer* known = nullptr;
   const UnknownLayer* unknown = nullptr;
 };
 
-// The layers in the order of the source's index, then the layers of the version that the source
-// lacks.
+// The layers to write: first the layers of the source's index in its order, then the layers of the
+// target version that the source lacks.
 std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& options) {
   std::vector<PlannedLayer> plan;
   std::size_t next_unknown = 0;
@@ -95,7 +95,7 @@ std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& option
   for (const detail::KnownLayer& layer : detail::kLayers) {
     if (layer.since_minor <= options.minor) add_known(layer);
   }
-  // Non-empty layers that are neither in the source's index nor in the version.
+  // Then layers with content that neither the source's index nor the target version has.
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
     if (value == std::remove_cvref_t<decltype(value)>{} || !options.newer_layers) return;
     for (const detail::KnownLayer& layer : detail::kLayers) {
@@ -132,12 +132,12 @@ std::vector<std::uint8_t> write_indexed(const Dna& dna, const WriteOptions& opti
   return w.take();
 }
 
-// 2.1 has the layers of 2.2, though not in an index.
+// Whether a version can store a layer. 2.1 stores the layers of 2.2 too, but without an index.
 bool holds(std::uint16_t minor, const detail::KnownLayer& layer) {
   return layer.since_minor <= std::max<std::uint16_t>(minor, 2);
 }
 
-// Non-empty layers that the version does not know.
+// Ids of the layers with content that the version cannot store.
 std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   std::vector<std::string> ids;
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
@@ -149,7 +149,8 @@ std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   return ids;
 }
 
-// Warns of each layer that the version cannot hold, and tells whether its content is lost.
+// Warns of each layer that the version does not know. In: kept  true: such layers are written
+// nevertheless; false: they are left out
 void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
                     std::vector<Warning>& warnings) {
   const std::string version = "version 2." + std::to_string(options.minor);
@@ -171,6 +172,7 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
 
 // The face without the layers and controls that this version cannot store, or nullopt if the whole
 // face can be stored.
+// In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =

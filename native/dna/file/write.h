@@ -12,8 +12,8 @@ namespace risorius::dna {
 
 struct WriteOptions {
   std::uint16_t minor = 8;  // file version 2.<minor>, 1 to 8
-  /// Whether layers that the version does not know (unknown and newer ones) are written, for
-  /// readers that look for them. 2.1 has no place for them.
+  /// Whether layers that the version does not know are written too, for readers that look for them.
+  /// They are unknown layers and layers of newer versions. 2.1 has no place for them.
   bool newer_layers = true;
 };
 

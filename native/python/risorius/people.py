@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The package of the sample people: a wheel of its own, found by its entry points."""
+"""Finds the modules of the separate wheel `risorius-people`, which makes sample people."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The old name of the sample people's package, before it had its own wheel."""
+"""Keeps the old import `risorius.sample` working: passes on the names of `risorius_people`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The program `risorius`: it handles Ctrl-C before the package and NumPy are imported.
 
-The import takes half a second or more, in which Python itself would print a traceback. This is a
-package of its own because `risorius/__init__.py` imports both before any other line of it runs.
+The import takes half a second or more, and Ctrl-C during this time would print a traceback. The
+program is a separate package, because any import of `risorius` first runs its `__init__.py`, which
+imports NumPy.
 """
 
 from __future__ import annotations

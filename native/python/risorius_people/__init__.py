@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Free sample people, made from CC0 data and written as DNA files by risorius."""
+"""Builds free sample people with face rigs from CC0 data, and writes them as DNA files."""
 
 from .build import build_sample
 from .people import PEOPLE, Person

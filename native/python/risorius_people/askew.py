@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Makes faces asymmetric: adds small one-sided shapes to a finished rig.
 
-No face is symmetric. The shapes are added last, because joints are fitted to a symmetric face,
-which animators expect. The shapes move the skin by some millimetres, so joints and expressions
-still fit.
+No face is symmetric. The shapes are added after the joints are fitted, because animators expect
+the joints at mirrored places. The shapes move the skin by only some millimetres, so the joints and
+expressions still fit it.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def set_askew(dna: Dna, parts: list[Part], shape: Floats, unit: float) -> None:
     """Adds the asymmetry shape to the meshes of all LODs.
 
     Args:
-        dna: a face made of `parts`, in which vertices of coarser LODs are vertices of LOD 0;
-            changed.
+        dna: a face made of `parts`; each vertex of its other, coarser meshes has the position of a
+            vertex of LOD 0. Changed.
         parts: the meshes of the face that were made from the base mesh.
         shape: float64[V, 3], displacement of the base mesh's vertices in decimetres.
         unit: factor from decimetres to the unit of the Dna's meshes.

@@ -90,7 +90,10 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """The blend shape delta that, added before skinning, gives the displacement with the joints.
+    """The blend shape delta of an expression whose joints move as well.
+
+    The delta is added before skinning. After the joints have moved, each vertex is displaced by
+    exactly the expression's displacement.
 
     Args:
         positions: float64[v, 3], positions at rest in decimetres.
@@ -115,7 +118,7 @@ def bind_displacement(
 
 
 def euler_xyz(rotation: Floats) -> Floats:
-    """Angles about x, y, z in degrees of a matrix Rz Ry Rx for column vectors."""
+    """float64[3]: the rotations about x, y and z, in degrees, whose matrix is Rz @ Ry @ Rx."""
     return np.degrees(
         [
             np.arctan2(rotation[2, 1], rotation[2, 2]),
@@ -166,12 +169,12 @@ def add_definition(
     raw: list[str],
     channels: list[str],
 ) -> None:
-    """Fills the descriptor and the definition: names, skeleton, the lists of each LOD.
+    """Fills the layers descriptor and definition: names, the skeleton, the indices for each LOD.
 
     Args:
         dna: the face; changed.
         person: the person, with name, gender and age.
-        parts: the meshes, those of LOD 0 first.
+        parts: the meshes; LOD 0 comes first.
         joints: name of a joint -> float64[3], its position in decimetres.
         raw: names of the raw controls without their prefix.
         channels: names of the blend shape channels.
@@ -332,7 +335,8 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # CLOSED has no shape: its corrective completes joint rotations, which do not add up.
+    # The corrective of CLOSED (jaw open, lips together) has no shape here. The joint fit uses it,
+    # because the joint rotations of its controls do not add up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)

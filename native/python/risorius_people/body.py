@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The body of a person before meshes are made: positions, skin weights and expressions."""
+"""Makes the body of a person, before its meshes: positions, skin weights and expressions."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
 FLOOR = 8.168  # height of the soles in decimetres below the origin of the data
-# The neck is cut where y - NECK_SLOPE * distance from the middle equals this, on the base mesh.
+# The neck is cut where y - NECK_SLOPE * hypot(x, 0.35) equals this (base mesh, in decimetres).
 NECK_CUT = 5.36
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035  # decimetres of the upper teeth that show below the lip of an open mouth
-# Decimetres above the collar's seam: skin below the first value does not move, because it would
-# come through the shirt; skin above the second moves freely.
+# Heights above the collar's seam in decimetres: expressions do not move skin below the first
+# height, because it would come through the shirt; they fully move skin above the second.
 COVERED = (0.06, 0.4)
 REACH = 1.3  # largest |x| of head and neck: the hands are as high as the neck, but farther out
 # (name, parent) of each joint.
@@ -159,8 +159,8 @@ def skin_weights(
 ) -> Floats:
     """Skin weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
-    The jaw's weight of a vertex is the fraction of the jaw's rigid motion in its jawOpen
-    displacement.
+    A vertex's weight of the jaw joint is the vertex's displacement by jawOpen along the rigid
+    motion of the jaw joint, as a fraction of this motion.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -192,8 +192,8 @@ def skin_weights(
 class Body:
     """A person before meshes are made: positions, and the expression of each raw control.
 
-    All people have the man's skin weights. Their expressions are the man's expressions, adapted to
-    their own proportions.
+    All people have the skin weights of the default person, MAN. Their expressions are the man's
+    expressions, adapted to their proportions.
 
     Attributes:
         groups: name of a group of the base mesh -> vertex indices.
@@ -206,7 +206,7 @@ class Body:
         lip_rim: int64[n], vertices of the lower lip's rim, where the upper lip touches it.
         eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on
             the eyeballs.
-        man: body of the man; for the man this object.
+        man: body of the man, which is this object if it is the man's body.
         weights: float64[V, 9], skin weights.
     """
 
@@ -238,7 +238,7 @@ class Body:
         mouth = Mouth(base, pucker, jaw_open)
         self.positions = sealed(mouth, self.positions)
         lower = rims(mouth, mouth.operator.apply(self.positions))[1]
-        # the first vertices of the mouth are vertices of the base mesh
+        # the first `count` vertices are vertices of the base mesh; subdivision adds the others
         self.lip_rim = lower[lower < count]
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
@@ -272,7 +272,7 @@ class Body:
             self.weights = other.weights
 
     def carried(self, displacement: Floats) -> Floats:
-        """float64[V, 3]: a displacement of the data, adapted to this person's proportions.
+        """float64[V, 3]: a displacement from the CC0 data, adapted to this person's proportions.
 
         Args:
             displacement: float64[V, 3], in decimetres.
@@ -283,8 +283,8 @@ class Body:
         """The man's `closing` displacements, adapted to this person's proportions.
 
         Each is adapted together with jawOpen, because both lips share the jaw's rotation, and the
-        lips would miss each other otherwise. The quarters of the lips get shares of their adapted
-        sum, because separately adapted quarters do not add up to it.
+        lips would miss each other otherwise. The four quarters of the lips (LIPS_TOGETHER) are
+        fractions of their adapted sum, because separately adapted quarters do not add up to it.
 
         Args:
             man: body of the man, whose displacements are adapted.

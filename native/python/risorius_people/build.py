@@ -65,7 +65,7 @@ METADATA = {
 
 
 def leave_maps(dna: Dna) -> None:
-    """Keeps only the flush maps on coarse LODs, which show no wrinkles.
+    """Removes wrinkle maps from LOD 4 and coarser LODs; only the maps of flushed skin stay there.
 
     Args:
         dna: the face; changed. Its animated maps and their conditionals begin with the flush maps.
@@ -93,7 +93,9 @@ def rounded(values: Floats, step: float) -> Floats:
 
 
 def even_weights(mesh: Mesh) -> None:
-    """Rounds skin weights to multiples of 1 / 4096 with sum 1; the largest absorbs the error.
+    """Rounds skin weights to multiples of 1 / 4096.
+
+    The largest weight of each vertex absorbs the rounding errors, so that its weights sum to 1.
 
     Args:
         mesh: the mesh; changed.
@@ -110,9 +112,9 @@ def even_weights(mesh: Mesh) -> None:
 
 
 def round_numbers(dna: Dna) -> None:
-    """Rounds all numbers to small steps, so that the file compresses to two thirds of its size.
+    """Rounds coordinates, weights and motions, so that the file compresses to 2/3 of its size.
 
-    The errors are far below visible ones.
+    The rounding errors are too small to be visible.
 
     Args:
         dna: the face; meshes and joint groups are changed.
@@ -131,7 +133,7 @@ def round_numbers(dna: Dna) -> None:
     dna.meshes = meshes
     groups = list(dna.joint_groups)
     for group in groups:
-        # in centimetres; degrees are rounded to the same step
+        # the step is in centimetres for translations, and in degrees for rotations
         group.values = rounded(group.values, DELTA_STEP / 2)
     dna.joint_groups = groups
 
@@ -158,7 +160,7 @@ class Steps:
             raise SourceError("stopped")
 
     def share_of(self, begin: float, end: float) -> Progress:
-        """A progress callback for a part of the work; it is called with 0 to 1.
+        """A progress callback for a part of the work, called with the done fraction of this part.
 
         Args:
             begin: fraction of the whole work at the beginning of the part.
@@ -204,8 +206,8 @@ def joint_face(
     """Replaces most blend shapes of a face by joints, and adds coarser LODs.
 
     The joints are fitted once, on the man; for every other person only the joints' motions are
-    fitted, with the joints at the same vertices. The joints of RIG are part of the package; others
-    are fitted here and kept in the user's cache.
+    fitted, with the joints at the same vertices. The package contains the man's joints for the
+    options RIG; for other options they are fitted here once and stored in the user's cache.
 
     Args:
         dna: the blend shape face.
@@ -297,7 +299,7 @@ def _assemble(making: _Making) -> None:
 
 
 def _begin_painting(making: _Making) -> None:
-    """Starts to paint textures and grow hair in a thread; native fits release the GIL meanwhile.
+    """Starts to paint textures and grow hair in a thread, parallel to fits, which release the GIL.
 
     If the build stops, the thread still runs to its end, and its result is dropped.
     """
@@ -310,7 +312,7 @@ def _begin_painting(making: _Making) -> None:
 def _paint(making: _Making) -> _Painted:
     """Paints textures and grows hair; it only reads the assembled face."""
     person, parts, size = making.person, making.parts, making.texture_size
-    # hair grows at the same vertices of all heads, chosen on the man's
+    # the vertices where hair grows are chosen on the man's head, and are the same for all people
     even = making.body.man.positions
     own = making.body.moved(making.asymmetry)
     units = making.body.man.units

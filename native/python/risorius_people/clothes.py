@@ -2,7 +2,7 @@
 """Makes a shirt that covers neck and shoulders: cut from the base mesh's tights, with a collar.
 
 The tights fit every body of the data. New vertices are affine combinations of vertices of the
-tights. Lengths are in decimetres, positions on the base mesh.
+tights. Lengths are in decimetres. Constants such as heights refer to the base mesh.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, edges
 from .source import BaseMesh
 
 GROUP = "helper-tights"
-# Height of the collar at x = z = 0, its drop per decimetre to the front, and its rise per squared
-# distance to the side.
+# Height y of the collar's seam at x = z = 0, its drop per decimetre of z (to the front), and its
+# rise per square decimetre of x^2 (to the side).
 COLLAR = 5.66
 COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3
@@ -45,7 +45,7 @@ def collar_heights(positions: Floats) -> Floats:
 
 
 def rings(polygons: Polygons) -> list[list[int]]:
-    """The borders of a mesh, each as vertices in the order of the faces along it.
+    """The border loops of a mesh, each as vertices in the direction of its faces' edges.
 
     Args:
         polygons: a mesh whose faces all have the same winding.
@@ -110,7 +110,7 @@ def unrolled(positions: Floats) -> Floats:
 
 
 def spread(vertices: list[int], most: int) -> list[int]:
-    """About `most` of the vertices, evenly spaced; few vertices keep operators sparse.
+    """About `most` of the vertices, evenly spaced; few keep the matrix of an Operator sparse.
 
     Args:
         vertices: vertices in their order on the ring.
@@ -120,19 +120,23 @@ def spread(vertices: list[int], most: int) -> list[int]:
 
 
 def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
-    """Widens the shirt, and adds collar and turned-in hems; returns faces and operator.
+    """Widens the shirt, and adds collar and turned-in hems.
+
+    Returns the faces, and the operator that computes all vertices of the shirt from the vertices of
+    the cut tights.
 
     Args:
-        polygons: the cut tights, on whose vertices the operator works.
-        positions: float64[v, 3], in decimetres.
+        polygons: the cut tights.
+        positions: float64[v, 3], their vertices in decimetres.
     """
     count = polygons.vertex_count
     faces = [list(face) for face in polygons.faces]
     rows: list[tuple[int, int, float]] = []
     trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
-    # Each vertex moves away from the mean of the trunk's vertices, because this is linear. The
-    # middle at the vertex's height would need a division and looks much the same.
+    # Each vertex moves away from the mean of the trunk's vertices, because this motion is linear in
+    # the positions. The trunk's middle at the height of the vertex would need a division, which is
+    # not linear, and looks much the same.
     for i in range(count):
         rows.append((i, i, 1 + ROOM))
         rows += [(i, j, -ROOM * near) for j in trunk]

@@ -81,7 +81,7 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Controls of both lips and of the teeth; {v} is replaced by U or D.
+# Controls of lips and teeth; {v} is replaced by U (upper) or D (lower), {s} by the side.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
@@ -99,11 +99,11 @@ LIPS_MIDDLE = [
     ("CTRL_C_teeth{v}.tx", "teethLeft{v}", "teethRight{v}"),
     ("CTRL_C_teeth_fwdBack{v}.ty", "teethFwd{v}", "teethBack{v}"),
 ]
-# (GUI control, raw controls that follow one another as it goes from 0 to 1): those of STICKY stay
-# on, those of SWALLOW go off again.
+# STICKY and SWALLOW: (GUI control, raw controls that rise one after the other while the GUI control
+# goes from 0 to 1). The raw controls of STICKY stay at 1; the ones of SWALLOW fall back to 0.
 STICKY = ("CTRL_{s}_mouth_lipSticky.ty", [f"mouthLipsSticky{{s}}Ph{n}" for n in (1, 2, 3)])
 SWALLOW = ("CTRL_C_neck_swallow.ty", [f"neckSwallowPh{n}" for n in (1, 2, 3, 4)])
-# (from, to, slope, cut) of a conditional.
+# (from, to, slope, cut): for an input from `from` to `to`, the output is slope * input + cut.
 Range = tuple[float, float, float, float]
 
 
@@ -145,7 +145,7 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise and lower raw controls: each starts where the last one peaks."""
+    """Conditionals that raise and lower raw controls: each starts where the one before peaks."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

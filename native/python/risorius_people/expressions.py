@@ -16,7 +16,7 @@ from .further import find_places, further_units, unit_shape
 from .polygons import Floats, Ints
 from .source import BaseMesh, Source
 
-# decimetres: heights of the cheek's ball and of the roll at the laugh line
+# decimetres: largest displacement of the ball of the cheek and of the skin roll at the laugh line
 _CHEEK_BALL, _ROLL = 0.032, 0.022
 PREFIX = "CTRL_expressions."
 LIPS_TOGETHER = [f"mouthLipsTogether{lip}{side}" for lip in "UD" for side in "LR"]
@@ -29,7 +29,7 @@ class Expression:
     """The motion of a raw control at 1, and the part of it that joints perform."""
 
     displacement: Floats  # [V, 3], decimetres: the whole motion, including that of the joints
-    # joint -> (rotation [3, 3], translation [3])
+    # joint -> (rotation [3, 3], translation [3] in decimetres)
     joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
 
@@ -42,9 +42,8 @@ def side_masks(positions: Floats) -> dict[str, Floats]:
 def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
     """float64[V] by "U" and "D": weights of upper and lower lip with sum 1.
 
-    Vertices that jawOpen moves are of the lower lip.
-
-    The lips touch, so their positions cannot distinguish them; the jaw's motion can.
+    The lips touch, so their positions cannot distinguish them. The lower lip consists of the
+    vertices that jawOpen moves.
     """
     travel = np.linalg.norm(jaw_open, axis=1)
     lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
@@ -52,7 +51,7 @@ def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
 
 
 def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
-    """Divides the 52 ARKit units over the raw controls of their rows in arkit.toml.
+    """Splits the shape of each ARKit unit among the raw controls that arkit.toml lists for it.
 
     Args:
         source: the data with the units.
@@ -84,7 +83,7 @@ def extra_units(
     Args:
         source: the data with the targets.
         positions: float64[V, 3] in decimetres, which distinguish left from right.
-        origin: origin of the data -> its share in the person; the sum is 1.
+        origin: one of ORIGINS (parts of the world) -> its share in the person; the sum is 1.
     """
     sides = side_masks(positions)
 
@@ -125,7 +124,7 @@ def add_further_units(
         base: the base mesh.
         groups: name of a group of the base mesh -> vertex indices.
         positions: float64[V, 3], in decimetres.
-        origin: origin of the data -> its share in the person; the sum is 1.
+        origin: one of ORIGINS (parts of the world) -> its share in the person; the sum is 1.
 
     Returns:
         Correctives: two raw controls -> float64[V, 3].
@@ -185,9 +184,10 @@ def add_joint_motion(
 
 
 def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
-    """float64[V, 3]: the displacement of a cheek that a true smile pushes up over the laugh line.
+    """float64[V, 3]: the displacement that bulges a cheek in a true smile.
 
-    It ends at the laugh line, where the skin folds in. Teeth do not move.
+    The bulge ends at the laugh line, where the skin folds in. Vertices that the smile's controls do
+    not move stay, such as the teeth.
 
     Args:
         units: raw control -> expression.
@@ -217,7 +217,9 @@ def leave_bones(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Moves teeth and eyeballs by their joints alone, so that they stay rigid; pupils may change.
+    """Moves teeth and eyeballs by their joints alone, so that they stay rigid.
+
+    The pupil controls are excepted: they keep their displacements of the eyeballs.
 
     Args:
         out: raw control -> expression with its joints; displacements are changed.
@@ -248,14 +250,14 @@ def leave_bones(
 def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
     """Removes the displacements that close the lips of an open jaw, and returns them.
 
-    Returns ("jawOpen", control of a lip's quarter) -> float64[V, 3].
+    Returns ("jawOpen", one of LIPS_TOGETHER) -> float64[V, 3].
 
-    The data's shape undoes the opening of the jaw. With a shut jaw it would lift the lower lip far
-    over the upper one; therefore the controls alone do nothing, and the displacement becomes a
-    corrective.
+    The data's shape assumes an open jaw. If the jaw is shut, the shape would lift the lower lip
+    far over the upper one. Therefore the controls alone move nothing, and their displacements
+    become correctives for the open jaw.
 
     Args:
-        out: raw control -> expression; displacements of the quarters become 0.
+        out: raw control -> expression; the displacements of LIPS_TOGETHER become 0.
     """
     result: dict[tuple[str, str], Floats] = {}
     for name in LIPS_TOGETHER:
@@ -267,7 +269,7 @@ def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
 def corrective_displacements(
     out: dict[str, Expression], places: Floats
 ) -> dict[tuple[str, str], Floats]:
-    """Displacements to add if two controls are active; (a, b) has the weight a * b.
+    """Correctives: two raw controls -> displacement, whose weight is the product of both controls.
 
     Args:
         out: raw control -> expression.

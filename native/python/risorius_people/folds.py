@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The laugh line, along which a smile folds the cheek over the lip. Lengths are in decimetres."""
+"""Locates the laugh line, along which a smile folds the cheek over the lip.
+
+Lengths are in decimetres.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ _ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # and distance from the middle of t
 
 
 def from_laugh_line(places: Floats) -> tuple[Floats, Floats]:
-    """Distance from the laugh line, which goes from the wing of the nose past the mouth.
+    """Distance from the laugh line, which runs from the wing of the nose past the mouth.
 
     Args:
         places: float64[..., 3] on the man's head, relative to the point between his eyes.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A mesh of a sample person at one LOD, with its operators from the base mesh."""
+"""Defines a mesh of a sample person at one LOD, computed from the vertices of the base mesh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .polygons import Floats, Operator, Polygons
 
 @dataclass
 class Part:
-    """One mesh at one LOD; `carry` converts values of the base mesh's vertices to its vertices."""
+    """A mesh at one LOD; `carry` converts values of base mesh vertices to vertices of this mesh."""
 
     name: str
     polygons: Polygons

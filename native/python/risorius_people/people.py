@@ -17,7 +17,8 @@ from risorius.base.given import GivenError, finite, shown
 Colour = tuple[float, float, float]
 ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)  # youngest and oldest age
-# (years, age of the data): at these years a face has only the shapes of this age.
+# (age in years, age group of the data): at this age a face has only the shapes of this group, and
+# between two ages a mix of both groups.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
 HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
 BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
@@ -37,7 +38,7 @@ _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 @dataclass(frozen=True)
 class Person:
-    """The definition of a sample person. Colours are sRGB in [0, 1]; see cast.toml for the keys."""
+    """The definition of a sample person; cast.toml explains it. Colours are sRGB in [0, 1]."""
 
     name: str
     gender: str

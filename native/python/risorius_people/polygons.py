@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Changes of polygon meshes as linear operators, for positions and displacements alike."""
+"""Cuts and subdivides polygon meshes, by linear operators for positions and displacements."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons,
     Args:
         mesh: the mesh; not changed.
         heights: float64[V], height of each vertex above the plane.
-        level: height of the cut.
+        level: height at which the mesh is cut.
 
     Returns:
         The part that is left, with renumbered vertices, and the operator from old to new vertices.

@@ -73,7 +73,7 @@ class Proportions:
 
 
 def affine_form(faces: list[list[int]], before: Floats, after: Floats) -> Floats:
-    """The affine map [3, 3] that fits the change of a whole mesh best, without its shift.
+    """The linear map [3, 3] that best fits the change of form of a whole mesh; shifts are ignored.
 
     Args:
         faces: the vertices of each polygon.
@@ -84,8 +84,11 @@ def affine_form(faces: list[list[int]], before: Floats, after: Floats) -> Floats
 
 
 def _edge_sums(faces: list[list[int]], before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex (a before, b
-    after), and over the vertex's normal, scaled to the length of an edge."""
+    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex.
+
+    a is an edge before and b after the change of form. The vertex's normal, scaled to the length of
+    an edge, is added like an edge. The first sum times the inverse of the second is the change.
+    """
     start = np.concatenate(faces)
     end = np.concatenate([face[1:] + face[:1] for face in faces])
     mixed = np.zeros((len(before), 3, 3))

@@ -39,7 +39,7 @@ class SourceError(RisoriusError, RuntimeError):
 
 
 def downloads() -> Path:
-    """The folder of the wheel and of files made from it: RISORIUS_CACHE, or the user's cache."""
+    """The folder of the wheel and of cached files: $RISORIUS_CACHE, or the user's cache."""
     given = os.environ.get("RISORIUS_CACHE")
     return Path(given) if given is not None else cache_folder()
 
@@ -145,7 +145,7 @@ def _runs(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _largest_in(folder: Path) -> int:
-    """Bytes of the largest file below a folder, because pip's copies would count twice."""
+    """Bytes of the largest file below a folder; a sum would count pip's copies twice."""
     largest = 0
     for path in folder.rglob("*"):
         with suppress(OSError):  # pip may have moved the file meanwhile
@@ -210,7 +210,8 @@ class Source:
         """float64[V, 3]: displacement of a shape of the body, in decimetres.
 
         Args:
-            name: folder and name; if the name has no l- or r-, both sides are added.
+            name: folder and name of the shape. If only shapes with the prefixes l- and r- have this
+                name, both are added.
             vertex_count: number of vertices V.
 
         Raises:

@@ -116,7 +116,7 @@ class Surface:
         size = np.linalg.det(edges)
         flat = np.abs(size) < 1e-12
         edges[flat] = np.eye(2)
-        # Map from the triangle's plane to the texture.
+        # to_uv maps directions in the triangle's plane to directions in the texture.
         self.back = np.linalg.inv(self.rest)
         self.to_uv = edges @ self.back
 
@@ -205,7 +205,8 @@ def folds_of_sides(
         moves: side -> float64[V, 3], displacement by that side's control.
     """
     both = surface.folds(positions + sum(moves.values()))
-    # Smoothed as widely as the folds; otherwise still skin amid moving skin would get no folds.
+    # The displacements are smoothed as widely as the folds. Otherwise skin that stays still between
+    # moving skin would get no folds.
     far = {
         side: surface.evened(np.linalg.norm(move, axis=1), _ROUNDS + 1)
         for side, move in moves.items()

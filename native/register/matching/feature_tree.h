@@ -8,11 +8,12 @@
 
 namespace risorius::registering::steps {
 
-/// Position, normal and bending of a point, each multiplied by its weight.
+/// Size of a feature: position, normal and bending of a point, three numbers each, multiplied by
+/// the weight of its kind.
 inline constexpr std::size_t kFeatures = 9;
 using Feature = std::array<float, kFeatures>;
 
-/// A k-d tree of features.
+/// A k-d tree that finds the nearest of many features.
 class FeatureTree {
  public:
   explicit FeatureTree(std::vector<Feature> features);

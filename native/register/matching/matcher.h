@@ -11,14 +11,15 @@
 
 namespace risorius::registering::steps {
 
-/// The target with samples and borders, in millimetres.
+/// The target surface, its borders, and points sampled on it, in millimetres.
 struct Target {
   Form form;
   std::vector<std::uint8_t> borders;  // the result of border_edges
   Samples samples;
 };
 
-/// Properties of the template at its start, which stay constant while its vertices move.
+/// Properties of the template's vertices at the start of the registration. They stay constant while
+/// the vertices move.
 struct Looks {
   std::vector<Bend> bends;           // [V]
   std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
@@ -27,7 +28,7 @@ struct Looks {
   std::vector<RimEdge> rim;          // the edges of that border
 };
 
-/// Weights of a search by features.
+/// Weights of the search for the nearest feature.
 struct Counting {
   double normal = 10.0;    // mm that a difference of 1 of the normals counts
   double bend = 40.0;      // mm that a difference of 1 of the bends counts
@@ -41,10 +42,11 @@ class Matcher {
   /// Keeps references to target and looks.
   Matcher(const Target& target, const Looks& looks, std::size_t threads);
 
-  /// [V] matches with samples of the target, nearest by position, normal and bending.
+  /// [V] matches with the target's samples that are nearest by position, normal and bending.
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The closest point of the target's triangles with a similar normal.
+  /// The closest point to a vertex on the target's triangles with a similar normal; triangle -1:
+  /// none.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();
@@ -55,9 +57,11 @@ class Matcher {
   };
   std::vector<Closest> closest(const Points& points, const Points& normals, double farthest,
                                double least_cosine) const;
-  /// Whether a vertex in a cavity is within 2 mm of the target, with a cosine of normals above 0.8.
+  /// Whether a vertex in a cavity of the template has a counterpart on the target: `found` is
+  /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
-  /// [V] matches with closest points. In: robust  mm, distance at which the weight is a quarter
+  /// [V] matches with the closest points of the target. In: robust  mm, distance at which the
+  /// weight of a match is a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

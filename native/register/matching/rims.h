@@ -13,10 +13,10 @@ struct RimEdge {
   double loop = 0.0;  // mm, total length of the edges that are connected with it
 };
 
-/// In: borders  the result of border_edges
+/// Lists the border edges of a surface. In: borders  the result of border_edges
 std::vector<RimEdge> rim_edges(const Form& form, const std::vector<std::uint8_t>& borders);
 
-/// The borders of a target, for matches with borders of a template.
+/// The borders of the target, to be matched with the borders of the template.
 class Rims {
  public:
   explicit Rims(const Form& target, const std::vector<std::uint8_t>& borders);

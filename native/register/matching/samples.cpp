@@ -12,7 +12,7 @@ namespace risorius::registering::steps {
 
 namespace {
 
-/// Samples sorted into the cubes of a grid.
+/// Samples sorted into cubes of a grid, so that a search visits only nearby samples.
 class Grid {
  public:
   Grid(const Points& points, double side) : side_(side) {
@@ -33,7 +33,7 @@ class Grid {
     for (std::uint32_t i = 0; i < points.size(); ++i) order_[next[cube(points[i])]++] = i;
   }
 
-  /// Calls visit(index) for all samples that may be within a radius, and for some beyond it.
+  /// Calls visit(index) for all samples within a radius of p, and for some beyond it.
   template <class Visit>
   void around(const Vec3& p, double radius, const Visit& visit) const {
     if (order_.empty()) return;
@@ -152,7 +152,8 @@ Samples sample(const Form& form, const std::vector<std::uint8_t>& borders, std::
   for (std::size_t i = 0; i < areas.size(); ++i) {
     const Triangle& t = form.triangles[i];
     for (open += areas[i] / each; open >= 1; open -= 1) {
-      // Roberts' sequence for two dimensions, folded into a triangle.
+      // Points of Roberts' sequence are evenly spread in a square. Points beyond its diagonal are
+      // reflected into the triangle.
       ++number;
       double u = std::fmod(static_cast<double>(number) * 0.7548776662466927, 1.0);
       double v = std::fmod(static_cast<double>(number) * 0.5698402909980532, 1.0);

@@ -8,8 +8,8 @@
 
 namespace risorius::registering::steps {
 
-/// Height of the mean of the surface within each of kRadii above a point, along the point's normal,
-/// divided by the radius: below 0 on a ridge, above 0 in a groove.
+/// The mean height of the surface within each of kRadii around a point, measured along the point's
+/// normal and divided by the radius: below 0 on a ridge, above 0 in a groove.
 using Bend = std::array<double, 3>;
 inline constexpr std::array<double, 3> kRadii{6.0, 12.0, 24.0};  // mm
 
@@ -22,9 +22,9 @@ struct Samples {
 
 /// Unit normals of vertices, weighted by the angles of their triangles; 0 without triangles.
 Points vertex_normals(const Points& points, const std::vector<Triangle>& triangles);
-/// [T] bit k: the edge from corner k to the next belongs to no other triangle.
+/// [T] bit k is set if no other triangle has the edge from corner k to the next one.
 std::vector<std::uint8_t> border_edges(const std::vector<Triangle>& triangles);
-/// About `count` evenly spread points; their bends are left empty.
+/// About `count` points, evenly spread over the surface. Their `bends` are not computed.
 Samples sample(const Form& form, const std::vector<std::uint8_t>& borders, std::size_t count);
 /// The bending of the surface `around` at points. In: normals  of `points`, length 1
 std::vector<Bend> bends(const Points& points, const Points& normals, const Samples& around,

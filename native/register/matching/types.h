@@ -26,13 +26,14 @@ struct Match {
   double weight = 0.0;         // in the direction of the normal
   double along = 1.0;          // weight across the normal, in shares of `weight`
 
-  /// weight (n n' + along (1 - n n')) x
+  /// The matrix of the match's weights times x: weight (n n' + along (1 - n n')) x, with the normal
+  /// n.
   Vec3 pulled(const Vec3& x) const {
     return weight * (along * x + (1 - along) * normal * normal.dot(x));
   }
 };
 
-/// A pair in millimetres.
+/// A vertex of the template and its point on the target, in millimetres.
 struct Landmark {
   std::uint32_t vertex = 0;
   Vec3 point = Vec3::Zero();

@@ -19,7 +19,8 @@ constexpr double kBound = 0.1;    // stiffness between the affine parts of neigh
 constexpr double kAtRest = 1e-4;  // weight of a node's current motion, for nodes without matches
 constexpr int kConjugate = 25;    // largest number of rounds
 
-/// A match with a smaller weight along the surface.
+/// A match of a vertex that is weaker along the surface than across it. It pulls only at the
+/// vertex's node.
 struct Drawn {
   std::uint32_t node;
   Row4 row;
@@ -46,10 +47,13 @@ struct Coarse::Impl {
     const Vec3 away = p - at(node);
     return {1.0, away[0], away[1], away[2]};
   }
-  /// Adds the stiffness to the diagonal block of every node and to the blocks of node pairs.
+  /// Adds the stiffness between neighbouring nodes.
+  /// Out: own      the diagonal block of each node
+  ///      between  entries of the blocks of two nodes, below the diagonal
   void add_stiffness(double stiffness, std::vector<Block>& own,
                      std::vector<Eigen::Triplet<double>>& between) const;
-  /// Adds a small weight for the current motion, so that nodes without matches are determined.
+  /// Adds a small weight for the current motion, so that the system also determines nodes without
+  /// matches.
   void hold(std::vector<Block>& own, Eigen::MatrixX3d& right) const;
   bool factorize(const std::vector<Block>& own, std::vector<Eigen::Triplet<double>>& entries);
 };
@@ -82,7 +86,8 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
   for (std::size_t e = 0; e < nodes.edges.size(); ++e) {
     const std::uint32_t a = nodes.edges[e][0], b = nodes.edges[e][1];
     const double weight = stiffness * stiff[e];
-    // Each node predicts the position of the other one.
+    // The motion of each node, applied to the other node's position, should give that node's own
+    // motion.
     const Row4 here = row(a, at(b)), there = row(b, at(a)), place(1, 0, 0, 0);
     Block cross = -weight * (here * place.transpose() + place * there.transpose());
     own[a] += weight * (here * here.transpose() + place * place.transpose());
@@ -93,7 +98,8 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
       own[b](k, k) += bound;
       cross(k, k) -= bound;
     }
-    // Lower triangle: rows of the later node.
+    // Only entries below the diagonal are stored: their rows belong to the node with the higher
+    // number, their columns to the other node.
     for (int i = 0; i < 4; ++i) {
       for (int j = 0; j < 4; ++j) {
         between.emplace_back(static_cast<int>(4 * b) + i, static_cast<int>(4 * a) + j, cross(j, i));

@@ -10,7 +10,7 @@ namespace risorius::registering::steps {
 
 class Coarse {
  public:
-  /// Keeps references to both. In: rest  [V] positions at the beginning, in millimetres
+  /// Keeps references to the arguments. In: rest  [V] positions at the beginning, in millimetres
   Coarse(const Nodes& nodes, const Points& rest);
   ~Coarse();
 
@@ -18,7 +18,8 @@ class Coarse {
     double stiffness = 1.0;  // of the nodes, against the sum of the matches of a cell
     double landmarks = 1.0;  // weight of a pair, against the same sum
   };
-  /// Solves for motions that bring vertices near their matches. False: there is no solution.
+  /// Solves for motions of the nodes that bring vertices near their matches. False: the system has
+  /// no solution.
   /// In: matches  [V]
   bool solve(const std::vector<Match>& matches, const std::vector<Landmark>& landmarks, Pull pull);
   /// [V] positions of the vertices after the motions.

@@ -6,7 +6,8 @@
 
 namespace risorius::registering::steps {
 
-/// Solves apply(x) = right. Both matrices are symmetric positive definite.
+/// Solves apply(x) = right by conjugate gradients. The matrix and the preconditioner are symmetric
+/// positive definite.
 /// In: apply    the product of the matrix and x
 ///     nearly   the preconditioner: solves a similar system
 ///     x        a guess; becomes the solution

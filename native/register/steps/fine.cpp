@@ -16,7 +16,8 @@ constexpr double kStretch = 0.02;  // of the stiffness: weight of differences be
 constexpr int kSlides = 12;        // largest number of rounds of conjugate gradients
 constexpr double kHold = 1e-6;     // weight of motion 0, for vertices without matches
 
-/// Rows of the difference between a value and the mean of its neighbours, weighted by 1 / distance.
+/// [V, V] matrix; its product with values of vertices is each value minus the mean of its
+/// neighbours' values. In the mean, neighbours have the weight 1 / distance in `base`.
 Sparse differences(const Graph& graph, const Points& base) {
   std::vector<Eigen::Triplet<double>> entries;
   for (std::uint32_t v = 0; v < graph.size(); ++v) {
@@ -39,7 +40,8 @@ Sparse differences(const Graph& graph, const Points& base) {
   return out;
 }
 
-/// [V, V] rows: the sum of the differences between a value and each of its neighbours' values.
+/// [V, V] matrix; its product with values of vertices is, for each vertex, the sum of the
+/// differences from its neighbours' values.
 Sparse stretches(const Graph& graph) {
   std::vector<Eigen::Triplet<double>> entries;
   for (std::uint32_t v = 0; v < graph.size(); ++v) {

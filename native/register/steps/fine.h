@@ -10,11 +10,11 @@ namespace risorius::registering::steps {
 
 class Fine {
  public:
-  /// In: base  [V] result of the coarse steps; the reference is kept
+  /// Keeps a reference to base. In: base  [V] positions from the coarse steps
   Fine(const Graph& graph, const Points& base);
   ~Fine();
 
-  /// Moves the vertices near their matches. False: the system has no solution.
+  /// Moves the vertices towards their matches. False: the system has no solution.
   /// In: stiffness  weight of the bending of the motions, against a match of weight 1
   bool solve(const std::vector<Match>& matches, double stiffness);
   const Points& points() const;

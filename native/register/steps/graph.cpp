@@ -17,7 +17,8 @@ constexpr double kReach = 2.2;  // radius in which a node moves vertices, in spa
 using Open = std::pair<double, std::uint32_t>;
 using Queue = std::priority_queue<Open, std::vector<Open>, std::greater<>>;
 
-/// Lengths of edges that are increased in dense regions, so that these get more nodes.
+/// Lengths of edges for the distance between nodes. Short edges count as longer than they are, so
+/// that dense regions get more nodes.
 class Metric {
  public:
   Metric(const Graph& graph, const Points& points) : points_(points) {
@@ -40,7 +41,8 @@ class Metric {
   double mean_ = 1.0;
 };
 
-/// Makes vertex `from` a node: updates `distance` and `cell` of the vertices nearest to it.
+/// Makes vertex `from` a node. Updates `distance` and `cell` of the vertices to which it is the
+/// nearest node.
 void grow(const Graph& graph, const Metric& metric, std::uint32_t from, std::uint32_t node,
           std::vector<double>& distance, std::vector<std::uint32_t>& cell) {
   Queue open;
@@ -72,7 +74,8 @@ std::vector<std::array<std::uint32_t, 2>> touching(const Graph& graph,
   return {found.begin(), found.end()};
 }
 
-/// Sets carriers with weights that fall off smoothly with the distance along the surface.
+/// Sets each vertex's carriers: the nodes within `reach` along the surface, with weights that fall
+/// off smoothly with the distance.
 void carry(const Graph& graph, const Metric& metric, double reach, Nodes& nodes) {
   nodes.carriers.assign(graph.size(), {});
   std::vector<double> distance(graph.size(), kFar);
@@ -140,7 +143,8 @@ Nodes spread(const Graph& graph, const Points& points, std::size_t count) {
   Nodes nodes;
   nodes.cell.assign(vertices, 0);
   std::vector<double> distance(vertices, kFar);
-  // The farthest vertex is the next node. Outdated distances in the heap are too large.
+  // The vertex that is farthest from all nodes is the next node. Distances in the heap may be
+  // outdated and too large; they are then replaced.
   std::priority_queue<Open> farthest;
   for (std::uint32_t v = 0; v < vertices; ++v) farthest.emplace(kFar, v);
   double spacing = 0;

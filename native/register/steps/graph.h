@@ -9,7 +9,8 @@
 
 namespace risorius::registering::steps {
 
-/// The neighbours of each vertex, without those of coinciding or unused vertices.
+/// The neighbours of each vertex along the edges of triangles. A vertex without triangles has none,
+/// such as the second of two coinciding vertices.
 class Graph {
  public:
   Graph(std::size_t vertices, const std::vector<Triangle>& triangles);
@@ -23,7 +24,7 @@ class Graph {
   std::vector<std::uint32_t> next_;
 };
 
-/// Nodes spread over a surface, denser in regions with dense vertices.
+/// Nodes spread over a surface. Regions with dense vertices have more nodes.
 struct Nodes {
   std::vector<std::uint32_t> vertices;              // [N]
   std::vector<std::uint32_t> cell;                  // [V] the nearest node along the surface
@@ -32,7 +33,8 @@ struct Nodes {
   std::vector<std::vector<std::pair<std::uint32_t, float>>> carriers;
 };
 
-/// In: count  number of nodes; each connected piece of the surface gets at least one
+/// Chooses nodes and their carriers. In: count  number of nodes; each connected piece of the
+/// surface gets at least one
 Nodes spread(const Graph& graph, const Points& points, std::size_t count);
 
 }  // namespace risorius::registering::steps

@@ -107,7 +107,9 @@ core::Status check_options(const RegisterOptions& options) {
   return core::ok();
 }
 
-/// The least-squares similarity between weighted points (Umeyama 1991). False: points on a line.
+/// The least-squares similarity transform between weighted points (Umeyama 1991). False: the points
+/// lie on a line.
+/// Out: turn, shift  p becomes turn * p + shift; turn contains the scale
 bool similarity(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
                 const std::vector<double>& weights, Eigen::Matrix3d& turn, Vec3& shift) {
   Vec3 middle = Vec3::Zero(), there = Vec3::Zero();
@@ -136,7 +138,8 @@ bool similarity(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
 
 Vec3 vec(const Vector3& p) { return {p[0], p[1], p[2]}; }
 
-/// The triangles with one index per position, so that a texture seam is not a border.
+/// The triangles with only one vertex index for each position, so that a texture seam is not a
+/// border.
 std::vector<Triangle> welded(const Mesh& mesh) {
   std::vector<std::uint32_t> order(mesh.points.size()), first(mesh.points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -152,13 +155,14 @@ std::vector<Triangle> welded(const Mesh& mesh) {
   return out;
 }
 
-/// The share of rays into the half space above a vertex that do not hit its own surface.
+/// The share of rays into the half space above a vertex that the surface itself does not block.
+/// In: own  the surface
 double openness(const author::detail::Nearest& own, const Vec3& point, const Vec3& normal) {
   if (normal.squaredNorm() < 0.5) return 1.0;
   const Vec3 side = normal.unitOrthogonal(), other = normal.cross(side);
   int open = 0;
   for (int i = 0; i < kRays; ++i) {
-    // A spiral of directions, denser near the normal.
+    // The directions lie on a spiral and are denser near the normal.
     const double share = (i + 0.5) / kRays, radius = std::sqrt(share), turn = 2.399963 * i;
     const Vec3 way =
         radius * (std::cos(turn) * side + std::sin(turn) * other) + std::sqrt(1 - share) * normal;

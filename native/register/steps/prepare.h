@@ -6,7 +6,8 @@
 
 namespace risorius::registering::steps {
 
-/// Converts from the target's unit to millimetres of the template, and back.
+/// Converts positions between the target's unit and millimetres. In millimetres, the target has the
+/// size of the template.
 struct Scale {
   Vec3 origin = Vec3::Zero();
   double mm = 1.0;  // mm per unit of the target
@@ -24,15 +25,18 @@ core::Status check(const Mesh& templ, const Mesh& target, const std::vector<Pair
 /// their points. Outliers among the pairs have little weight.
 /// Fails: kInvalidArgument (pairs that lie on a line)
 core::Result<std::vector<Vector3>> aligned(const Mesh& templ, const std::vector<Pair>& pairs);
-/// The scale of the target, from the sizes of the template and the start.
+/// The scale of the target: the template's size in mm, divided by the size of the start in the
+/// target's unit.
 /// Fails: kInvalidArgument (a template outside 10 mm to 100 m, or a start of size 0)
 core::Result<Scale> scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm);
 /// The triangles of the target within 60 mm of the box around the start, without triangles of area
 /// 0. Fails: kInvalidArgument (too few triangles)
-/// Out: whole  for each triangle its index in the whole target
+/// Out: whole  for each of these triangles its index in `target`
 core::Result<Target> near_target(const Mesh& target, const Points& start, const Scale& scale,
                                  std::size_t threads, std::vector<std::int32_t>& whole);
+/// Computes the properties of the template's vertices.
 /// In: start    the template in millimetres
+///     trusted  as in RegisterOptions
 ///     spacing  mm between samples, as of the target's samples
 Looks looks_of(const Form& start, const std::vector<std::uint8_t>& trusted, double spacing,
                std::size_t threads);

@@ -18,7 +18,8 @@ using steps::Points;
 
 namespace {
 
-/// Settings of a coarse step: stiffness of nodes, weight of a pair, rounds, weights of features.
+/// Settings of a coarse step: stiffness of nodes, weight of a pair, number of rounds, and weights
+/// of the search for features.
 struct CoarseStep {
   double stiffness, landmarks;
   int rounds;
@@ -35,8 +36,9 @@ constexpr std::array<CoarseStep, 8> kCoarse{{
     {0.1, 0.03, 4, {20, 30, 10, 0.1, true}},
 }};
 
-/// Settings of a fine step: stiffness; in mm the largest distance of a match and the distance of
-/// weight 1/4; weight along the surface; rounds.
+/// Settings of a fine step. stiffness: of the motions; farthest: largest distance of a match in mm;
+/// robust: distance in mm at which a match has a quarter of its weight; along: weight of a match
+/// along the surface; rounds: number of rounds.
 struct FineStep {
   double stiffness, farthest, robust, along;
   int rounds;
@@ -140,7 +142,8 @@ core::Result<Points> Laying::fine(const Points& base) const {
 
 std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const steps::Scale& scale,
                                           double noise) {
-  // Weights are inversely proportional to the variance of the error, 1 at kNoise.
+  // The weight of a pair is inversely proportional to the variance of its error. An error of kNoise
+  // gives the weight 1.
   const double sure = kNoise * kNoise / std::max(noise * noise, kNoise * kNoise / kSurest);
   std::vector<steps::Landmark> out;
   for (const Pair& pair : pairs) {
@@ -149,7 +152,7 @@ std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const 
   return out;
 }
 
-/// The result for the final positions of the vertices.
+/// Converts the final positions of the vertices to the result.
 Registered told(const Points& points, const Mesh& templ, const steps::Matcher& matcher,
                 const steps::Looks& looks, const steps::Scale& scale,
                 const std::vector<std::int32_t>& whole) {

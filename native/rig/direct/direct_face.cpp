@@ -80,7 +80,8 @@ Status check(const FaceParts& parts) {
   return core::ok();
 }
 
-// The begin of each block in the deltas of each channel: [channels, blocks + 1].
+// Where the deltas of each block of vertices begin in each channel of a morph: [channels, blocks +
+// 1].
 std::vector<std::uint32_t> block_starts(const Morph& morph, std::uint32_t blocks) {
   std::vector<std::uint32_t> starts;
   starts.reserve(morph.channels.size() * (std::size_t{blocks} + 1));

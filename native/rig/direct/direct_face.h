@@ -18,8 +18,8 @@
 
 namespace risorius::rig {
 
-/// The parts of a face. The armature may have more bones than the rig moves: the others keep the
-/// values of the last call of `keep`.
+/// The parts of a face. The armature may have more bones than the rig moves. These other bones have
+/// the transforms of the last call of `keep`.
 struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
@@ -34,20 +34,21 @@ struct FaceParts {
   std::vector<Mesh> meshes;
 };
 
-/// The memory for the vertices of a mesh.
+/// Where to write the vertices of a mesh.
 struct Target {
   std::uint32_t mesh = 0;
   float* out = nullptr;  // [vertices, 3]
-  // Set afterwards: false if nothing of the mesh changed since it was last written.
+  // Set by the evaluation: false if the mesh had not changed since it was last written, and
+  // therefore was not written.
   bool written = false;
 };
 
 /// A frame of a face.
 /// raw    float32[R]; nullptr: the pose is given
-/// pose   output of the rig, unless its pointers are null; without raw an input: joints and
-/// blend_shapes
-/// turns  float32[turned, 4], w x y z: each is multiplied from the left to the rotation of its
-/// bone; nullptr: none
+/// pose   with raw: the rig's output, null pointers are ignored; without raw: the input, joints and
+///        blend_shapes are read
+/// turns  float32[turned, 4], w x y z: rotations that are multiplied from the left to the rotations
+///        of the bones FaceParts::turned; nullptr: none
 /// anew   write all targets, even if nothing changed
 struct FaceFrame {
   const float* raw = nullptr;
@@ -58,30 +59,31 @@ struct FaceFrame {
   std::vector<Target> targets;  // no mesh twice
 };
 
-/// One face from frame to frame. It remembers the last frame to skip unchanged meshes. Not
-/// thread-safe.
+/// Evaluates one face frame after frame. It remembers the last frame and skips unchanged meshes.
+/// Not thread-safe.
 class DirectFace {
  public:
-  /// Fails: invalid_index, invalid_length or invalid_value if the parts do not fit together.
+  /// Fails: kInvalidIndex, kInvalidLength or kInvalidValue if the parts do not fit together.
   static core::Result<std::unique_ptr<DirectFace>> make(FaceParts parts);
 
   const FaceParts& parts() const { return parts_; }
-  /// Sets the transforms of all bones: [bones of chain, 3], [.., 4], [.., 3]. Those of the rig's
-  /// bones are overwritten in each frame.
+  /// Sets the transforms of all bones: location [bones of chain, 3], rotation [.., 4], scale [..,
+  /// 3]. The rig's own bones get new transforms in each frame.
   void keep(const float* location, const float* rotation, const float* scale);
-  /// In: mesh  below the number of meshes; base  float32[vertices, 3]
+  /// Sets the vertices of a mesh without channels and bones. In: mesh  below the number of meshes;
+  /// base  float32[vertices, 3]
   void set_base(std::uint32_t mesh, const float* base);
-  /// The next frame writes every mesh.
+  /// Makes the next frame write every mesh.
   void forget() noexcept;
 
-  // The steps of evaluate_faces.
+  // The following functions are the steps of evaluate_faces.
   /// Evaluates the rig and the bones, and finds the changes. Allocates nothing.
   void begin(const FaceFrame& frame) noexcept;
-  /// After begin: whether the target has to be written.
+  /// Whether the target must be written. Call it after begin.
   bool is_due(const FaceFrame& frame, const Target& target) const noexcept;
   /// Writes one block of a mesh. Call it after begin, from any thread.
   void write(const Target& target, std::uint32_t block) const noexcept;
-  /// Call it after all blocks of a target.
+  /// Remembers that a target was written. Call it after all of its blocks.
   void end(const Target& target) noexcept;
 
  private:
@@ -108,9 +110,10 @@ class DirectFace {
   std::vector<float> raw_;
   std::uint32_t lod_ = 0;
   bool has_pose_ = false;
-  // Location, rotation and scale of the bones of `space`, three arrays one after the other.
+  // Location, rotation and scale of the bones that the rig moves, three arrays one after the other.
   std::vector<float> own_;
-  // The same of all bones, in this frame and in the frame before.
+  // Location, rotation and scale of all bones of the armature, in this frame and in the frame
+  // before.
   std::vector<float> channels_, last_channels_;
   bool has_matrices_ = false;
   std::vector<JointChain::Affine> affine_;
@@ -121,10 +124,11 @@ class DirectFace {
   std::vector<std::uint64_t> bone_changed_, channel_changed_;
 };
 
-/// Evaluates a frame of each face in several threads. The results do not depend on their number.
-/// In:  faces    different ones
-///      frames   one of each face; their outputs may not overlap
-///      threads  number of threads; 0: as many as the work is worth, at most one per core
+/// Evaluates a frame of each face in several threads. The results do not depend on the number of
+/// threads.
+/// In:  faces    no face twice
+///      frames   one for each face; their outputs may not overlap
+///      threads  number of threads; 0: one for each kWorthAThread vertices, at most one per core
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads);
 

@@ -13,10 +13,11 @@ namespace {
 constexpr std::size_t kWorthAThread = 8192;
 constexpr std::size_t kMostThreads = 64;
 
-// One list of work for all threads: first each face is begun, then the blocks of its meshes follow.
-// A thread that takes a block waits until the face is begun, which another thread already does.
-// Threads share ownership: the caller waits until all work is done, not until each thread has
-// started, which takes longer than a frame on a busy machine. A late thread finds nothing left.
+// One list of tasks for all threads: first a begin for each face, then the blocks of all meshes. A
+// thread that takes a block waits until another thread has finished the begin of its face. Threads
+// share ownership of the list: the caller waits until all tasks are done, not until each thread has
+// started, which takes longer than a frame on a busy machine. A thread that starts too late finds
+// no task.
 class Work {
  public:
   Work(std::span<DirectFace* const> faces, std::span<FaceFrame> frames)
@@ -92,7 +93,7 @@ void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> fra
   for (std::size_t t = 1; t < std::min(threads, kMostThreads); ++t) {
     try {
       std::thread([work] { work->run(); }).detach();
-      // The system has no more threads; the calling thread does the work.
+      // If the system has no more threads, the calling thread does the remaining work.
     } catch (const std::system_error&) {
       break;
     }

@@ -13,8 +13,8 @@ std::array<float, 3> transform(const Matrix& m, float x, float y, float z) {
           m[6] * x + m[7] * y + m[8] * z};
 }
 
-/// axes * M(q) * axes^T as a quaternion. The rotation axis is converted, and the sense of rotation
-/// is reversed if the axes mirror.
+/// The quaternion of axes * M(q) * axes^T, where M(q) is the rotation matrix of q. If the axes
+/// mirror, the sense of rotation is reversed.
 Quaternion convert(const Matrix& axes, float handedness, const Quaternion& q) {
   const std::array<float, 3> v = transform(axes, q.x, q.y, q.z);
   return {handedness * v[0], handedness * v[1], handedness * v[2], q.w};

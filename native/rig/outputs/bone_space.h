@@ -18,8 +18,9 @@ struct SpaceConvention {
   float scale = 1;
 };
 
-/// A bone rests in the neutral pose n of its joint. A pose with the deltas dt, dr and ds gives it
-/// the transform R(n)^-1 T(dt) R(n + dr) S(1 + ds), in the axes of the other space.
+/// Converts poses to the bones of another program. A bone rests in the neutral pose n of its joint.
+/// A pose with the deltas dt, dr and ds gives the bone the transform R(n)^-1 T(dt) R(n + dr) S(1 +
+/// ds), in the axes of the other program.
 struct BoneSpace {
   struct Bone {
     std::uint32_t joint;
@@ -32,11 +33,13 @@ struct BoneSpace {
   std::vector<Bone> bones;
 };
 
+/// Prepares the conversion of some joints' poses to bones.
 /// In:  neutral_rotations  float32[joint_count, 3] in the file's unit
 ///      bones              the joint of each bone, below joint_count
 BoneSpace make_bone_space(const SpaceConvention& convention, const float* neutral_rotations,
                           std::uint32_t joint_count, const std::vector<std::uint32_t>& bones);
 
+/// Converts the joints of a pose to transforms of bones.
 /// In:  joints   float32[joint_count, 9]: tx ty tz rx ry rz sx sy sz deltas of a Pose, file units
 /// Out: location float32[bones, 3]; rotation float32[bones, 4], unit quaternions w x y z, w >= 0;
 ///      scale float32[bones, 3]

@@ -15,7 +15,8 @@ using Affine = JointChain::Affine;
 
 constexpr Affine kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-// A matrix with columns of length 1 and a smaller determinant counts as not invertible.
+// A matrix counts as not invertible if its determinant, after its columns are scaled to length 1,
+// is below this.
 constexpr double kLeastDeterminant = 1e-9;
 
 Affine product(const Affine& a, const Affine& b) {
@@ -33,7 +34,7 @@ double column_length(const Affine& m, std::size_t c) {
   return std::sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]);
 }
 
-// Whether the matrix is invertible. Out: out  the inverse
+// Inverts a matrix. Out: out  the inverse; false if the matrix is not invertible
 bool invert(const Affine& m, Affine& out) {
   const double c0 = m[5] * m[10] - m[6] * m[9], c1 = m[6] * m[8] - m[4] * m[10],
                c2 = m[4] * m[9] - m[5] * m[8];
@@ -143,8 +144,8 @@ void evaluate_chain(const JointChain& chain, const float* location, const float*
                 *s = scale + std::size_t{b} * 3;
     const std::int32_t parent = chain.parents[b];
     const Affine& above = parent < 0 ? kIdentity : work[parent];
-    // rest * basis * rest^-1 is the bone's own motion in the armature's space; the rest matrices of
-    // parent and child cancel out.
+    // rest * basis * rest^-1 is the bone's own motion in the armature's space. Rest matrices
+    // relative to the parent are not needed, because they cancel out.
     if (is_nothing(l, q, s)) {
       work[b] = above;
     } else {

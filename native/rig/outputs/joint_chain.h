@@ -22,24 +22,25 @@ struct JointChain {
   std::uint32_t size() const { return static_cast<std::uint32_t>(parents.size()); }
 };
 
+/// Checks a hierarchy of bones and prepares its evaluation.
 /// In:    parents  [bones] in any order, -1: none
 ///        rest     float64[bones, 4, 4], in the armature's space
-/// Fails: bad_index (a parent that does not exist, or a cycle of parents); bad_value (a matrix that
-///        is not finite, cannot be inverted, or whose last row is not 0 0 0 1)
+/// Fails: kInvalidIndex (a parent that does not exist, or a cycle of parents); kInvalidValue (a
+///        matrix that is not finite, cannot be inverted, or whose last row is not 0 0 0 1)
 core::Result<JointChain> make_joint_chain(std::span<const std::int32_t> parents,
                                           const double* rest);
 
-/// The skinning matrices: pose times the inverse of rest, in the armature's space. The pose of a
-/// bone is the pose of its parent times its rest relative to the parent times T(location)
+/// Computes the skinning matrices: pose times the inverse of rest, in the armature's space. The
+/// pose of a bone is the pose of its parent times its rest relative to the parent times T(location)
 /// R(rotation) S(scale). Computed in double; the bits are the same on every CPU.
 /// In:  location  float32[bones, 3]
 ///      rotation  float32[bones, 4], w x y z of any length; 0 0 0 0 is half a turn about x as in
 ///                Blender
-///      scale     float32[bones, 3], may be 0. A value that is not finite spoils its bone and the
-///                bone's descendants
-///      work      [bones]
-/// Out: matrices  float32[bones, 3, 4]; a bone without a transform of its own has the matrix of its
-///                parent
+///      scale     float32[bones, 3], may be 0. A value that is not finite makes the matrices of its
+///                bone and the bone's descendants invalid
+///      work      [bones] scratch memory
+/// Out: matrices  float32[bones, 3, 4]; a bone whose location, rotation and scale are neutral has
+///                the matrix of its parent
 void evaluate_chain(const JointChain& chain, const float* location, const float* rotation,
                     const float* scale, JointChain::Affine* work, float* matrices) noexcept;
 

@@ -62,13 +62,14 @@ Status check_influences(const Lists& lists, std::uint32_t vertex_count, std::uin
   return core::ok();
 }
 
-// The sum that divides a vertex's weights; 0 if the vertex stays in place.
+// The sum of a vertex's weights, by which they are divided; 0 if the vertex does not move.
 float divisor(std::span<const float> weights) {
   const float sum = std::accumulate(weights.begin(), weights.end(), 0.0f);
   return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
 }
 
-// The number of groups of four influences that move a vertex.
+// A vertex's number of influences other than 0, in groups of four, rounded up; 0 if the vertex does
+// not move.
 std::uint32_t fours_of(std::span<const float> weights) {
   if (divisor(weights) == 0) return 0;
   const auto none = static_cast<std::size_t>(std::ranges::count(weights, 0.0f));
@@ -79,8 +80,9 @@ std::span<const float> weights_of(const Lists& lists, std::size_t v) {
   return lists.weights.subspan(lists.offsets[v], lists.offsets[v + 1] - lists.offsets[v]);
 }
 
-// In: at     index of the first influence of the vertex's group
-//     place  of the vertex in the group
+// Writes a vertex's influences into its group of vertices.
+// In: at     index of the first influence of the group
+//     place  number of the vertex in the group
 void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t place, Skin& skin) {
   const std::span<const float> weights = weights_of(lists, v);
   const float sum = divisor(weights);
@@ -94,7 +96,8 @@ void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t p
   }
 }
 
-// Adds a run of vertices with equal numbers of influences. In: begin  in the block
+// Adds a run: vertices of a block with the same number of influences. In: begin  first vertex of
+// the block
 void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
              std::uint32_t fours, Skin& skin) {
   skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});
@@ -109,7 +112,7 @@ void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_
   }
 }
 
-// Adds the vertices [begin, end), sorted by number of influences and then by index.
+// Adds a block with the vertices [begin, end), sorted by number of influences and then by index.
 void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
   std::vector<std::uint32_t> fours;
   for (std::uint32_t v = begin; v < end; ++v) fours.push_back(fours_of(weights_of(lists, v)));
@@ -154,7 +157,7 @@ Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t
   skin.bones.shrink_to_fit();
   skin.weights.shrink_to_fit();
   std::vector<std::uint8_t> used(std::size_t{bone_count} + 1);
-  // The entry bone_count, for no bone, included.
+  // Missing influences have the bone bone_count, which is not listed below.
   for (const std::uint16_t bone : skin.bones) used[bone] = 1;
   for (std::uint32_t b = 0; b < bone_count; ++b) {
     if (used[b] != 0) skin.bones_used.push_back(static_cast<std::uint16_t>(b));

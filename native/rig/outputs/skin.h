@@ -13,10 +13,10 @@
 
 namespace risorius::rig {
 
-/// The vertices of one block: few enough that the first cache holds them while they are read,
-/// summed and written.
+/// Number of vertices in a block: so few that the first-level cache has room for them while they
+/// are read, summed and written.
 inline constexpr std::uint32_t kSkinBlock = 1024;
-/// A vertex stays in place if its weights add up to at most this.
+/// A vertex does not move if the sum of its weights is at most this.
 inline constexpr float kLeastWeight = 1e-4f;
 
 struct Skin {
@@ -27,7 +27,7 @@ struct Skin {
   std::uint32_t vertex_count = 0, bone_count = 0;
   std::vector<simd::SkinRun> runs;  // of each block, by ascending fours
   std::vector<Block> blocks;        // one for each block, and one behind the last
-  // Relative to the block's first vertex, in the order of the runs.
+  // The vertices of each run, relative to the first vertex of their block.
   std::vector<std::uint16_t> vertices;
   std::vector<std::uint16_t> bones;    // as in simd::SkinPart; bone_count stands for no bone
   core::AlignedVector<float> weights;  // the same, each divided by the sum of its vertex's weights
@@ -37,26 +37,28 @@ struct Skin {
   std::size_t memory_bytes() const;
 };
 
+/// Checks the weights of a mesh and packs them for the kernels.
 /// In:    offsets     uint32[vertices + 1]: the first influence of each vertex
 ///        bones       [influences], below bone_count
 ///        weights     [influences], 0 or more; they need not add up to 1, and 0 counts as no
 ///                    influence
 ///        bone_count  at most 65,535
-/// Fails: invalid_index, invalid_length or invalid_value with the vertex and its influence
+/// Fails: kInvalidIndex, kInvalidLength or kInvalidValue with the vertex and its influence;
+///        kLimitExceeded (bone_count)
 core::Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t> offsets,
                              std::span<const std::uint32_t> bones, std::span<const float> weights,
                              std::uint32_t bone_count);
 
-/// One block of a mesh: out = p + (sum of weight * (M p - p)) / sum of weights.
+/// Deforms one block of a mesh: out = p + (sum of weight * (M p - p)) / sum of weights.
 /// In:  rows    float32[bone_count + 1, kSkinRow], aligned to a cache line: kernels.skin_rows of
 ///              the matrices of evaluate_chain, and a last row of 0. A matrix that is not finite
-///              spoils the vertices that have a weight on its bone
+///              makes the vertices with a weight on its bone invalid
 ///      block   below block_count
 ///      points  float32[kSkinBlock, 3], or fewer for the last block
 /// Out: out     float32[kSkinBlock, 3]; may be points
 void evaluate_skin_block(const Skin& skin, const simd::Kernels& kernels, const float* rows,
                          std::uint32_t block, const float* points, float* out) noexcept;
-/// All blocks of a mesh. In: points, out  float32[vertices, 3]
+/// Deforms all blocks of a mesh. In: points, out  float32[vertices, 3]
 void evaluate_skin(const Skin& skin, const simd::Kernels& kernels, const float* rows,
                    const float* points, float* out) noexcept;
 

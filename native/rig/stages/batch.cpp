@@ -11,7 +11,8 @@ namespace {
 
 using simd::kFrames;
 
-// A block takes the time of three to four frames, even if it holds fewer.
+// Fewer frames than this are evaluated one by one, because a block takes the time of three to four
+// frames, however few it has.
 constexpr std::size_t kFewest = 4;
 
 PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
@@ -40,7 +41,7 @@ class Block {
     detail::place_rows(rig_, lod, work_, work_.rows.data(), first_.joints, count_);
   }
 
-  /// Adds the controls of a frame to the controls of the block.
+  /// Marks the active controls of frame f as active in the block, and stores their values.
   void take(std::size_t f) noexcept {
     const float* controls = first_.controls + f * rig_.control_count;
     for (std::size_t a = 0; a < work_.active_count; ++a) {

@@ -21,7 +21,9 @@ float corrective(const Rig& rig, const Psd& psd, const float* values) noexcept {
   return product > 1.0f ? 1.0f : product;
 }
 
-// Most controls of a face rest in most frames. Runs of eight resting controls are skipped at once.
+// Appends the controls from begin up to end that are not 0. Runs of eight controls that are 0 are
+// skipped at once, because most controls are 0 in most frames.
+// Out: number of controls appended
 std::size_t append_active(const float* controls, std::uint32_t begin, std::uint32_t end,
                           std::uint16_t* active) noexcept {
   constexpr std::uint32_t kTogether = 8;
@@ -45,9 +47,9 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
 }
 
 // Lists the watched correctives that may not be 0: their watcher and their second factor are not 0.
-// If a second evaluation has the same active controls, correctives with any resting factor are
-// removed from the list; this test takes longer than one evaluation gains by it.
-// In:  kept    active equals the list of the evaluation before
+// If the next evaluation has the same active controls, it also removes correctives with any factor
+// at 0 from the list; for a single evaluation this test takes longer than it saves.
+// In:  kept    the evaluation before had the same active controls
 //      rests   rests(control): whether a control is 0
 // Out: work    firing
 template <class Rests>
@@ -80,19 +82,22 @@ class Correctives {
   Correctives(const Rig& rig, Workspace& work, float* controls)
       : rig_(rig), work_(work), controls_(controls) {}
 
-  // In: active  controls that are not 0, without the correctives
+  // Computes the watched correctives. In: active  controls that are not 0, without the correctives;
+  // kept  as in list_firing
   void watched(std::uint32_t lod, std::span<const std::uint16_t> active, bool kept) noexcept {
     const auto rests = [this](std::uint16_t control) { return controls_[control] == 0.0f; };
     list_firing(rig_, lod, active, kept, work_, rests);
     for (std::size_t i = 0; i < work_.firing_count; ++i) {
       const Psd& psd = rig_.psds[work_.firing[i]];
       const float value = corrective(rig_, psd, controls_);
-      // 0 times NaN: the corrective rests here too, because other evaluations leave it out.
+      // The value is 0 times NaN. It must be 0 here, because other evaluations skip a corrective
+      // with a factor at 0.
       if (std::isnan(value) && rests_any(rig_, psd, rests)) continue;
       set(psd.output, value);
     }
   }
-  // In: from  the controls to read. The output may be a raw control; it need not be marked active.
+  // Computes one corrective. In: from  the controls to read. If the output is a raw control, it is
+  // set but not marked as active.
   void one(std::uint32_t p, const float* from) noexcept {
     const Psd& psd = rig_.psds[p];
     const float value = corrective(rig_, psd, from);
@@ -116,7 +121,8 @@ class Correctives {
   float* controls_;
 };
 
-// Lists the controls that do not rest, without the correctives.
+// Lists the controls that are not 0, without the correctives.
+// Out: number of controls in work.active
 std::size_t list_sources(const Rig& rig, const float* controls, Workspace& work) noexcept {
   const std::size_t n = append_active(controls, 0, rig.raw_count, work.active.data());
   work.raw_active = n;
@@ -129,10 +135,10 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
   return rig.is_half() ? rig.joint_halves[at] : std::bit_cast<std::uint32_t>(rig.joint_values[at]);
 }
 
-// Reads one value of every list that these controls will need. The reads do not depend on each
-// other, so that a cold cache loads all of them at once, and the pages are mapped when the columns
-// are read. In a batch only the first frame does it, because the others need mostly the same
-// memory.
+// Reads one value of every list that these controls will need. These reads do not depend on each
+// other, so that a cold cache loads all of them at once, and their pages are in memory when the
+// columns are read. In a batch only the first frame does it, because the other frames need mostly
+// the same memory.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
            Workspace& work) noexcept {
   const std::uint32_t* watches =
@@ -153,8 +159,9 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
-// Touches the memory that these controls will need, unless the evaluation before had the same ones:
-// its lists are kept, and they are read in one run anyway. Out: whether it had the same ones
+// Calls touch(), unless the evaluation before had the same active controls: then its lists are used
+// again, and these name the columns in one run.
+// Out: whether the evaluation before had the same active controls
 bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
            Workspace& work) noexcept {
   const bool kept = work.firing_for.are(rig, lod, active);
@@ -162,7 +169,7 @@ bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> act
   return kept;
 }
 
-// Computes the watched correctives; the others stay 0.
+// Sets all correctives to 0 and computes the watched ones.
 void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
                        float* controls) noexcept {
   std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
@@ -173,8 +180,8 @@ void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
   Correctives(rig, work, controls).watched(lod, active, kept);
 }
 
-// Lists active controls in ascending order: raw, correctives, networks and poses. In: active  as
-// list_sources left it, which later steps may have changed
+// Lists active controls in ascending order: raw, correctives, networks and poses.
+// In: had_steps  other steps ran since list_sources, which may have changed raw controls
 void list_active(const Rig& rig, bool had_steps, Workspace& work, const float* controls) noexcept {
   std::uint16_t* active = work.active.data();
   std::size_t n = had_steps ? append_active(controls, 0, rig.raw_count, active) : work.raw_active;
@@ -197,7 +204,7 @@ void run(const Rig& rig, std::uint32_t step, std::uint32_t lod, Workspace& work,
   }
 }
 
-// Transposes the raw controls of frames, so that the values of one control lie side by side.
+// Transposes the raw controls of frames, so that the values of one control are adjacent.
 // Out: values  [raw controls, kFrames]; frames beyond count are 0
 void turn_raw(const Rig& rig, const float* raw, std::size_t count, float* values) noexcept {
   static_assert(simd::kFrames == 8);
@@ -220,7 +227,8 @@ bool any_negative_0(const float* values, std::size_t count) noexcept {
   return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
 }
 
-// Lists raw controls that are not 0 in any frame. Out: signs  whether any number has a sign bit
+// Lists the raw controls that are not 0 in at least one frame.
+// Out: signs  whether any value has its sign bit set
 std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   const float* values = work.frame_weights.data();
   std::uint64_t all = 0;
@@ -237,7 +245,8 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   return n;
 }
 
-// A corrective of four frames. Products and roundings follow the order of corrective().
+// Computes a corrective of four frames. Products and roundings have the same order as in
+// corrective().
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {
   simd::Four product = simd::Four::all(psd.weight);
@@ -274,7 +283,8 @@ void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, fl
   }
 }
 
-// Copies the controls from work to the frames. Out: controls  [count, controls]
+// Writes the controls of each frame: its raw controls, and the others from work. Out: controls
+// [count, controls]
 void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
                   float* controls) noexcept {
   const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;

@@ -9,7 +9,7 @@ namespace risorius::rig {
 
 namespace {
 
-// The pose of a face without LODs, which never moves.
+// Writes the pose of a face without LODs, which never moves.
 void rest(const Rig& rig, const float* raw, const Workspace& work, const PoseView& pose) noexcept {
   std::copy(raw, raw + rig.raw_count, pose.controls);
   std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
@@ -30,7 +30,8 @@ std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept {
 
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept {
-  // A settled evaluation reads no corrective before it is set.
+  // A settled evaluation sets all correctives before it reads one, so that they need no initial
+  // value.
   const std::uint32_t rest = rig.raw_count + (settle ? rig.psd_count : 0);
   std::copy(raw, raw + rig.raw_count, controls);
   std::copy(rig.initial_controls.begin() + rest, rig.initial_controls.end(), controls + rest);

@@ -11,15 +11,15 @@ namespace risorius::rig {
 
 /// Turns raw controls into a pose. Allocates nothing.
 /// In:   raw     float32[R], any values. Outside [0, 1] joints and blend shapes extrapolate,
-///               correctives clamp their factors, and maps rest outside of their intervals. NaN or
-///               infinity spoils the rows of joint groups that have the control as a column, its
-///               shapes, maps, networks and setups, and the correctives whose other factors are not
-///               0; check_finite finds such values
+///               correctives clamp their factors, and maps are 0 outside of their intervals. NaN or
+///               infinity makes these outputs invalid: rows of joint groups that have the control
+///               as a column, its shapes, maps, networks and setups, and the correctives whose
+///               other factors are not 0. check_finite finds such values
 ///       lod     clamped to the last LOD
 ///       settle  true: networks, solvers and correctives run in the order of their dependencies, so
 ///               that the pose is a function of raw alone; false: networks, then solvers, then
-///               correctives; each reads the rest values of later stages, as in the reference's
-///               first call
+///               correctives; each reads the rest values of later stages, as in the first call of
+///               the reference evaluator
 /// Out:  pose    every field is overwritten
 /// From: RigLogic; dna-format 12
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
@@ -29,11 +29,12 @@ inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool s
   evaluate(rig, raw, lod, settle, work, view(pose));
 }
 
-/// Evaluates count frames or faces as a small product of matrices that reads each value of the rig
-/// once for several frames. Frame n has the same bits as with evaluate.
+/// Evaluates several frames, or several faces with the same rig, as a small product of matrices. It
+/// reads each value of the rig once for up to kFrames frames. The bits of each frame equal the
+/// result of evaluate.
 /// In:  raw   float32[count, R]
 ///      work  of make_batch_workspace
-/// Out: pose  of the first frame; the others follow, [count, ...] each
+/// Out: pose  of the first frame; each list has room for all frames, [count, ...]
 void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                      bool settle, Workspace& work, const PoseView& pose) noexcept;
 

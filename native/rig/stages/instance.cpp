@@ -10,7 +10,7 @@ namespace risorius::rig {
 
 namespace {
 
-// Whether nothing but joint groups writes joints.
+// Whether only joint groups write joint attributes.
 bool by_groups_alone(const Rig& rig) {
   return rig.joint_stride == 9 && rig.quaternion_joints.empty() && rig.twist_swings.empty() &&
          rig.ml_joints.empty();
@@ -38,7 +38,8 @@ void Instance::rest() noexcept {
 }
 
 void Instance::set_lod(std::uint32_t lod) noexcept {
-  // The reference compares the request, not the level it is clamped to, before it clears its state.
+  // The argument is compared before it is clamped, as the reference evaluator does. A LOD beyond
+  // the last one therefore always resets the state.
   if (lod == lod_) return;
   lod_ = detail::clamp_lod(*rig_, lod);
   rest();
@@ -59,8 +60,8 @@ const Pose& Instance::evaluate(const float* raw) noexcept {
   if (has_latency) before_ = pose_.controls;  // of equal size: no allocation
   detail::latent_controls(*rig_, lod_, work_, pose_.controls.data());
   detail::outputs(*rig_, lod_, work_, view(pose_));
-  // If a control reads later stages it follows one frame later; the pose rests when nothing has
-  // changed.
+  // If a control depends on a later stage it changes one frame later. The pose is at rest only when
+  // an evaluation changes no control.
   at_rest_ = !has_latency || std::memcmp(before_.data(), pose_.controls.data(),
                                          before_.size() * sizeof(float)) == 0;
   return pose_;

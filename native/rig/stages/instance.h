@@ -10,18 +10,19 @@
 
 namespace risorius::rig {
 
-/// A face through time with the latency of the reference: networks, solvers and correctives run in
-/// this order, and each reads the results of later stages from the previous evaluation.
+/// A face in a sequence of frames, with the latency of the reference evaluator: networks, solvers
+/// and correctives run in this order, and each reads the results of later stages from the previous
+/// evaluation.
 class Instance {
  public:
   explicit Instance(const Rig& rig);
   std::uint32_t lod() const { return lod_; }
-  /// Changes the level, clamped to the last LOD. Another level puts all controls except the raw
-  /// ones to rest, as in the reference.
+  /// Changes the LOD, clamped to the last one. Another LOD resets all controls except the raw ones
+  /// to their initial values, as in the reference evaluator.
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
-  /// One value per region of each mesh, mesh after mesh. At 0 the networks of the region are
-  /// skipped and their outputs rest; other values have no effect.
+  /// One value for each region, mesh after mesh. At 0 the networks of the region are skipped and
+  /// their outputs are at rest. Other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
   /// In: index below the number of masks.
   void set_mask(std::size_t index, float value) noexcept;

@@ -10,13 +10,14 @@ namespace risorius::rig {
 
 namespace {
 
-// Bytes that listing one column moves: the column is read at its control, the end of its group's
-// list is read and written, the column is written to that list, and the kernel reads it again.
+// Number of bytes that are read and written to list one column: the column is read in the list of
+// its control, the end of its group's list is read and written, the column is written to that list,
+// and the kernel reads it again.
 constexpr std::uint64_t kListed =
     sizeof(JointColumn) + 2 * sizeof(std::uint32_t) + 2 * sizeof(simd::Column);
 
-// The columns and values of the joint groups that the active controls read. Only `columns` is
-// counted if the rig keeps no table of reads.
+// The numbers of columns and values in the joint groups that the active controls make an evaluation
+// read. Only `columns` is counted if the rig has no control_reads.
 ControlReads count_active(const Rig& rig, std::uint32_t lod,
                           std::span<const std::uint16_t> active) noexcept {
   ControlReads sum;
@@ -35,8 +36,9 @@ ControlReads count_active(const Rig& rig, std::uint32_t lod,
   return sum;
 }
 
-// Compares counted bytes: reading all columns, resting ones included, or listing and reading the
-// active ones. A column at rest adds 0 * k to sums that begin at +0, which changes no bit.
+// Whether reading all columns moves fewer bytes than listing the active columns and reading only
+// these. The sums are the same: a column of a control at 0 adds 0 * k to sums that begin at +0,
+// which changes no bit.
 bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& active) noexcept {
   const std::size_t stride = std::size_t{rig.control_count} + 1;
   const ControlReads& all = rig.control_reads[lod * stride + rig.control_count];
@@ -44,19 +46,20 @@ bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& act
   return rest * size + all.columns * sizeof(simd::Column) <= active.columns * kListed;
 }
 
-// Columns per group from which on a list is made if the frame before had the same active controls,
-// because the list will probably serve later frames too. In films of the real face, by AVX2, an
-// evaluation with 32 to 60 active controls then takes 0.75 of the time of adding; with fewer
-// columns 1.1 to 1.2.
+// Number of active columns per group from which on they are listed if the frame before had the same
+// active controls, because the list will probably serve later frames too. In captures of a real
+// face, with AVX2, an evaluation with 32 to 60 active controls then takes 0.75 of the time of
+// adding; with fewer columns it takes 1.1 to 1.2.
 constexpr std::uint32_t kFewOfMany = 6;
 
 // Chooses how the columns are visited. Columns that are added in the order of memory need no list
-// and no kernel call per group, but a sum is read and written with each column. Time of adding
-// divided by the time of listing, measured on two faces: by AVX2 0.7 to 1.0 with 4 to 60 columns
-// per group, 0.93 to 1.04 with 77 to 149 columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80
-// rows; with float16, which halves the bytes for the same sums, listing wins from 64 columns on; by
-// AVX-512, which keeps the sums of a group in registers, 0.86 with one or two columns per group,
-// 1.0 with 5, and 1.1 to 1.3 with 13 to 50.
+// and no kernel call for each group, but a sum is read and written with each column.
+//
+// Time of adding divided by the time of listing, measured on two faces: with AVX2 0.7 to 1.0 for 4
+// to 60 columns per group, 0.93 to 1.04 for 77 to 149 columns of 106 rows, and 0.8 to 1.0 for 138
+// to 295 columns of 80 rows. With float16, which halves the bytes of columns but not of sums,
+// listing is faster from 64 columns on. With AVX-512, which keeps the sums of a group in registers,
+// the quotient is 0.86 for one or two columns per group, 1.0 for 5, and 1.1 to 1.3 for 13 to 50.
 // In: seen  the frame before added the columns of the same controls
 Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool seen, const Workspace& work) noexcept {
@@ -72,7 +75,7 @@ Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_
   return adds ? Traversal::kAdded : Traversal::kListed;
 }
 
-// Lists columns by ascending control, so that sums have one order.
+// Lists the columns of each group by ascending control, so that sums always have the same order.
 void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
                  Workspace& work) noexcept {
   std::uint32_t* ends = work.column_ends.data();
@@ -89,7 +92,8 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
   }
 }
 
-// Adds the columns of each active control to work.sums, by ascending control as in a list.
+// Adds the columns of each active control to work.sums, by ascending control, the order in which
+// listed columns are added.
 void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
                 const float* controls) noexcept {
   std::fill(work.moves.begin(), work.moves.end(), std::uint8_t{0});
@@ -108,7 +112,7 @@ void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
   }
 }
 
-// Clears the sums of active groups.
+// Sets the sums of active groups to 0.
 void clear_sums(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   const simd::Rows* rows = work.group_rows.data() + lod * rig.joint_groups.size();
   for (std::size_t n = 0; n < work.live_count; ++n) {
@@ -117,7 +121,8 @@ void clear_sums(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   }
 }
 
-// Calls f(word, bits) for each word with its bits from begin up to end, until f returns false.
+// Calls f(word, bits) for each 64-bit word that contains bits from begin up to end, with these bits
+// set, until f returns false.
 template <class F>
 void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
   for (std::uint32_t at = begin; at < end;) {
@@ -128,8 +133,8 @@ void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
   }
 }
 
-// Whether a group shares a block with an active group: then its rows in that block must be 0 while
-// it rests.
+// Whether a group writes into a block that an active group also writes. Then the group's rows are
+// placed too, and must be 0 if it is not active.
 bool shows(const JointGroup& g, const Workspace& work) noexcept {
   bool live = false;
   for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {
@@ -138,7 +143,8 @@ bool shows(const JointGroup& g, const Workspace& work) noexcept {
   return live;
 }
 
-// The first of `count` bits from `at` on that differs from `value`. In: word(i)  the i-th 64 bits
+// The first of `count` bits, from `at` on, whose value is not `value`; `count` if there is none.
+// In: word(i)  the i-th 64 bits
 template <class Word>
 std::size_t find_other(std::size_t at, std::size_t count, bool value, Word word) noexcept {
   const std::uint64_t flip = value ? ~std::uint64_t{0} : 0;
@@ -150,7 +156,7 @@ std::size_t find_other(std::size_t at, std::size_t count, bool value, Word word)
   return count;
 }
 
-// Calls f(first, end) for each run of set bits among the first `count`.
+// Calls f(first, end) for each run of set bits among the first `count` bits.
 template <class Word, class F>
 void for_runs(std::size_t count, Word word, F f) noexcept {
   for (std::size_t at = 0, end = 0; (at = find_other(end, count, false, word)) < count;) {
@@ -159,7 +165,7 @@ void for_runs(std::size_t count, Word word, F f) noexcept {
   }
 }
 
-// Marks the blocks that active groups reach, and lists all groups that write into these blocks.
+// Marks the blocks that active groups write, and lists all groups that write into these blocks.
 void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   std::fill(work.live_blocks.begin(), work.live_blocks.end(), 0u);
   const std::uint32_t live = rig.live_groups[lod];
@@ -181,8 +187,9 @@ void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   work.live_count = n;
 }
 
+// Lists columns and marks blocks.
 // In:  way   kListed or kWhole
-// Out: work  lists and marked blocks
+// Out: work  column_ends, moves, columns and the marked blocks
 void list(const Rig& rig, std::uint32_t lod, Traversal way, std::span<const std::uint16_t> active,
           Workspace& work) noexcept {
   const std::uint32_t live = rig.live_groups[lod];
@@ -201,8 +208,10 @@ void list(const Rig& rig, std::uint32_t lod, Traversal way, std::span<const std:
   work.listed_for.keep(rig, lod, active);
 }
 
-// Lists the columns of these controls, unless they are to be added or the list of the frame before
-// is still valid. Out: the chosen way; same  the frame before had the same controls and way
+// Chooses the traversal, and lists the columns of the active controls, unless they are to be added
+// or the lists of the frame before are still valid.
+// In:  may_add  kAdded may be chosen
+// Out: the chosen traversal; same  the frame before had the same controls and traversal
 Traversal prepare(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                   bool may_add, Workspace& work, bool& same) noexcept {
   const bool kept = work.listed_for.are(rig, lod, active);
@@ -223,7 +232,7 @@ const simd::Column* listed_columns(const Rig& rig, Workspace& work) noexcept {
   return rig.group_columns.data();
 }
 
-// Places runs of blocks of one LOD in ascending order, for all frames.
+// Copies rows to runs of blocks of one LOD, for all frames. The runs must be in ascending order.
 class Placer {
  public:
   Placer(const Rig& rig, std::uint32_t lod, const float* rows, float* joints, std::size_t frames)
@@ -235,7 +244,8 @@ class Placer {
         extra_end_(rig.extra_pieces.data() + rig.extra_begins[lod + 1]) {}
 
   std::size_t blocks() const { return (places_ + simd::kPlaces - 1) / simd::kPlaces; }
-  // Extra pieces fill attributes that the first pieces left at 0.
+  // Copies the rows of blocks [first, end). Extra pieces fill attributes that the first pieces set
+  // to 0.
   void place(std::size_t first, std::size_t end) noexcept {
     const std::size_t whole = std::min(end, places_ / simd::kPlaces);
     simd::PlacedFrames frames = frames_;
@@ -257,7 +267,8 @@ class Placer {
   }
 
  private:
-  // The extra pieces of earlier blocks, found from the last call on in steps that double.
+  // The end of the extra pieces of earlier blocks. The search begins at the result of the last
+  // call, with steps that double.
   const simd::Piece* extra_before(std::size_t block) noexcept {
     std::ptrdiff_t step = 1;
     const simd::Piece* from = extra_;
@@ -269,7 +280,8 @@ class Placer {
                                       &simd::Piece::block);
     return extra_;
   }
-  // Places the last block if it is incomplete: the memory behind it belongs to something else.
+  // Copies the rows of the last block if it is incomplete, through a copy of full size: the memory
+  // after it must not be written.
   void place_last(std::size_t block, std::size_t frame) noexcept {
     float last[simd::kPlaces];
     const simd::PlacedFrames one{frames_.from + frame * frames_.from_stride, 0, last, 0, 1};
@@ -317,7 +329,7 @@ void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float*
 
 namespace {
 
-// Out: work.rows, by group, and the results of list_columns
+// Sums the listed columns of each group. Out: work.rows
 void sum_listed(const Rig& rig, std::uint32_t lod, Workspace& work,
                 const float* controls) noexcept {
   const simd::Column* columns = listed_columns(rig, work);

@@ -32,8 +32,8 @@ void activate(const MlLayer& layer, float* values, std::uint32_t count) noexcept
   }
 }
 
-// Runs one layer with the kernel of the joint matrices: the biases are an extra column whose input
-// is 1, and inputs at 0 are skipped.
+// Runs one layer of a network with the kernel of the joint matrices. The biases are an additional
+// column whose input is 1. Inputs at 0 are skipped.
 void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const float* in,
                std::uint32_t inputs, Workspace& work, float* out) noexcept {
   std::size_t n = 0;
@@ -49,7 +49,8 @@ void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const f
   activate(layer, out, rows);
 }
 
-// Gathers values of other operations, one after the other.
+// Copies the values that an operation reads from other operations to one list, at most `most`.
+// Out: number of values
 std::uint32_t join(const Rig& rig, const MlOperation& op, const float* values, std::uint32_t most,
                    float* to) noexcept {
   std::uint32_t n = 0;
@@ -62,7 +63,7 @@ std::uint32_t join(const Rig& rig, const MlOperation& op, const float* values, s
   return n;
 }
 
-// Runs a network; rows that a LOD leaves out are 0.
+// Runs a network. Rows that the LOD does not compute are 0.
 void run_network(const Rig& rig, const MlOperation& op, std::uint32_t lod,
                  Workspace& work) noexcept {
   float* values = work.operation_values.data();
@@ -132,7 +133,8 @@ void turn(const Rig& rig, const Quaternion& q, float* to) {
   detail::store_rotation(rig, multiply(q, {to[0], to[1], to[2], to[3]}), to);
 }
 
-// A scale has no sign along an axis, so that the conversion only permutes its values.
+// Converts a scale to the face's axes. It has no sign along an axis, so that its values are only
+// permuted.
 std::array<float, 3> scale_in_our_axes(const Rig& rig, const std::array<float, 3>& v) {
   std::array<float, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {

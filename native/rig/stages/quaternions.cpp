@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joints turned by quaternions, and Euler angles as quaternions. From: dna-format 12.5
+// Joints rotated by quaternions, and Euler angles as quaternions. From: dna-format 12.5
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,7 +14,7 @@ bool is_identity(const Quaternion& q) {
   return q.x == 0.0f && q.y == 0.0f && q.z == 0.0f && q.w == 1.0f;
 }
 
-// Multiplies the column's share of a rotation to the product, after the earlier columns.
+// Multiplies the product, from the left, by the rotation of a term at the control value v.
 void apply(const QuaternionTerm& term, float v, Quaternion& product) noexcept {
   const Quaternion& full = term.rotation;
   const float identity = full.w >= 0.0f ? 1.0f - v : v - 1.0f;
@@ -49,7 +49,7 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
   for (const std::uint16_t joint : work.straight_joints) {
     rotation_of(rig, joints, joint)[3] = 1.0f;
   }
-  // a rig may have no joint at all, and poses no memory for one.
+  // A rig may have no joint, so that a pose has no memory for one.
   if (rig.euler_joints.empty()) return;
   const EulerConvention& c = rig.euler;
   simd::EulerTurns turns;
@@ -62,7 +62,8 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
                            rig.joint_stride);
 }
 
-// Multiplies the columns in the order of the file and skips resting ones.
+// Rotates the quaternion joints: multiplies the rotations of the active columns in the order of the
+// file.
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept {
   if (rig.quaternion_joints.empty()) return;

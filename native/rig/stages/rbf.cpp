@@ -14,14 +14,16 @@ namespace {
 
 double square(double v) { return v * v; }
 
-// The quaternion 0 0 0 0 has neither twist nor swing: the result is NaN, and no pose is near.
+// Reduces a quaternion to its rotation about an axis. For the quaternion 0 0 0 0 the result is NaN,
+// so that the input is near no pose.
 void twist_only(double* q, std::uint32_t axis) noexcept {
   const double length = std::sqrt(square(q[axis]) + square(q[3]));
   for (std::uint32_t i = 0; i < 3; ++i) q[i] = i == axis ? q[i] / length : 0.0;
   q[3] /= length;
 }
 
-// Removes the twist from a rotation. Half a turn across the axis has no twist.
+// Removes the rotation about an axis from a quaternion. A rotation of 180 degrees about an axis
+// perpendicular to it needs no change.
 void swing_only(double* q, std::uint32_t axis) noexcept {
   const double t = q[axis], w = q[3];
   const std::uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -57,7 +59,9 @@ double kernel(std::uint32_t function, double d, double r) noexcept {
 
 double clamp01(double v) { return v < 0.0 ? 0.0 : (v > 1.0 ? 1.0 : v); }
 
-// Weights of the poses before scale and threshold. Out: their sum
+// Computes the weights of the poses before scale and threshold.
+// Out: near    kernel value of each pose's distance
+//      values  weights; the sum of the weights is returned
 double pose_values(const Rig& rig, const RbfSolver& s, const double* inputs, double* near,
                    double* values) noexcept {
   double sum = 0;
@@ -87,7 +91,7 @@ void gather_inputs(const Rig& rig, const RbfSolver& s, const float* controls,
   convert_rbf_inputs(s.distance, s.axis, inputs, s.input_count);
 }
 
-// The factor that makes the weights of the poses sum to 1.
+// The factor that makes the weights of the poses sum to 1, or 1 if they need not.
 double ratio_of(const RbfSolver& s, double sum) noexcept {
   const bool normalize = sum > 1.0 || (s.always_normalize != 0 && sum != 0.0);
   return normalize ? 1.0 / sum : 1.0;

@@ -12,22 +12,23 @@ namespace risorius::rig {
 
 enum RbfDistance : std::uint32_t { kEuclidean, kQuaternion, kSwingAngle, kTwistAngle };
 
-/// Reduces each quaternion (x y z w) of values to its swing or twist about the axis, in place;
-/// other distances leave them as they are.
+/// For the distances of swing or twist angles: reduces each quaternion (x y z w) of values to its
+/// swing or twist about the axis, in place. For other distances: does nothing.
 void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* values,
                         std::size_t count) noexcept;
-/// The distance of two inputs that convert_rbf_inputs has converted: the length of their
-/// difference, or for rotations the root of the sum of squared angles.
+/// The distance between two inputs that convert_rbf_inputs has converted: the length of their
+/// difference, or for rotations the root of the sum of squared angles, in radians.
 /// In: distance  an RbfDistance
 ///     a, b      [count]; rotations are x y z w, one after the other
 double rbf_distance(std::uint32_t distance, const double* a, const double* b,
                     std::size_t count) noexcept;
-/// The weight of a pose at a distance.
+/// The weight of a pose at a distance from its target.
 /// In: function  as in the file: 0 Gaussian 1 exponential 2 linear 3 cubic 4 quintic
 ///     radius    0: the weight is 1 at distance 0, else 0
 double rbf_kernel(std::uint32_t function, double distance, double radius) noexcept;
 
-/// Distances and weights of a solver's poses, for explanations; evaluate() computes the same.
+/// Distances and weights of a solver's poses, to explain a result of evaluate(), which computes the
+/// same weights.
 /// In:  index     below the number of solvers
 ///      controls  float32[controls] of an evaluated pose
 ///      work      of make_workspace

@@ -11,66 +11,69 @@
 
 namespace risorius::rig::detail {
 
-/// In: lod of any size. Out: the nearest level of the rig, 0 if it has none.
+/// Limits any LOD to the last LOD of the rig; 0 if it has none.
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
-/// Computes all other controls from the raw ones, and lists in work.active the controls that are
-/// not 0.
-/// In: controls  [controls]: the raw ones are set, the others rest
+/// Computes all other controls from the raw controls, and lists in work.active the controls that
+/// are not 0.
+/// In: controls  [controls]: the raw controls are set; the controls of networks and poses have
+///               their initial values
 ///     lod       below the number of LODs, as in all functions below
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// The same with the reference's latency.
-/// In: controls  the raw ones are set, the others are from the frame before
+/// As settled_controls, but with the latency of the reference evaluator.
+/// In: controls  the raw controls are set, all others have the values of the frame before
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// Copies the raw controls, puts the others to rest and calls one of the two functions above.
+/// Copies the raw controls, sets all other controls to their initial values, and calls
+/// settled_controls or latent_controls.
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
 
-/// Whether a LOD has only watched correctives besides the raw controls.
+/// Whether frames can be evaluated together at a LOD: apart from watched correctives it has no
+/// steps that compute controls.
 bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
-/// Computes the controls of up to kFrames frames of such a rig together; each frame has the bits of
-/// begin.
+/// Computes the controls of up to kFrames frames together, if go_together(). The bits of each frame
+/// equal the result of begin().
 /// In:  raw       [count, raw controls]
 ///      work      of make_batch_workspace
 /// Out: controls  [count, controls]
-///      work      frame_weights; active: the controls that are not 0 in a frame
-///      false, and nothing is done, if a raw control is -0: it would reach its channels if every
-///      channel is read, and none if only active controls name their channels
+///      work      frame_weights; active: the controls that are not 0 in at least one frame
+///      false, and nothing is done, if a raw control is -0: its channels would get -0 if every
+///      channel reads its control, but +0 if only the channels of active controls are written
 bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                     Workspace& work, float* controls) noexcept;
-/// Moves the set bits of work.union_bits to work.active, and clears them.
+/// Lists the set bits of work.union_bits in work.active, and clears the bits.
 void list_union(Workspace& work) noexcept;
 
-/// Runs one operation of the graph of networks. A scatter writes controls, the others scratch
-/// memory.
+/// Runs one operation of the graph of networks. A scatter writes controls, other operations write
+/// only scratch memory.
 void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Workspace& work,
                    float* controls) noexcept;
-/// Runs one RBF solver; overwrites the controls that its poses write.
+/// Runs one RBF solver. Overwrites the output controls of its poses.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
-/// The bits that any of eight numbers has set, in two halves; kSigns are their sign bits.
+/// bits_of_eight combines eight floats by OR: the upper and the lower half of the result have the
+/// bits that any float of odd or even index has. kSigns are the sign bits of both halves.
 constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
 inline std::uint64_t bits_of_eight(const float* numbers) noexcept {
   std::uint64_t pairs[4];
   std::memcpy(pairs, numbers, sizeof(pairs));
   return pairs[0] | pairs[1] | pairs[2] | pairs[3];
 }
-/// Whether eight controls, or one control in eight frames, are 0 of either sign.
+/// Whether eight controls, or one control in eight frames, are all +0 or -0.
 inline bool rest_eight(const float* controls) noexcept {
   return (bits_of_eight(controls) & ~kSigns) == 0;
 }
 inline float clamp01(float v) { return v < 0.0f ? 0.0f : (v > 1.0f ? 1.0f : v); }
 
-/// Computes joints, channels and maps from the controls and work.active.
-/// Out: pose  everything except the controls, which are read
+/// Computes joints, channels and maps from pose.controls and work.active.
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 
-/// The joint attributes from the joint groups; overwrites all attributes of all joints.
+/// Computes the joint attributes from the joint groups. Overwrites all attributes of all joints.
 void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
-/// The stages behind the joint groups, which a batch runs frame by frame. rotations() calls the
-/// next four functions in their order.
+/// The following stages run after the joint groups; a batch runs them frame by frame. rotations()
+/// calls the next four functions in their order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
@@ -80,24 +83,26 @@ void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
                        const PoseView& pose) noexcept;
 
-/// The same for up to kFrames frames, as frame_controls left them.
+/// The same as channels_and_maps for up to kFrames frames whose controls frame_controls has
+/// computed.
 /// Out: first  the first frame; the others follow
 void frame_channels_and_maps(const Rig& rig, std::uint32_t lod, std::size_t count,
                              const Workspace& work, const PoseView& first) noexcept;
 
-/// Lists the columns that a frame, or frames together, need: those of active controls, or all
-/// columns if reading them costs less than listing. Out: columns by group; the columns of group i
-/// are from its columns_begin up to work.column_ends[i].
+/// Lists the columns that a frame, or frames together, need: the columns of active controls, or all
+/// columns if reading them costs less than listing.
 /// In:  active  controls, ascending
 /// Out: work    also live_blocks and live
+///      the columns by group: the columns of group i are from its columns_begin up to
+///      work.column_ends[i]
 const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
                                  std::span<const std::uint16_t> active, Workspace& work) noexcept;
 
-/// The first rotation attribute of a joint.
+/// The address of a joint's first rotation attribute.
 inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {
   return joints + std::size_t{joint} * rig.joint_stride + 3;
 }
-/// Writes a rotation in the form of the rig's poses: four numbers, or three Euler angles.
+/// Writes a rotation in the form that the rig's poses have: a quaternion, or three Euler angles.
 inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexcept {
   if (rig.joint_stride == 10) {
     to[0] = q.x, to[1] = q.y, to[2] = q.z, to[3] = q.w;
@@ -108,8 +113,8 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
 }
 
 /// Copies the rows of all groups to their joint attributes. Attributes without a row, and
-/// attributes of resting blocks, become 0. If work.shown_blocks is kept, blocks that rested in the
-/// frame before stay 0.
+/// attributes of blocks that no active group writes, become 0. With work.shown_blocks, blocks that
+/// were 0 in the frame before are not written again.
 /// In:  rows    [frames, rows_size]
 ///      work    as list_columns left it
 /// Out: joints  [frames, joints, stride]

@@ -10,7 +10,8 @@ namespace risorius::rig {
 
 namespace {
 
-// Adds the result of a run for the value v of its input: one row, or all rows for NaN.
+// Adds the result of a run for the value v of its input: the first row whose interval contains v,
+// or all rows if v is NaN.
 void add_run(std::span<const ConditionalRow> run, float v, float* out) noexcept {
   for (const ConditionalRow& row : run) {
     const bool holds = row.from <= v && v <= row.to;
@@ -23,8 +24,8 @@ void clamp(float* values, std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) values[i] = detail::clamp01(values[i]);
 }
 
-// Few controls move the rows of many maps: a run whose input rests is skipped unless it adds
-// something even then. Sums keep the order of the rows; a skipped run would add +0.
+// Computes the animated maps. A run of rows whose input is 0 is skipped if it would only add 0.
+// Values are added in the order of the rows.
 void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   float* out = pose.animated_maps;
   std::fill(out, out + rig.animated_map_count, 0.0f);
@@ -39,8 +40,11 @@ void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   clamp(out, rig.animated_map_count);
 }
 
-// Whether it is cheaper, in bytes read, to list the channels of each active control than to look at
-// the control of every channel.
+// Whether listing the channels of each active control reads fewer bytes than reading the control of
+// every channel.
+// In: run     number of channels that one copy sets
+//     shapes  number of channels at the LOD
+//     active  number of active controls
 bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
                     std::size_t active) noexcept {
   constexpr std::size_t kLooked = 2 * sizeof(std::uint16_t) + 2 * sizeof(float),
@@ -49,7 +53,7 @@ bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
          active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
 }
 
-// Calls f(channel) for each channel that a control moves.
+// Calls f(channel) for each channel of a control at the LOD.
 template <class F>
 void for_channels(const Rig& rig, std::uint32_t shapes, std::uint16_t control, F f) noexcept {
   const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];
@@ -85,7 +89,8 @@ void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> 
   }
 }
 
-// The maps of all frames. A run that rests in all frames is looked at once.
+// Computes the animated maps of all frames. A run whose input is 0 in all frames is skipped by one
+// test.
 // In: values  [controls, kFrames]
 void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::size_t count,
                 float* out) noexcept {
@@ -105,8 +110,8 @@ void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::siz
   clamp(out, count * maps);
 }
 
-// The channels of all frames. In: values  [controls, kFrames]; controls  [count, controls]: the
-// same
+// Computes the channels of all frames. In: values  [controls, kFrames]; controls  [count,
+// controls], the same numbers
 void frame_channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                     const float* values, std::size_t count, const float* controls,
                     float* out) noexcept {

@@ -6,14 +6,15 @@
 
 namespace risorius::rig {
 
-/// Raw controls from GUI controls by the conditional table. Results are clamped to [0, 1]; an input
-/// outside the ranges of all rows adds nothing.
+/// Computes raw controls from GUI controls by the conditional table. Results are clamped to [0, 1];
+/// an input outside the intervals of all rows adds nothing.
 /// In: gui float32[G]. Out: raw float32[R].
 void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 
-/// GUI controls from raw controls, if the table can be inverted. Of the ranges (rows of equal
-/// bounds) of each GUI control, the one wins that most raw controls other than 0 can be inverted
-/// into; its first such row gives the value. Other GUI controls are 0.
+/// Computes GUI controls from raw controls by inverting the rows of the table. The rows of a GUI
+/// control with equal bounds form a range. For each GUI control the range wins in which most raw
+/// controls other than 0 have an inverse inside the bounds. The first row with such an inverse
+/// gives the value. GUI controls without such a row are 0.
 /// In: raw float32[R]. Out: gui float32[G].
 void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept;
 

@@ -17,7 +17,7 @@ Quaternion inverse(const Quaternion& q) {
                         : Quaternion{c.x / square, c.y / square, c.z / square, c.w / square};
 }
 
-// The part of a rotation that turns about one axis.
+// The part of a rotation that rotates about one axis.
 Quaternion twist(const Quaternion& q, std::uint32_t axis) {
   const float t = axis == 0 ? q.x : (axis == 1 ? q.y : q.z);
   const float length = std::sqrt(t * t + q.w * q.w);
@@ -26,7 +26,7 @@ Quaternion twist(const Quaternion& q, std::uint32_t axis) {
   return {axis == 0 ? s : 0.0f, axis == 1 ? s : 0.0f, axis == 2 ? s : 0.0f, q.w / length};
 }
 
-// Blends from q (weight 0) to no rotation (weight 1) along the short way.
+// Interpolates from q (weight 0) to no rotation (weight 1) along the shorter arc.
 Quaternion to_identity(const Quaternion& q, float weight) {
   const float sign = q.w < 0.0f ? -1.0f : 1.0f, cosine = q.w * sign;
   float a = 1.0f - weight, b = weight;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Prints the version matrix as Markdown, from pytest's reports.
+"""Prints test results by version of Blender as a Markdown table, from pytest's reports.
 
     python packaging/check/blender/matrix_table.py NAME=REPORT.xml [NAME=REPORT.xml ...]
 

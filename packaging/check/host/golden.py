@@ -20,8 +20,8 @@ import numpy as np
 RAW, JOINTS, SHAPES, MAPS = 0, 2, 3, 4
 BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
 LATENT = 1  # option of risorius_create with which the reference evaluates
-# Relative to the largest value of a kind of output. Sums of some hundred products may differ by
-# this, because their order differs.
+# Allowed difference, as a fraction of the largest value of a kind of output. Sums of some hundred
+# products differ by this if the order of the products differs.
 TOLERANCE = 64 * np.finfo(np.float32).eps
 
 
@@ -63,7 +63,7 @@ def is_plain(path: Path) -> bool:
 
 
 def records(path: Path) -> int:
-    """Compare all records of a golden file. Returns their number. Raises AssertionError."""
+    """Compare all records of a golden file. Returns their number. A difference raises an error."""
     about = json.loads(path.read_text())
     packed = path.with_name(path.name.removesuffix(".json") + ".bin.gz").read_bytes()
     values = np.frombuffer(gzip.decompress(packed), "<f4")

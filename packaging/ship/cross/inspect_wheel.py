@@ -7,8 +7,9 @@
                                                                  file name
 
 pefile (Windows), LIEF (macOS) and auditwheel (Linux) read the module. `wheel` checks the hashes in
-RECORD. repairwheel must find no library to copy into the wheel. PROGRAM is a Python of the wheel's
-version for any system. FOLDER is zig's lib folder, which contains the symbols of macOS.
+RECORD. repairwheel must find no library to copy into the wheel. PROGRAM is a Linux Python of the
+wheel's version, also for wheels of other systems. FOLDER is zig's lib folder, which contains the
+symbols of macOS.
 If a check fails, prints one sentence and gives exit code 1.
 """
 
@@ -31,7 +32,7 @@ MOST_BYTES = 4 * 1000 * 1000
 OLDEST_GLIBC = 28  # 2.28
 OLDEST_MACOS = (11, 0)
 LICENCES = {"LICENSE", "native/NOTICES.txt"}
-# Files of the package beside the module: sources, data of the self-test, the page of web.sh.
+# Files that the package may contain besides the module: sources, data of the self-test, web page.
 OWN = re.compile(
     r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256)"
     r"|web/page\.html)"
@@ -99,7 +100,7 @@ def names_of_python(program: Path) -> set[str]:
 
 
 def python_has(undefined: Iterable[str], program: Path) -> str:
-    """Check that a Python exports all its symbols that the module imports. Returns a line.
+    """Check that a Python exports all Python symbols that the module imports. Returns a line.
 
     Args:
         undefined: imported symbols of the module.
@@ -125,7 +126,7 @@ def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[st
     of_python = next(e for e in image.DIRECTORY_ENTRY_IMPORT if e.dll.decode().lower() == own)
     yield python_has((symbol.name.decode() for symbol in of_python.imports), program)
     exported = [symbol.name.decode() for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols]
-    # Windows resolves an import in the named DLL only, so exports of pybind11 cannot collide.
+    # Windows resolves an import in the named DLL only, so exports of pybind11 do no harm.
     ours = [name for name in exported if not PYBIND11.match(name)]
     want(ours == ["PyInit__native"], f"it exports {ours[:5]}")
     flags = image.OPTIONAL_HEADER

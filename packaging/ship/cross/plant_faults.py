@@ -24,7 +24,7 @@ Plant = Callable[[Files], Files]
 
 
 def in_module(change: Callable[[bytes], bytes]) -> Plant:
-    """A fault in the compiled module.
+    """A function that plants a fault into the compiled module of a wheel.
 
     Args:
         change: function from the module's bytes to changed bytes.

@@ -4,9 +4,9 @@
     speed.py FACE.dna FOLDER OTHER [ROUNDS]    FOLDER, OTHER: made by `pip install --target` for
                                                this Python
 
-Processes of both wheels run in turn. Each times loading a file, compiling the rig, and evaluating
-frames with 60 changing raw controls, like docs/measurements/evaluator.md. Prints the quotients
-FOLDER / OTHER of the shortest times and of the medians; above 1, FOLDER is slower.
+Processes of both wheels run in turn. Each process times loading a file, compiling the rig, and
+evaluating frames with 60 changing raw controls, like docs/measurements/evaluator.md. Prints the
+quotients FOLDER / OTHER of the shortest times and of the medians; above 1, FOLDER is slower.
 """
 
 import json

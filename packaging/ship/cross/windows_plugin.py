@@ -4,7 +4,7 @@
 RISORIUS_NOT_RUN names a TOML file with tables. `tests` is a list of patterns of test names
 (file::name, with * and ?), `why` is the reason, and `hangs = true` prevents the test from running.
 In wine, a listed test that passes is a failure, so that outdated lines are removed. On Windows
-itself it may pass, because some reasons concern only wine.
+itself a listed test may pass, because some reasons concern only wine.
 """
 
 import ctypes

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """check.py FOLDER FACE.dna [TAKE.csv]: compares three.js in chromium with the file and the rig.
 
-FOLDER has node_modules, page.html and combinations.js. For each single target, the vertices in
-three.js must equal the sum of the file's numbers and the rig's vertices. For frames of a take, the
-vertices must equal the sum of the file's numbers. The distance from the rig is printed with and
-without the combination driver; with it, the distance must be at most DRIVEN_MM.
+FOLDER has node_modules, page.html and combinations.js. With each target alone, the vertices in
+three.js must equal both the sum of the exported file's numbers and the rig's vertices. For frames
+of a take, they must equal the sum of the file's numbers. The distance from the rig is printed with
+and without the combination driver; with it, the distance must be at most DRIVEN_MM.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""check_body.py FOLDER FACE.dna [BODY.glb]: a face with long hair on a body, in three-vrm.
+"""check_body.py FOLDER FACE.dna [BODY.glb]: tests a face with long hair on a body in three-vrm.
 
 Without BODY a small body is made. The hair of the face is made five times as long, so that it
 hangs. Writes body_new.vrm and body_old.vrm.
@@ -66,7 +66,7 @@ async def try_file(one: Browser, folder: Path, name: str) -> None:
     at_file = {mesh: found.positions(mesh) * sides for mesh in found.meshes()}
     worst = apart(rest, at_file)
     [hair] = [mesh for mesh in rest if mesh.startswith("hair")]
-    # The head turns, and the hair comes behind it.
+    # The head turns at once, and the hair follows later.
     turned = await one.evaluate("at({jawOpen: 1.0}, {head: 0.6}, null)")
     later = await one.evaluate("wait()")
     for state in (turned, later):

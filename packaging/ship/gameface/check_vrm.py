@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests exported VRM files in three-vrm.
 
-For each single expression, the vertices must equal the sum of the file's numbers and the rig's
-vertices. A real take plays by the 52 ARKit units, and a voice by the visemes. Also checks that
-emotions override blinks as the file says, that the head turns, and that the eyes look at a target
-by expressions.
+With each expression alone, the vertices must equal both the sum of the file's numbers and the
+rig's vertices. A real take plays by the 52 ARKit units, and a voice by the visemes. Also checks
+that emotions override blinks as the file says, that the head turns, and that the eyes look at a
+target by expressions.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ async def try_expressions(shown: Shown, folder: Path, dna: Any, rig: Any, kind: 
 
 
 def old_name(name: str) -> str:
-    """The name of a target's expression in three-vrm for VRM 0.x. One name differs from 1.0."""
+    """The name of a target's expression in three-vrm for VRM 0.x; only "surprised" differs."""
     return "Surprised" if name == "surprised" else name
 
 
@@ -175,7 +175,7 @@ async def try_clips(shown: Shown, take: Path | None, voice: Path | None) -> None
 
 
 async def try_gaze(shown: Shown, found: GlbFile) -> None:
-    """Check that the eyes look at a target, and that emotions hold back blinks as the file says."""
+    """Check that the eyes look at a target, and that emotions reduce blinks as the file says."""
     eyes = np.array(await shown.one.evaluate("eyes()"))
     sides = np.array([-1, 1, -1] if "VRM" in found.json["extensions"] else [1, 1, 1])
     front, worst = np.array([0.0, 0.0, 1.0]) * sides, 0.0

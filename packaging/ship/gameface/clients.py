@@ -100,7 +100,7 @@ def from_the_file(
 
 
 def listed(folder: Path, client: str, target: str, away: float) -> None:
-    """Append a row to targets.tsv: client, target, distance in mm from the rig in this pose."""
+    """Append a row to targets.tsv: client, morph target, largest distance from the rig in mm."""
     with (folder / "targets.tsv").open("a") as table:
         table.write(f"{client}\t{target}\t{away:.4f}\n")
 

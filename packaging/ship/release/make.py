@@ -38,7 +38,8 @@ VERSIONS = {
     "native/python/risorius/base/version.py": r'^__version__ = "([^"]+)"',
     "addon/risorius/blender_manifest.toml": r'^version = "([^"]+)"',
 }
-# Largest size of a zip for one platform, bytes: 3 wheels of 4 MB, the sample face of 8 MB and more.
+# Largest size in bytes of a zip for one platform. It contains three wheels of 4 MB each, the sample
+# face of 8 MB, and small files.
 LARGEST = 24 << 20
 
 

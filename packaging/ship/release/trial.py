@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does what a user does who installs from the repository, in a Blender with a window; see trial.sh.
+"""Installs, updates and removes the extension as a user does, in Blender's window; see trial.sh.
 
     blender --python trial.py -- STEP,STEP,... OUT URL
 

@@ -46,7 +46,7 @@ def checks(
     yield "self-test", of("after", "self_test") == done
     yield "faults were tried", len(faults) >= 4
     for name, (there, said) in faults.items():
-        # Blender installs a file for another Python, but does not enable it.
+        # Blender installs an extension for another Python version, but does not enable it.
         refused = there == 0 or "isn't compatible" in said
         yield f"refused with a sentence: {name}", refused and bool(said)
     yield "of two, one runs", (of("twice", "handlers") or 9) == 1

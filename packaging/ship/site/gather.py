@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
 def listed(nav: str) -> list[str]:
-    """The pages in the navigation that exist in the project.
+    """The pages in the navigation that are files of the project, and not made by this script.
 
     Args:
         nav: text of mkdocs.yml.
@@ -87,7 +87,7 @@ def copy_pages(pages: Path, names: Iterable[str]) -> None:
 
 
 def commands() -> str:
-    """The page on the command line: the text of --help of each command."""
+    """The page on the command line, with the text that each command prints for --help."""
     from risorius import cli
 
     def said(*words: str) -> str:
@@ -115,7 +115,7 @@ def commands() -> str:
 
 
 def python_item(module: ModuleType, name: str) -> str:
-    """The entry of a public name: a reference to a class or function, or the text of a value.
+    """The entry of a public name in Markdown: a class or function by reference, or a value as text.
 
     Args:
         module: the module that exports the name.

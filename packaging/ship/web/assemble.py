@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Puts style, script and WebAssembly into one page: assemble.py SOURCES BUILT."""
+"""Combines style, script and WebAssembly into one page: assemble.py SOURCES BUILT."""
 
 import base64
 import gzip

@@ -66,7 +66,7 @@ class Browser:
         return await self.open_address(page.resolve().as_uri(), width, height, phone)
 
     async def open_address(self, address: str, width: int, height: int, phone: bool = False) -> str:
-        """Open a URL, as open() opens a file."""
+        """Open a URL; arguments and result are as in open()."""
         await self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,

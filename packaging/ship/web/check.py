@@ -31,8 +31,8 @@ from risorius.web import page as pages
 ROOT = Path(__file__).resolve().parents[3]
 GOLDEN = ROOT / "tests" / "data" / "golden"
 POSES = 12
-# Largest deviation as a fraction of the head's size. It is not 0, because a page rounds weights to
-# 1/1024 and shapes to 1/16384 of the head's size.
+# Largest deviation of a vertex of a turned head, as a fraction of the head's size. It is not 0,
+# because a page rounds weights to 1/1024, and shapes to 1/16384 of the head's size.
 TURNED = 2e-4
 MOST_BYTES = 4_000_000  # largest size of the sample person's page
 EVALUATE = """(rows => {
@@ -105,7 +105,7 @@ def poses(rig: risorius.Rig) -> list[tuple[int, list[float]]]:
 
 
 async def same_numbers(one: Browser, path: Path, page: Path, places: int = 0) -> str:
-    """Compare the page's outputs with the scalar path of the package, bit by bit.
+    """Compare the page's outputs bit by bit with those of the package (scalar code, without SIMD).
 
     Args:
         one: the browser.
@@ -168,9 +168,9 @@ def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
 
 
 async def same_turned_head(one: Browser, built: Path) -> str:
-    """Compare the vertices of a clip that turns neck and head with a NumPy implementation.
+    """Compare the page's vertices with a NumPy implementation, in a clip that turns neck and head.
 
-    The face has neck poses.
+    The face has RBF poses of the neck.
 
     Returns: a sentence.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Checks how people use a page: drop takes and sounds on it, touch it, embed it in other pages.
+"""Checks the uses of a page: dropping takes and sounds on it, touch, embedding in other pages.
 
-Also checks that no page requests an address outside.
+Also checks that no page requests an address of the network.
 """
 
 from __future__ import annotations

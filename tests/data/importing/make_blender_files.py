@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes blender.glb and blender.fbx beside itself: a triangle with three animated shape keys.
+"""Writes blender.glb and blender.fbx into this folder: a triangle with three animated shape keys.
 
 python tests/data/importing/make_blender_files.py    (with bpy; the files are of bpy 4.5)
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clip objects: valid and refused arguments, and interpolation between frames."""
+"""Tests Clip objects: valid and refused arguments, and interpolation between frames."""
 
 from __future__ import annotations
 

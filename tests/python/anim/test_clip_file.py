@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips in .rzc files: lossless round trips, parts, recordings, and refusals."""
+"""Tests clips in .rzc files: lossless round trips, parts, recordings, and refusals."""
 
 import os
 import threading
@@ -10,7 +10,7 @@ from risorius import Clip, ClipError, ClipReader, ClipWriter, Event
 
 
 def make_clip(frames=1300, times=True):
-    """A clip of random bits with NaN payloads, -0 and denormals; one curve rests, one repeats."""
+    """Random bits with NaN, -0 and denormals; two curves are constant, one equals another."""
     rng = np.random.default_rng(1)
     bits = rng.integers(0, 2**32, (7, frames), np.uint64).astype(np.uint32)
     bits[3] = 0x7FC12345
@@ -95,7 +95,7 @@ def test_a_recording_is_the_clip(tmp_path):
         take.event(clip.events[1])
         assert take.frame_count == 1300
         assert not (tmp_path / "take.rzc").exists()
-        # Recorded frames can be read during the recording.
+        # Frames that have been recorded can be read while the recording continues.
         part = ClipReader(take.part, recover=True)
         assert part.frame_count == 1024
         assert part.read().curves.tobytes() == clip.curves[:, :1024].tobytes()

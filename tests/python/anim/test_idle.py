@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Idle movement: equal for equal seeds, in range, with measured speeds and frequencies."""
+"""Tests idle movement: equal for equal seeds, in range, with measured speeds and frequencies."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def blinks_and_saccades(seed, length=600.0, life=None, loop=False):
 
 
 def angles(clip, side="L"):
-    """Rotation of an eye in degrees to the face's left and up."""
+    """Rotation of an eye in degrees: to the face's left, and up."""
     look = {d: clip.curve(f"{P}eyeLook{d}{side}") for d in ("Left", "Right", "Up", "Down")}
     return (look["Left"] - look["Right"]) * 35.0, (look["Up"] - look["Down"]) * 30.0
 
 
 def test_a_seed_gives_the_same_everywhere():
-    # Recorded in one run. On another machine, a difference would come from NumPy's random bits or
-    # from arithmetic.
+    # The constants were recorded in one run. On another machine, NumPy's random bits or arithmetic
+    # could differ.
     clip = idle(7, 20.0)
     assert [round(e.time, 6) for e in clip.events] == EVENTS
     np.testing.assert_allclose(clip.curve(P + "browRaiseInL")[::300], BROW, atol=1e-6)

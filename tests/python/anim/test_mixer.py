@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mixer, compared with a NumPy version written from the comment in clip/mixer/mixer.h."""
+"""Compares the mixer with a NumPy version that follows the comment in clip/mixer/mixer.h."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def noise(names=tuple(NAMES[:5]), frames=25, seed=3, **settings):
 
 
 def clip_time(layer, clip, t):
-    """The clip time at a scene time within the layer's range."""
+    """The time in the clip that a layer shows at the scene time t, both in seconds."""
     if layer.warp is not None:
         assert not layer.reverse  # refused: a descending warp plays backwards
         return float(np.interp(t, *layer.warp))
@@ -58,7 +58,7 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The scene time at which the layer is evaluated, or None if it has no effect."""
+    """The scene time at which a layer is evaluated, extended or not; None if it has no effect."""
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time
@@ -83,7 +83,7 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """Steps 1, 2 and 5 of the comment in mixer.h."""
+    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h."""
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
     for layer in layers:
@@ -210,7 +210,7 @@ def test_bakes_what_it_evaluates():
 
 
 def test_a_warp_that_falls_plays_backwards():
-    """For a clip whose value is its time, the result is the line of the warp: 0.75 - t / 2."""
+    """A clip whose value is its time shows the clip time that the warp gives: 0.75 - t / 2."""
     ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
     mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
     times = np.linspace(0.25, 1.25, 11)
@@ -218,7 +218,7 @@ def test_a_warp_that_falls_plays_backwards():
     np.testing.assert_allclose(shown, 0.75 - times / 2, rtol=0, atol=1e-6)
 
 
-# Settings that a warp replaces, and that are refused with a warp.
+# Settings that the warp of a layer replaces; a layer with both is refused.
 BESIDE_A_WARP = (
     {"start": 0.5}, {"end": 3.0}, {"clip_range": (0.25, 0.5)}, {"scale": 2.0}, {"repeat": 2.0},
     {"reverse": True},
@@ -305,7 +305,7 @@ def test_firing_again_makes_no_step_and_never_goes_beyond_one():
         mixer.fire("two", when)
     curve = mixer.evaluate_batch(times)[:, 0]
     assert curve.max() <= 1.0
-    # The largest slope of x * x * (3 - 2 * x) is 1.5 / attack; sixteen attacks may overlap.
+    # The slope of x * x * (3 - 2 * x) is at most 1.5 / attack, and at most sixteen attacks overlap.
     assert np.abs(np.diff(curve)).max() < 16 * 0.8 * 1.5 / 0.3 * (times[1] - times[0])
 
 
@@ -361,9 +361,9 @@ def test_yields_see_values_before_any_of_them():
 
 
 def test_the_seal_of_an_open_jaw_stills_the_lips():
-    """The lips-together controls have no effect with a shut jaw.
+    """The lips-together controls suppress the upper lip only while the jaw is open.
 
-    Then they neither hide teeth nor hold the jaw.
+    With a shut jaw they suppress no control, and they never change the jaw.
     """
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
     names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]
@@ -405,7 +405,7 @@ def test_files_of_rules_and_reactions(tmp_path):
 
 
 def test_every_region_has_standard_controls_and_a_title(standard_controls):
-    """The order of the regions must stay, because the add-on stores their indices."""
+    """The order of regions must not change, because the add-on stores their indices."""
     assert " ".join(REGIONS) == "brow eye nose cheek mouth jaw tongue teeth neck ear other"
     assert {region_of(name) for name in standard_controls} == set(REGIONS) - {"other"}
     assert TITLES["brow"] == "Brows"

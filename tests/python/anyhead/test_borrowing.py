@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts from a template get the template's textures; the head's own parts keep their textures."""
+"""Tests that parts from a template get its textures, and that a head's own parts keep theirs."""
 
 from risorius import Dna
 from risorius.anyhead.borrowing import lend_materials

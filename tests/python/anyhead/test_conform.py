@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of conform: a face takes the form of another head and keeps its topology."""
+"""Tests of conform, which gives a face the form of another head but keeps its topology."""
 
 import copy
 import json
@@ -57,7 +57,7 @@ def ball(middle, joint, radius=1.3, rings=8, around=12):
 
 
 def with_lid(mesh):
-    """A skin whose left lid is skinned to a joint at the centre of the eye, so that it slides."""
+    """The skin with a left lid skinned to a joint in the eye's centre, so that it slides."""
     lid = (np.abs(mesh.positions[:, :2] - 3.0) < 1.7).all(axis=1)
     joints = np.array(mesh.skin_joint_indices).reshape(-1, 4)
     weights = np.array(mesh.skin_weights).reshape(-1, 4)
@@ -90,7 +90,7 @@ def skin_points(dna):
 
 
 def stretched(points):
-    """Points of another head, wider at the top, with a longer chin."""
+    """Skin points changed to another head's: wider at the top, with a longer chin, moved."""
     out = points * [1.1, 1.0, 0.95]
     out[:, 0] *= 1 + 0.01 * points[:, 1]
     out[:, 1] -= 0.02 * np.clip(-points[:, 1], 0, None) ** 1.5
@@ -98,7 +98,7 @@ def stretched(points):
 
 
 def posed(dna, mesh, **raw):
-    """float64[V, 3]: posed vertices, computed by the evaluator and skinning of the tests."""
+    """float64[V, 3]: posed vertices, computed by the oracle and by the skinning of the tests."""
     rig = risorius.Rig(dna)
     values = np.array(rig.initial_raw_controls, np.float64)
     for name, value in raw.items():
@@ -206,13 +206,16 @@ def test_eyes_stay_spheres_about_their_joints_and_turn_in_place(face):
 
 
 COLUMNS = np.radians(np.linspace(-60, 60, 13))
-# Rows of a lid: elevation in degrees, distance from the eye's centre in cm.
+# Rows of the upper lid: elevation in degrees, distance from the eye's centre in cm.
 ROWS = [(60, 1.1), (45, 1.1), (30, 1.1), (20, 1.1), (10, 1.1), (10, 1.0)]
 
 
 def face_with_lids(shape):
-    """Two lids in front of an eye of radius 1 cm at the origin. A control turns the upper lid by 20
-    degrees, so that its rim meets the lower lid. shape: adds a blend shape without motion."""
+    """A face of two lids in front of an eye with radius 1 cm at the origin.
+
+    A control rotates the upper lid by 20 degrees, so that its rim meets the lower lid.
+    shape: adds a blend shape without motion.
+    """
     upper = np.array([
         [r * np.sin(a), r * np.cos(a) * np.sin(e), r * np.cos(a) * np.cos(e)]
         for e, r in ((np.radians(e), r) for e, r in ROWS) for a in COLUMNS
@@ -279,7 +282,7 @@ def test_lids_close_on_an_eye_that_is_wider_open(shape, left):
     wide[:, 1] += 0.05 * (points[:, 1] > 0) * np.cos(points[:, 0])
     other = conform(face, {SKIN: wide})
     assert np.abs(skin_points(other) - wide).max() < 1e-5
-    # With the unchanged angle the lid stops halfway.
+    # With the original face's angle, the lid would stop before it meets the lower lid.
     was = copy.copy(other)
     was.joint_groups = face.joint_groups
     if shape:
@@ -301,7 +304,8 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
     for a, b in zip(found.meshes, wanted.meshes, strict=True):
         assert np.abs(a.positions - b.positions).max() < 1e-5
         assert np.abs(a.normals - b.normals).max() < 0.05  # polygons have other triangulations
-    # Grid cells of the smoothing depend on the axes; the root joint, far below, differs most.
+    # The grid of the smoothing depends on the axes; the root joint, far below the head, differs
+    # most.
     off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
     assert off.max() < 3e-3
     assert np.median(off) < 1e-4
@@ -311,7 +315,7 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
 
 
 def as_part(dna, points, cut=False, name="sculpt"):
-    """The skin as a HeadPart. cut: the polygons are triangulated."""
+    """The face's skin with other vertices as a HeadPart. cut: quads are cut into triangles."""
     mesh = dna.meshes[0]
     faces = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)].reshape(-1, 4).tolist()
     if cut:
@@ -338,7 +342,10 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
 
 
 def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
-    """Exact results replace the earlier steps, which other tests cover."""
+    """Only the last step, which moves the head to the face, is tested.
+
+    The registration, which other tests cover, is replaced by its exact result.
+    """
     system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
     mirrored = face.convert(**system, face_winding_order="ccw")
     points = stretched(skin_points(face))  # cm, standing

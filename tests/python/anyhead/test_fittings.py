@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that eyes, teeth, tongue and lashes of a head are found, or fitted in from a template."""
+"""Tests that a head's eyes, teeth, tongue and lashes are found, or taken from a template."""
 
 import sys
 from pathlib import Path
@@ -25,7 +25,7 @@ def head():
 
 
 def strip(side):
-    """A mesh of upper lashes: a narrow band of quads in front of the upper lid's edge."""
+    """Points and quads of upper lashes: a narrow band in front of the upper lid's edge."""
     x = np.linspace(-0.8, 0.8, 12)
     y = 0.5 * np.sqrt(1 - (x / 1.05) ** 2)
     root = np.stack([x, y, np.sqrt(RADIUS**2 * 1.12 - x**2 - y**2)], axis=1) + EYE
@@ -35,7 +35,7 @@ def strip(side):
 
 @pytest.fixture(scope="module")
 def template(head):
-    """A DNA file of the test head with eyes, teeth and lashes."""
+    """The test head with eyes, teeth and lashes, as a Dna."""
     face = part("head", head.points, head.faces)
     face.shapes = dict(head.ways)
     lashes = part("eyelashes", *strip(1))
@@ -89,7 +89,7 @@ def test_no_mesh_is_refused():
 
 @pytest.fixture(scope="module")
 def larger(head, template):
-    """The skin of a head of 1.5 times the size at another place, completed from the template."""
+    """(Parts of a skin of 1.5 times the size, completed; the function that moves points.)"""
     move = lambda points: 1.5 * np.asarray(points) + [0, 10, 3]  # noqa: E731
     found = sort_parts([part("skin", move(head.points), head.faces)])
     return complete(found, template, move(template.meshes[0].positions)), move
@@ -127,7 +127,7 @@ def test_a_painted_eye_gets_no_eyeball(template):
 
 
 def test_eyes_that_are_shut_get_no_eyeballs(head, template):
-    """The displacement of a blink is added to the head at rest."""
+    """The head's eyes are shut at rest, by adding the displacement of a blink."""
     shut = mask(short=0.0)
     points = shut.points + shut.ways["eyeBlinkL"] + shut.ways["eyeBlinkR"]
     fitted = complete(sort_parts([part("skin", points, shut.faces)]), template, points)

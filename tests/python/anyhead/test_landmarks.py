@@ -39,20 +39,20 @@ def formed(seed: int) -> np.ndarray:
 
 
 def head(seed: int) -> tuple[Surface, dict[str, np.ndarray]]:
-    """A random head of the model, and its exact landmarks."""
+    """A random head of the model, and its exact landmarks: name -> place."""
     form, points = head_form(), formed(seed)
     places = {name: points[vertex] for name, vertex in form.places.items()}
     return Surface(points[: form.skin], form.triangles), places
 
 
 def chin() -> np.ndarray:
-    """A point in front of the chin of head 3."""
+    """A point in front of the chin of the head with seed 3."""
     return np.asarray(head(3)[1]["chin"] + np.array([0.0, 0.0, 0.1]))
 
 
 @cache
 def found(seed: int) -> Found:
-    """The result of find_form for a head; for head 3 an eyeball and the chin are given."""
+    """The result of find_form for a head; with seed 3 an eyeball and the chin are given."""
     given = Hints("head.obj", {"chin": chin()}, Y, Z, (formed(3)[head_form().skin],))
     return find_form(head(seed)[0], given if seed == 3 else STANDS)
 
@@ -62,7 +62,7 @@ def worst(have: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> float:
 
 
 def closed(surface: Surface, around: np.ndarray) -> Surface:
-    """The surface with the hole around a point closed."""
+    """The surface with the hole around a point closed by a fan of triangles."""
     sides = surface.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     there = {(int(a), int(b)) for a, b in sides}
     open_ = np.array([(a, b) for a, b in there if (b, a) not in there])
@@ -74,7 +74,7 @@ def closed(surface: Surface, around: np.ndarray) -> Surface:
 
 
 def joined(one: Surface, other: Surface) -> Surface:
-    """Two surfaces joined into one; the vertices of the second follow those of the first."""
+    """One surface of two; the second one's vertices follow the first one's."""
     return Surface(
         np.concatenate([one.points, other.points]),
         np.concatenate([one.triangles, other.triangles + len(one.points)]),

@@ -21,7 +21,7 @@ CONTROLS = {"jaw_open": "jawOpen", "smile": "mouthCornerPullL", "pucker": "mouth
 
 @pytest.fixture(scope="module")
 def template(tmp_path_factory):
-    """The mean head with three expressions, as a DNA file."""
+    """The path of a DNA file of the mean head with three expressions."""
     form = head_form()
     every = zip(form.expression_names, form.expressions, strict=True)
     ways = {CONTROLS[name]: way[: form.skin] for name, way in every if name in CONTROLS}
@@ -35,7 +35,10 @@ def template(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
-    """The OBJ file of another head (z up, metres, triangles in another order); its points in cm."""
+    """Path of the OBJ file of another head, and the head's points in cm.
+
+    The file has z up, metres, and triangles in another order.
+    """
     form = head_form()
     parts = np.zeros(len(form.parts))
     parts[[1, 3, 5]] = 1.0, -1.0, 0.7

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the registration on heads of a formula, whose corresponding points are known exactly."""
+"""Tests of the registration on computed heads, whose corresponding points are known exactly."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def found(heads):
 
 
 def _mm(template, found, true):
-    """Errors along the surface, in mm of a head of 240 mm."""
+    """Errors of vertices along the surface, in mm for a head of 240 mm."""
     return any_heads.errors(template, found, true) * any_heads.HEAD_MM / np.ptp(true[:, 1])
 
 

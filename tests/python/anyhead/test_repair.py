@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of repair: lids and lips close, and expressions without faults stay unchanged."""
+"""Tests of repair: lids and lips close, and expressions without faults do not change."""
 
 import copy
 import sys
@@ -60,8 +60,11 @@ def mended(head, skin, fitted):
 
 
 def seen(skin, points, ball):
-    """The number of parallel rays from the front that hit the eye, in a grid of 0.2 mm, and the
-    largest number in one column. Independent of the code under test."""
+    """How much of an eye is visible from the front, computed without the code under test.
+
+    Parallel rays start in a grid of 0.2 mm. Returns the number of rays that hit the eye, and the
+    largest number in one column of the grid.
+    """
     at = np.arange(-RADIUS, RADIUS, 0.02)
     x, y = (grid.ravel() for grid in np.meshgrid(at, at))
     begin = ball.middle + np.stack([x, y, np.full(len(x), 9.0)], axis=1)
@@ -97,7 +100,7 @@ def test_lids_that_close_already_stay_as_they_are(skin, fitted, mended):
 
 
 def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
-    """A lid is pressed 1 mm into the eye while the eye looks down."""
+    """An upper lid that is pressed into an eye that looks down is lifted out of the cornea."""
     lids = find_eyelids(skin, fitted.eyes["L"])
     arm = skin.points - EYE
     inwards = np.where(
@@ -119,7 +122,8 @@ def test_lips_meet_where_an_open_jaw_is_closed(head, skin, mended):
     assert before.lip_gap > 1.5
     assert after.lip_gap <= 0.3
     assert after.lip_cut <= 0.15
-    # Measured independently: distances between lower and upper lip line, which coincide at rest.
+    # Distances between the lower and the upper line of the lips, which coincide at rest; they are
+    # measured without the tested code.
     points = skin.points + mended.combinations[CLOSED]
     line = np.flatnonzero(np.abs(skin.points[:, 1] - MOUTH) < 0.01)
     middle = line[np.abs(skin.points[line, 0]) < 0.6 * HALF]

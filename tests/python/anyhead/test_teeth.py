@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The jaw of a head by its skin and by its own teeth; eyeballs before a head stands; stopping."""
+"""Tests of a head's jaw, measured by its skin or its own teeth.
+
+Also tested: pairs of balls may be eyes, the search for a face can be stopped, and lids meet.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests of the transfer of expressions to heads on which a formula gives the right result."""
+"""Tests of the transfer of expressions to heads for which the right result can be computed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NAMES = {"mouthSmileLeft": SMILE, "eyeBlinkLeft": BLINK, "jawOpen": "jawOpen"}
 
 
 def face(unit="cm", scale=1.0):
-    """A face with three expressions and a corrective, in a given unit."""
+    """(face with three expressions and a corrective in a unit, expressions, corrective; in cm)."""
     points, faces = face_shapes.head()
     ways = {NAMES[n]: d for n, d in face_shapes.expressions(points).items() if n in NAMES}
     mesh = ObjMesh(scale * points, np.zeros((0, 2)), faces.tolist(), [[]] * len(faces))
@@ -40,7 +40,12 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """Transfer to a head; points: positions of the template's vertices on it."""
+    """Transfer the template's expressions to a head.
+
+    Args:
+        points: positions of the template's vertices on the head.
+        target: surface of the head; None: the template's triangles with these points.
+    """
     target = target or Surface(points, template.surface.triangles)
     return transfer(
         template, target, points, np.ones(len(points)), TransferOptions(threads=1, **options)
@@ -96,7 +101,7 @@ def test_a_wider_head_has_a_wider_smile_and_no_longer_one(template) -> None:
 
 
 def finer(points, triangles):
-    """The surface with each triangle split into four; also both end vertices of each new vertex."""
+    """Points and triangles of a surface, each triangle split into four at its edges' middles."""
     edges, rows = np.unique(
         np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1),
         axis=0, return_inverse=True,
@@ -136,8 +141,10 @@ def test_a_hole_of_the_template_is_filled_from_around_it(template) -> None:
 
 
 def slit():
-    """Two plates, edge to edge with a tiny gap, of which the lower one moves down; also the vertex
-    indices of the upper plate."""
+    """Points in cm and quads of two plates, edge to edge with a gap of 0.2 mm, as two lips.
+
+    Also returns the number of vertices of the upper plate, which come first.
+    """
     x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(0.01, 4, 21))
     up = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
     corner = np.arange(21 * 21).reshape(21, 21)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint rigs from expressions: an independent reader checks written files; bad input is refused."""
+"""Tests joint rigs made from expressions: an independent reader checks them; refused input."""
 
 import copy
 import importlib.util
@@ -39,7 +39,7 @@ from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
 
-# Skinning and morphing from the format's description, without code of risorius.author.
+# The module computes skinning and morphing from the format's description, without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
@@ -52,7 +52,7 @@ EIGHT = [506, 304, 182, 109, 66, 39, 24, 24]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("egg")
-    # Given vertex budgets are respected; without budgets a face of 506 vertices has fewer LODs.
+    # The spec gives vertex budgets, because a face of 506 vertices has fewer LODs without them.
     face_shapes.write_all(folder, more=f"[lods]\nvertices = {EIGHT}\n")
     return folder
 
@@ -68,12 +68,12 @@ def made(folder):
 
 
 def tolerated(times=1.0):
-    """The default tolerance of a vertex in cm, a fraction of the head's height, times a factor."""
+    """The default tolerance of a vertex in cm, multiplied by a factor. Args: times  the factor."""
     return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
 def posed(dna, controls):
-    """Posed vertices in metres. Args: controls  raw control without prefix -> value."""
+    """Posed vertices in metres. Args: controls  raw control without prefix -> value; others: 0."""
     rig = risorius.Rig(dna)
     names = list(dna.raw_control_names)
     values = np.zeros(len(names), np.float32)
@@ -119,7 +119,7 @@ def test_the_file_is_sound_and_says_what_moves(made):
 
 @pytest.fixture(scope="module")
 def read(folder, made):
-    """The written file, parsed by an independent reader."""
+    """The written file, read without Risorius."""
     return dna_bytes.Face((folder / "egg.dna").read_bytes())
 
 
@@ -136,7 +136,7 @@ def test_another_reader_gets_the_same_expression(read, name):
 
 
 def test_eight_levels_by_another_reader(read, made):
-    """Each level has a subset of the finer level's joints and vertices, and stays near it."""
+    """Each LOD has a subset of the finer LOD's joints and vertices, and moves nearly like it."""
     _, said = made
     assert read.lod_count == 8
     counts = [len(read.geometry[m[0]]["positions"]) for m in read.lod_meshes]
@@ -164,7 +164,7 @@ def test_eight_levels_by_another_reader(read, made):
 
 
 def test_levels_end_before_the_picture_breaks(folder, tmp_path):
-    """A small face has fewer levels; their skin stays near the fine one and does not fold."""
+    """A small face has fewer LODs; their skin stays near the fine skin and does not fold."""
     text = (folder / "spec.toml").read_text(encoding="utf-8")
     for name in ("neutral.obj", "shapes"):
         text = text.replace(f'"{name}"', f'"{(folder / name).as_posix()}"')
@@ -190,7 +190,7 @@ def test_levels_end_before_the_picture_breaks(folder, tmp_path):
 
 
 def test_hair_of_more_vertices_than_the_skin_ends_no_level():
-    """A head with hair cards gets the same levels as without hair."""
+    """A head with hair cards gets the same LODs as without hair."""
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     shapes = shape_face.ShapeSet(
@@ -221,7 +221,7 @@ def test_hair_of_more_vertices_than_the_skin_ends_no_level():
 
 
 def test_pieces_of_a_mesh_stay_whole_or_go_together():
-    """A head mesh with two eyes and forty lashes keeps both eyes, and all lashes or none."""
+    """A mesh with two eyes and forty lashes keeps both eyes, and all lashes or none."""
     positions, faces = face_shapes.head()
     eye = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], float)
     box = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2],
@@ -251,7 +251,7 @@ def test_pieces_of_a_mesh_stay_whole_or_go_together():
 
 
 def test_a_coarser_level_keeps_the_rim_and_is_no_fold(read):
-    """The open rim of the face keeps its extent, and no triangle is flipped."""
+    """The open rim of the face keeps its extent, and no triangle's direction is reversed."""
     positions, _ = face_shapes.head()
     for lod in range(1, 5):
         mesh = read.geometry[read.lod_meshes[lod][0]]
@@ -292,7 +292,7 @@ def test_budgets_are_kept(folder, tmp_path):
 
 
 def test_a_seam_of_the_texture_stays_closed():
-    """A simplified sheet of two halves with a texture seam has no gap and the same corners."""
+    """A simplified sheet whose texture has a seam in the middle has no gap and the same corners."""
     n = 12
     x, y = np.meshgrid(np.arange(2 * n + 1), np.arange(n + 1))
     positions = np.stack([x.ravel(), y.ravel(), 0.01 * (x * y).ravel()], axis=1).astype(float)
@@ -397,7 +397,8 @@ def test_joints_alone_come_near(folder, tmp_path):
         error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
-        # Motion along an arc is also fitted at half its way, so the error at the end is larger.
+        # Motion along an arc is also fitted at half of its way, which makes the error at its end
+        # larger.
         assert error.max() < 0.12 * np.linalg.norm(delta, axis=1).max() * METRES
         if name.startswith(("mouth", "brow")):  # others follow an arc
             between = max(
@@ -415,7 +416,7 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     )
     assert np.abs(jaw.position - [0, 0, -2]).max() < 0.2
     assert jaw.expressions == (0,)
-    # A lid of vertices on the surface of a ball, which slides down along it.
+    # Vertices of a lid on the surface of a ball, along which the lid slides down.
     middle, turn = np.array([3.0, 2.0, 7.0]), np.linspace(0.1, 0.6, 9)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.7, 0.7, 9), turn))
 
@@ -464,14 +465,17 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    # The result of 200 rounds depends on the compiler's rounding.
+    # The margin is only 2 %, because the result of 200 rounds depends on the compiler's rounding.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)
 
 
 def test_joints_that_are_there_stay(folder):
-    """A neck still carries its half of the lower vertices, and a jaw keeps its motion."""
+    """A source with a neck and a jaw joint keeps both.
+
+    The neck joint keeps its weight of 0.5 on the lower vertices, and the jaw keeps its rotation.
+    """
     read = spec.read_spec(folder / "spec.toml")
     dna = spec.read_face(read).dna
     positions, _ = face_shapes.head()
@@ -515,7 +519,10 @@ def test_joints_that_are_there_stay(folder):
 
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
-    """At 0.5 and with other expressions, the skin is where jaw and shapes of the source put it."""
+    """New joints in the skin that the jaw moves become children of the jaw joint.
+
+    So the skin equals the source's at jawOpen 0.5 and in combinations with other expressions.
+    """
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     hinge = np.array([0, 0, -2.0])
@@ -584,7 +591,7 @@ def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
 
 
 def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
-    """The source's LOD 1 has every third row and second column of vertices, and its own shapes."""
+    """LOD 1 of the source has every third row and second column of vertices, and its own shapes."""
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     grid = np.arange(len(positions)).reshape(face_shapes.DOWN, face_shapes.ACROSS)[::3, ::2]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Correctives from sculpts and from the search, evaluated by an independent reader."""
+"""Tests correctives from sculpts and from the search, evaluated by an independent reader."""
 
 import itertools
 import json
@@ -29,7 +29,11 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """The egg in a combination: less smile, and an additional bulge."""
+    """Sculpted displacements in cm of two combinations, which weaken a smile; one adds a bulge.
+
+    Args:
+        positions: float64[V, 3], the egg's vertices in cm.
+    """
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -66,7 +70,7 @@ def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    # The tolerance of each active expression and corrective, and rounding.
+    # Number of active expressions and correctives; each may have an error up to the tolerance.
     parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
     assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
@@ -142,9 +146,9 @@ def test_a_wrong_table_is_one_sentence(tmp_path, table, sentence):
     assert sentence in done.stderr
 
 
-# A sheet of 40 x 40 mm, 1 mm above a ball of 40 mm, at two levels, with lashes above it. Two
-# controls push the middle of the sheet down softly, each by less than 1 mm. A third control pushes
-# a place far away.
+# A sheet of 40 x 40 mm is 1 mm above a ball of 40 mm, at two LODs, with lashes above it. Controls
+# a, b and d push the middle of the sheet down softly, by less than 1 mm each; control c pushes a
+# place far away.
 SIDE = 41
 BALL = np.array([0.0, -21.0, 0.0])
 RADIUS = 20.0
@@ -193,9 +197,9 @@ def make_face(pushes, turning=None, first="head_lod0_mesh"):
     """A face whose controls push the sheet.
 
     Args:
-        pushes: pushes of the controls.
-        turning: control that also turns everything about x by 25 degrees, or None.
-        first: name of the file's first mesh.
+        pushes: control -> arguments of push.
+        turning: control that also rotates everything about x by 25 degrees, or None.
+        first: name of the mesh that is first in the file.
     """
     count = len(pushes)
     parts = {
@@ -264,13 +268,13 @@ def corrected(face):
 
 
 def skin_of(read, controls, lod=0):
-    """float64[V, 3]: posed vertices of the sheet in mm; it is the first mesh of a level."""
+    """float64[V, 3]: posed vertices of the sheet in mm; the sheet is the first mesh of each LOD."""
     side = SIDE if lod == 0 else 21
     return 10 * read.vertices(controls, lod)[: side * side]
 
 
 def depth(positions):
-    """Depth inside the ball in mm. Args: positions  float64[V, 3], mm."""
+    """float64[V]: depth inside the ball in mm. Args: positions  float64[V, 3], mm."""
     return RADIUS - np.linalg.norm(positions - BALL, axis=1)
 
 
@@ -285,7 +289,8 @@ def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
 
 
 def test_what_has_a_corrective_is_as_somebody_wanted_it(face):
-    # The sculpt goes deeper into the ball: the search keeps it, and repairs the other pair.
+    # The sculpt of a and b goes deeper into the ball. The search does not change it, and repairs
+    # the pairs of d.
     sculpt = push(sheet(SIDE)[0], 0.5, 9.0) / 10
     found = find_correctives(add_correctives(face, 0, [((0, 1), sculpt)]))
     assert {one.controls for one in found.correctives} == {(0, 3), (1, 3)}
@@ -300,7 +305,8 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
         plain, _ = sheet(SIDE if lod == 0 else 21)
         linear = plain + sum(push(plain, *PUSHES[name]) for name in names)
         assert depth(linear).max() > 0.6
-        # Vertices away from the ball stay; each goes as far down as by either expression alone.
+        # Vertices away from the ball move by both pushes; each vertex goes down at least as far as
+        # with one control alone.
         away = np.hypot(plain[:, 0], plain[:, 2]) > 17
         assert np.abs(posed[away] - linear[away]).max() < 1e-3
         least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)
@@ -324,8 +330,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Near the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
-    # elsewhere makes undoing cheap.
+    # Near the fault of 0.35 mm, the expression that is undone balances a rise of 6 mm by the other
+    # one. Its effect in other places makes undoing cheap.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])
@@ -406,13 +412,15 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
+    # 2 and 3 move no common vertices, so that triples with both are not tried; 0 and 2 do, and
+    # their pair has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
 
 def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
-    # A single measure such as volume / 100 + folds / 5 would put all pairs with volume first.
+    # If faults were compared by one number, such as volume / 100 + folds / 5, all pairs with volume
+    # would come first.
     sums = {(0, i): SimpleNamespace(volume=100.0 + i, stretched=0, folded=0) for i in range(1, 21)}
     sums |= {(1, i): SimpleNamespace(volume=0.0, stretched=0, folded=4) for i in range(30, 50)}
     sums[2, 50] = SimpleNamespace(volume=5.0, stretched=0, folded=0)  # too small to be repaired
@@ -420,7 +428,7 @@ def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
     assert len(chosen) == len(set(chosen)) == 20
     folds = [on for on in chosen if on[0] == 1]
     assert 8 <= len(folds) <= 12
-    # Of the pairs with volume, the pairs with the largest volume are chosen.
+    # Of the pairs with volume, the ones with the largest volume are chosen.
     assert {on for on in chosen if on[0] == 0} == {(0, i) for i in range(len(folds) + 1, 21)}
     assert set(fairest_of(sums, 40)) == set(fairest_of(sums, 999)) == set(sums) - {(2, 50)}
     assert fairest_of(sums, 0) == []
@@ -449,7 +457,8 @@ def test_it_ends_where_it_is_told_to(face):
 
 
 def test_a_triple_that_pairs_do_not_repair_gets_its_own(face):
-    # Without a limit of its own a, b and d together push 2.6 mm; the pairs with b are repaired.
+    # Here a and d are no opposites: a, b and d together push the sheet by 2.6 mm, and each pair of
+    # them is repaired.
     found = find_correctives(face, CorrectiveOptions())
     assert {one.controls for one in found.correctives} >= {(0, 1), (0, 3), (1, 3)}
     rows = [(one.controls, one.shape) for one in found.correctives]
@@ -474,7 +483,7 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     found, _ = corrected
     rows = {one.controls: one.shape for one in found.correctives}
     first = add_correctives(face, found.skin, [((0, 1), rows[0, 1])])
-    # Few joints and shapes approximate badly, so that the sheet enters the ball again.
+    # Few joints and a large tolerance approximate badly, so that the sheet enters the ball again.
     rig = make_joint_rig(first, RigOptions(FitOptions(joints=2, rounds=2), tolerance_mm=0.5)).dna
     options = CorrectiveOptions(apart=(("a", "d"),))
     again = correct_again(rig, face, options)
@@ -482,11 +491,12 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     for names in (("a", "b"), ("b", "d")):
         assert depth(skin_of(before, at_one(*names))).max() > 0.35
         assert depth(skin_of(after, at_one(*names))).max() < 0.11
-    # One pair has a corrective already, the other gets one; single controls stay the same.
+    # The corrective of one pair is improved, the other pair gets one; single controls stay the
+    # same.
     assert (rig.psd_count, again.psd_count) == (1, 2)
     for name in PUSHES:
         assert (skin_of(before, at_one(name)) == skin_of(after, at_one(name))).all()
-    # If the first corrective were a sculpt, it would stay unchanged.
+    # If the first corrective belongs to the input, like a sculpt, it is not changed.
     kept = dna_bytes.Face(correct_again(rig, first, options).to_bytes())
     assert (skin_of(before, at_one("a", "b")) == skin_of(kept, at_one("a", "b"))).all()
 
@@ -523,7 +533,7 @@ def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
-    """The sums by moments equal those of a matrix with three rows for each vertex."""
+    """Equations that are summed from moments equal those of a matrix with 3 rows per vertex."""
     random = np.random.default_rng(7)
     joints, vertices = 9, 200
     turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]

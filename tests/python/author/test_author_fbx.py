@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads from FBX: pivots, orders of rotation, axes, units and in-between targets; bad files."""
+"""Tests heads from FBX: pivots, orders of rotation, axes, units, in-between targets; bad files."""
 
 import command_line
 import face_shapes
@@ -24,7 +24,7 @@ ORDER, ORDERS = 4, ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")
 
 
 def turned(points, degrees, order="XYZ", back=False):
-    """Points rotated about one axis after another by Rodrigues' formula."""
+    """Points rotated by degrees about the axes in this order, or back, by Rodrigues' formula."""
     for letter in reversed(order) if back else order:
         axis = "XYZ".index(letter)
         angle = np.radians(degrees[axis]) * (-1 if back else 1)
@@ -59,7 +59,7 @@ def vectors(points):
 
 
 class Egg:
-    """An FBX of the tests' head; its parts can be changed before it is saved."""
+    """An FBX with the head of face_shapes, whose parts can be changed before it is saved."""
 
     def __init__(self):
         self.positions, quads = face_shapes.head()
@@ -102,7 +102,7 @@ class Egg:
         for number, (name, delta) in enumerate(self.moved.items()):
             channel = 100 + 10 * number
             links.append((channel, BLEND))
-            # An in-between target that is not on the straight line, then the full target.
+            # An in-between target that is not on the straight line, before the full target.
             weights = [50.0, 100.0] if number == 1 else [100.0]
             objects.append(
                 ("Deformer", (I64(channel), f"face.{name}\0\1SubDeformer", "BlendShapeChannel"),
@@ -232,7 +232,7 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
 
 
 def test_damaged_files_are_refused_or_read(tmp_path):
-    """Changed bytes and cut files raise only errors of Risorius."""
+    """Files with changed bytes or cut ends raise only errors of Risorius."""
     egg = Egg()
     egg.moved = dict(list(egg.moved.items())[:2])
     whole = egg.save(tmp_path / "egg.fbx").read_bytes()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads from glTF: seams, sparse targets, strides, rotated and scaled nodes; bad files."""
+"""Tests heads from glTF: seams, sparse targets, strides, rotated and scaled nodes; bad files."""
 
 import command_line
 import face_shapes
@@ -30,7 +30,7 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
 
 
 def outward(mesh):
-    """The fraction of triangles that face away from the mesh' middle."""
+    """The fraction of triangles whose front faces away from the middle of the mesh."""
     points = mesh.positions[np.array(mesh.faces)]
     normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     return (
@@ -53,9 +53,10 @@ def test_a_mirror_shows_the_backs_of_no_polygons(tmp_path):
 
 
 def skinned(path, change=None):
-    """Write a skinned head like quantizers do.
+    """Write a skinned head as programs that quantize meshes do.
 
-    The scale to metres is in the skin, the neck is posed, and the mesh' node is far away.
+    The skin's matrices contain the scale to metres, the neck is posed, and the node of the mesh is
+    far away.
     """
 
     def posed(document):

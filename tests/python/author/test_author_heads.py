@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads of several meshes in any unit and direction: joints, sides, textures, bad input."""
+"""Tests heads of several meshes in any unit and direction: joints, sides, textures, bad input."""
 
 import struct
 from functools import cache
@@ -39,7 +39,7 @@ def made(name):
 
 
 def read(path, text=""):
-    """Read a head's file, or a spec for it. Args: text  lines of the spec's table [source]."""
+    """Read a head's file, or a spec of it. Args: text  lines for the spec's table [source]."""
     if text:
         toml = path.with_suffix(".toml")
         toml.write_text(f'[source]\nneutral = "{path.name}"\n{text}', encoding="utf-8")
@@ -56,7 +56,7 @@ def centimetres(dna, mesh=0):
 
 
 def target(dna, control, mesh=0):
-    """Vertex indices and displacements in cm of a control's blend shape."""
+    """Vertex indices of a control's blend shape, and their displacements in cm."""
     channel = list(dna.blend_shape_channel_names).index(control)
     for found in dna.meshes[mesh].blend_shape_targets:
         if found.blend_shape_channel_index == channel:
@@ -65,7 +65,7 @@ def target(dna, control, mesh=0):
 
 
 def strongest(dna, control, mesh=0):
-    """Place and displacement in cm of the vertex that a control moves most."""
+    """Place of the vertex that a control moves most, and its displacement, in cm."""
     vertices, deltas = target(dna, control, mesh)
     at = np.linalg.norm(deltas, axis=1).argmax()
     return centimetres(dna, mesh)[vertices[at]], deltas[at]
@@ -111,7 +111,7 @@ def test_every_likeness_stands_and_has_its_size(name, stand, scale, tmp_path):
 
 
 def moved(dna, mesh, control):
-    """Neutral vertices of a mesh and their displacements by a control, cm."""
+    """Neutral vertices of a mesh, and their displacements by a control, in cm."""
     face = work.begin(dna)
     row = face.names.index(f"CTRL_expressions.{control}")
     index = [n.removesuffix("_lod0_mesh") for n in dna.mesh_names].index(mesh)
@@ -204,14 +204,14 @@ def test_names_that_disagree_with_places_are_told_and_the_mesh_is_not_mirrored(t
     assert len(told) == 1
     assert centimetres(found.dna) == pytest.approx(points, abs=1e-4)
     assert strongest(found.dna, "mouthCornerPullL")[0][0] < -2  # the side that the file names
-    # A mirrored file shows the backs of its polygons; the reader mirrors it back.
+    # A file that was mirrored shows the backs of its polygons; the reader mirrors it again.
     flipped = {**swapped, "points": points * [-1, 1, 1],
                "shapes": {n: d * [-1, 1, 1] for n, d in shapes.items()}}  # fmt: skip
     found = read(saved(tmp_path, [flipped]))
     assert any("mirrored file" in n for n in found.odd)
     assert centimetres(found.dna) == pytest.approx(points, abs=1e-4)
     assert strongest(found.dna, "mouthCornerPullL")[0][0] > 2
-    # A given setting takes precedence over a guess.
+    # A direction in the spec has precedence over the reader's guess.
     found = read(saved(tmp_path, [swapped]), 'front = "-z"\nup = "+y"')
     assert not any("disagree" in n for n in found.odd)
     assert strongest(found.dna, "mouthCornerPullL")[0][0] > 2
@@ -392,7 +392,7 @@ def test_a_folder_of_obj_files_is_a_head(tmp_path):
 
 
 def fbx_head(path, picture, *, embedded):
-    """A head, and eyes of two materials, as an FBX of centimetres."""
+    """Write a head, and eyes with two materials, as an FBX in centimetres."""
     points, faces, shapes = likenesses.skull()
     eyes = likenesses.joined(*likenesses.eyes())
     objects, links = [], []

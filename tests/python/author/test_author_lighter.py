@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A rig has at most as many deltas as its input, and its last line states the trade."""
+"""A made rig has at most as many deltas as its input.
+
+The last line of the command states its numbers of joints and deltas, its size and its errors.
+"""
 
 import re
 
@@ -40,7 +43,7 @@ def face_of(shapes):
 
 
 def deltas(dna):
-    """The number of nonzero deltas of LOD 0, counted in the file."""
+    """The number of nonzero deltas at LOD 0, counted in the file."""
     read = dna_bytes.Face(dna.to_bytes())
     meshes = [dna.meshes[m] for m in read.lod_meshes[0]]
     return sum(int(np.asarray(t.deltas).any(axis=1).sum()) for m in meshes

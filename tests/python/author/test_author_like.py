@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reusing joints, weights and levels of a joint rig for another person."""
+"""Tests that joints, weights and LODs of a joint rig can be used for another person."""
 
 import copy
 import importlib.util
@@ -20,7 +20,7 @@ from risorius.author import (
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 
-# Skinning and morphing from the format's description, without code of risorius.author.
+# The module computes skinning and morphing from the format's description, without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle_like", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
@@ -30,7 +30,7 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=6), 0.05, lighter=False, lods=
 
 
 def other_person(dna):
-    """The face made narrower and with a longer chin; its expressions are scaled alike."""
+    """The face with 0.85 times the width and a longer chin; its expressions are scaled alike."""
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -48,7 +48,10 @@ def other_person(dna):
 
 @pytest.fixture(scope="module")
 def people(tmp_path_factory):
-    """Face of shapes and joint rig of a person, and of another who reuses the joints."""
+    """Blend shape face and joint rig of a person, then of another person.
+
+    The second rig reuses the joints of the first.
+    """
     folder = tmp_path_factory.mktemp("like")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
@@ -86,7 +89,7 @@ def test_joints_lie_where_they_move_the_other_one(people):
 
 @pytest.mark.parametrize("name", ["mouthCornerPullL", "jawOpen", "eyeBlinkR"])
 def test_a_control_at_1_is_the_other_ones_expression(people, name):
-    """By joints and shapes, at LOD 0, by another reader."""
+    """The second rig, posed by an independent reader at LOD 0, shows the second person's shape."""
     _, _, before, rig = people
     dna = rig.dna
     values = np.zeros(len(dna.raw_control_names), np.float32)

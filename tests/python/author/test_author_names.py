@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Assigns shapes of a head by their names to controls or to additional expressions."""
+"""Tests which controls or additional expressions a head's shapes become by their names."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ def test_visemes_and_faces_become_expressions():
 
 
 def test_the_names_of_icts_head_are_all_known():
-    # ARKit's shapes, with sides for browInnerUp and cheekPuff, and three additional shapes
+    # ARKit's shapes without tongueOut, with sides for browInnerUp and cheekPuff, and with
+    # cheekRaiser and PupilDilate
     units = [u.replace("Left", "_L").replace("Right", "_R") for u in arkit.mapping()]
     names = [u for u in units if u not in ("browInnerUp", "cheekPuff", "tongueOut")]
     sided = ("browInnerUp", "cheekPuff", "cheekRaiser", "PupilDilate")
@@ -94,7 +95,7 @@ def test_odd_names_are_one_sentence(names, words):
 
 @pytest.fixture(scope="module")
 def authored(tmp_path_factory):
-    """The egg with a viseme, an emotion, a funnel and ARKit's units, made by the command author."""
+    """(folder, output of --names, output) of `author` for an egg with other shapes than ARKit's."""
     folder = tmp_path_factory.mktemp("names") / "egg"
     path = face_shapes.write_all(folder, joints=8, more="rounds = 2\n[lods]\ncount = 1\n")
     positions, faces = face_shapes.head()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Packed or quantized heads equal the plain heads; damaged files are refused."""
+"""Tests that compressed or quantized heads equal plain heads; damaged files are refused."""
 
 import functools
 import sys
@@ -28,7 +28,7 @@ def rows(array, stride):
 
 
 def numbers():
-    """Quantized positions, displacements and texture coordinates of the head of face_shapes.py."""
+    """Quantized positions, displacements and texture coordinates of the head of face_shapes."""
     positions, _ = face_shapes.head()
     low = positions.min(axis=0) / 100
     whole = np.round((positions / 100 - low) / STEP).astype("<u2")
@@ -41,10 +41,10 @@ def numbers():
 
 
 def head(path, *, packed, change=None):
-    """Write a head like gltfpack.
+    """Write a head as gltfpack does, compressed only if `packed`.
 
-    It has quantized numbers, a node that scales them back, packed views, normals of eight bits, and
-    texture coordinates that the material scales.
+    It has quantized numbers, a node that scales them back, normals of eight bits, and texture
+    coordinates that the material scales.
     """
     low, whole, moved, uvs = numbers()
     glb = Glb()
@@ -101,7 +101,7 @@ def test_a_packed_head_is_its_plain_twin(tmp_path):
 
 @pytest.mark.parametrize("bits", [12, 23])
 def test_floats_and_corners_in_a_row_are_unpacked(tmp_path, bits):
-    """The exponential filter, the mode INDICES, and two accessors in one view."""
+    """A reader unpacks the exponential filter, the mode INDICES, and two accessors in one view."""
     positions, moved = face_shapes.head()[0] / 100, face_shapes.expressions(face_shapes.head()[0])
     jaw = moved["jawOpen"] / 100
     glb = Glb()
@@ -197,7 +197,7 @@ def test_texture_coordinates_that_no_picture_has_are_one_sentence(tmp_path):
 
 
 def test_damaged_bytes_are_refused_or_read(tmp_path):
-    """Changed bytes and cut files raise only errors of Risorius."""
+    """Files with changed bytes or cut ends raise only errors of Risorius."""
     whole = head(tmp_path / "whole.glb", packed=True).read_bytes()
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261127)
@@ -270,7 +270,10 @@ def test_a_head_that_draco_packed(tmp_path):
 
 
 def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_path):
-    """Each place of the JSON, one odd value at a time: no traceback, no warning, no gigabytes."""
+    """One odd value at a time is put at each place of the JSON.
+
+    Reading succeeds or raises an error that names the file, without warnings or gigabytes.
+    """
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261128)
     odd = [None, -1, [], {}, "x", 1e308, 10**400, True, 2**53, 0.5, float("nan"), 7, 2**31]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Double vertices along seams are merged; vertices of touching lips stay separate."""
+"""Tests that double vertices along seams are merged, but not those of lips that touch."""
 
 import command_line
 import face_shapes
@@ -11,7 +11,7 @@ from risorius.author.input.welding import welded
 
 
 def parted(column=11):
-    """The head of face_shapes.py with duplicated vertices along a column, like a texture seam.
+    """The head of face_shapes with duplicated vertices along a column, as at a texture seam.
 
     Returns: positions in cm, polygons, expressions, and the original index of each vertex.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius batch`: real worker processes, a real Dask scheduler, real kills."""
+"""Tests `risorius batch` with real worker processes, a Dask scheduler, and killed processes."""
 
 import contextlib
 import csv
@@ -41,13 +41,13 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def curves_of(clip, count, frames):
-    """The curves of clip number `clip`: float32[count, frames] in 0 to 1, by formula."""
+    """Curves of clip number `clip` by formula, float32[count, frames] in 0 to 1."""
     t = np.arange(frames) / RATE
     return (0.5 + 0.5 * np.sin(np.outer(1 + np.arange(count) % 5, t) + clip)).astype(np.float32)
 
 
 def make(folder, clips=3, frames=12, faces=FACES, table="", top='output = "out"\n'):
-    """Make a folder with clips, faces and a jobs.toml. Returns the path of jobs.toml."""
+    """Write a folder with clips, faces and a jobs.toml. Returns the path of jobs.toml."""
     (folder / "clips").mkdir(parents=True)
     (folder / "faces").mkdir()
     names = risorius.load(GOLDEN / "core.dna").raw_control_names
@@ -63,7 +63,7 @@ def make(folder, clips=3, frames=12, faces=FACES, table="", top='output = "out"\
 
 
 def check_outputs(jobs, clips=3, frames=12, faces=FACES, lods=(0, 1)):
-    """Check that every output exists, is complete, and equals Rig.evaluate of each frame."""
+    """Check that all outputs exist and are complete, and that frames equal Rig.evaluate."""
     names = risorius.load(GOLDEN / "core.dna").raw_control_names
     names += [n for n in risorius.load(GOLDEN / "medium.dna").raw_control_names if n not in names]
     out = jobs.parent / "out"
@@ -236,7 +236,7 @@ def test_a_journal_that_is_cut_or_is_none_is_no_trouble(tmp_path, capsys):
 
 
 def start(jobs, *options):
-    """Start the command in its own process group, as a shell does."""
+    """Start the command as a shell does, in a process group of its own."""
     command = [sys.executable, "-m", "risorius", "batch", str(jobs), "--workers", "2", *options]
     return subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
@@ -244,7 +244,7 @@ def start(jobs, *options):
 
 
 def wait_for_outputs(jobs, process):
-    """Wait until two jobs are done; the batch must still have jobs to do."""
+    """Wait until two jobs are done; the batch must not have ended."""
     journal = jobs.parent / "out" / ".jobs.journal"
     while not journal.exists() or journal.read_bytes().count(b"\n") < 3:
         assert process.poll() is None, "the batch has ended already"
@@ -256,7 +256,8 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     jobs = make(tmp_path / "j", clips=8, frames=1500, table='write = ["npz", "csv"]\n')
     process = start(jobs)
     wait_for_outputs(jobs, process)
-    # A terminal's Ctrl-C reaches every process; SIGKILL stands for a machine that fails.
+    # Ctrl-C in a terminal reaches every process of the group; SIGKILL simulates a machine that
+    # fails.
     os.killpg(process.pid, signal.SIGINT if how == "interrupt" else signal.SIGKILL)
     error = process.communicate()[1].decode()
     out = jobs.parent / "out"
@@ -416,7 +417,7 @@ def test_workers_that_cannot_start_are_no_endless_loop(tmp_path):
 
 
 class Unloadable:
-    """Work that a worker process cannot unpickle."""
+    """Work that fails when a worker process unpickles it."""
 
     def __reduce__(self):
         return (int, ("no number",))
@@ -446,7 +447,7 @@ def test_failed_jobs_are_named_and_the_others_done(tmp_path, capsys):
 
 
 class Dask:
-    """A Dask scheduler and two workers, as processes on this machine."""
+    """A Dask scheduler and two workers, as processes of this machine."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -480,7 +481,7 @@ class Dask:
 
 
 def lose_the_first(cluster, monkeypatch):
-    """Lose the first result together with its worker, so that the job runs again."""
+    """Let the first result be lost together with its worker, so that its job runs again."""
     distributed = pytest.importorskip("distributed")
     lost = []
 

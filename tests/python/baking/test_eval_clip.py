@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius eval CLIP DNA -o OUT`: every frame is Rig.evaluate of its controls."""
+"""Tests `risorius eval CLIP DNA -o OUT`: every frame equals Rig.evaluate of its controls."""
 
 import csv
 import json
@@ -39,9 +39,9 @@ def write_clip(path, names, curves, rate=30.0, start=0.0):
 
 
 def random_clip(path, name="medium", frames=50, seed=1):
-    """Write a random clip of half the controls of a golden face.
+    """Write a clip with random values of about half the controls of a golden face.
 
-    Returns the DNA file, the rig, and its raw controls, float32[frames, R].
+    Returns the DNA file, the rig, and the raw controls of each frame, float32[frames, R].
     """
     dna = risorius.load(GOLDEN / f"{name}.dna")
     rig = risorius.Rig(dna)
@@ -160,7 +160,8 @@ def test_frames_and_rate(tmp_path):
     out = tmp_path / "out.npz"
     jaw = risorius.load(core).raw_control_names.index("CTRL_expressions.jawOpen")
     arguments = ["eval", str(ramp), core, "-o", str(out), "--what", "controls"]
-    # Resampled from 10 to 20 frames per second: every second frame is in the middle of two.
+    # After resampling from 10 to 20 frames per second, every second frame is the mean of two
+    # frames.
     assert main([*arguments, "--rate", "20", "--frames", "1:6"]) == 0
     with np.load(out) as arrays:
         np.testing.assert_array_equal(
@@ -212,7 +213,10 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
 
 
 def test_a_capture_is_mapped(tmp_path, capsys):
-    """Names of Live Link Face, with the mapping that is found and with a mapping of the user."""
+    """Curves named as in Live Link Face are mapped to controls.
+
+    Without --mapping a built-in mapping is found; a mapping of the user replaces it.
+    """
     dna = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(dna))
     jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")

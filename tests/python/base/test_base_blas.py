@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits linear algebra to one thread, if threadpoolctl is installed."""
+"""Tests that linear algebra is limited to one thread if threadpoolctl is installed."""
 
 import sys
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Readers use memory in proportion to their input, and refuse small files that demand much more.
+"""Tests that readers refuse small files that demand much memory.
 
-Each test makes such a file and reads it through the public readers. Its peak memory is measured by
-Python's count of allocations, which is the same on every machine.
+Each test makes such a file and reads it through the public readers. Its largest memory use is
+measured by Python's count of allocations, which is the same on every machine.
 """
 
 import json
@@ -24,7 +24,7 @@ MB = 1 << 20
 
 
 def peak_of(work):
-    """Run work(). Returns the peak of additional bytes, and the error or None."""
+    """Run work(). Returns the largest number of additional bytes in use, and the error or None."""
     error = None
     tracemalloc.start()
     try:
@@ -38,7 +38,7 @@ def peak_of(work):
 
 
 def refused(path, words):
-    """Read a file that must be refused with a text. Returns the peak of additional bytes."""
+    """Check that a file is refused with these words. Returns the most additional bytes in use."""
     peak, error = peak_of(lambda: importing.read(path))
     assert isinstance(error, AnimationFileError), path
     assert str(error).startswith(str(path))
@@ -48,13 +48,13 @@ def refused(path, words):
 
 
 def zeros_array(letter, count, size):
-    """A compressed FBX array of zeros, a thousandth of its unpacked size."""
+    """A compressed FBX array of zeros, which is a thousand times larger when it is unpacked."""
     packed = zlib.compress(bytes(count * size), 9)
     return letter + struct.pack("<III", count, 1, len(packed)) + packed
 
 
 class Raw:
-    """A value of an FBX property that is written as the given bytes."""
+    """A value of an FBX property that is written as the given bytes, without a type letter."""
 
     def __init__(self, data):
         self.data = data
@@ -62,7 +62,7 @@ class Raw:
 
 @pytest.fixture
 def raw_values(monkeypatch):
-    """Make fbx_files write the bytes of a Raw unchanged."""
+    """Let fbx_files write a Raw as its bytes."""
     plain = fbx_files.value
     monkeypatch.setattr(fbx_files, "value", lambda v: v.data if isinstance(v, Raw) else plain(v))
 
@@ -107,13 +107,14 @@ def test_curves_of_an_fbx_that_unfold_without_end_are_refused(tmp_path, raw_valu
     path = tmp_path / "keys.fbx"
     path.write_bytes(fbx_files.fbx([("Objects", (), objects), ("Connections", (), links)]))
     assert path.stat().st_size < MB
-    # The first curve is invalid (its times do not ascend), so nothing more is unpacked.
+    # The first curve is invalid, because its times do not ascend, so that no other curve is
+    # unpacked.
     peak = refused(path, "key times that ascend were expected")
     assert peak < 40 * keys
 
 
 def gltf_bomb(channels, keys):
-    """A GLB with many channels, each for its own target, that share one accessor."""
+    """A GLB with many channels, each for another morph target, which share an accessor."""
     times = np.arange(keys, dtype="<f4")
     body = times.tobytes() + np.zeros(keys, "<f4").tobytes()
     document = {

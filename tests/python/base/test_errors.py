@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All errors derive from one class, and the command line prints each once."""
+"""Tests that all errors derive from one class, and that the command line prints each once."""
 
 import importlib
 import inspect
@@ -32,7 +32,7 @@ OLD_BASES = {
 
 
 def error_classes():
-    """All error classes that a module of the packages defines, by name."""
+    """Name -> class of each error that a module of the packages defines."""
     found = {}
     modules = [
         module

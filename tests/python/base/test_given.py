@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers and files from users: of any size or kind, or without an end."""
+"""Numbers of any size and kind, and files without an end, are used or refused in one sentence."""
 
 import os
 import threading
@@ -136,7 +136,14 @@ def test_tables_of_a_spec_are_tables(top, words, tmp_path):
 
 
 def _moved(positions, faces, folder, deltas):
-    """Write the egg's files with other positions."""
+    """Write the OBJ files of the test head with other positions.
+
+    Args:
+        positions: float[V, 3] at rest.
+        faces: polygons.
+        folder: folder of the files.
+        deltas: name of an expression -> float[V, 3], its displacements.
+    """
     face_shapes.write_obj(folder / "neutral.obj", positions, faces)
     for name, delta in deltas.items():
         face_shapes.write_obj(folder / "shapes" / f"{name}.obj", positions + delta, faces)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A file of another kind is named by its kind, in every reader and with any name."""
+"""Tests that every reader names a file of another kind by its kind, whatever the file's name."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ KINDS = {
 
 
 READERS = {
-    # Reader, suffix of the test's file, and words of the kinds that the test leaves out, because
-    # the reader reads such files or has a more detailed error for them.
+    # Reader, suffix of the test's file, and words of the kinds that are not tested with this
+    # reader, because it reads such files or has a more detailed error for them.
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The check of random acting finds penetrations and measures their depth."""
+"""Tests that the check of random acting finds penetrations and measures their depth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from acting_random import random_acting
 
 
 def sphere(radius=1.4, bulge=0.1):
-    """An eyeball with a cornea that looks along z."""
+    """Vertices of an eyeball with a cornea that looks along z."""
     up, side = np.meshgrid(np.linspace(0.01, np.pi - 0.01, 40), np.linspace(-np.pi, np.pi, 80))
     rays = np.stack([np.sin(up) * np.sin(side), np.cos(up), np.sin(up) * np.cos(side)], axis=-1)
     rays = rays.reshape(-1, 3)
@@ -58,7 +58,7 @@ def test_what_lies_within_an_eye_is_no_part_of_its_surface():
 
 
 def teeth():
-    """A row of teeth: an arc of a wall from radius 3 to 3.4, height 0 to 1, with z above 0."""
+    """Vertices and triangles of an arc of a wall: radius 3 to 3.4, height 0 to 1, z above 0."""
     angle, height = np.meshgrid(np.radians(np.arange(-80, 81, 5)), [0.0, 1.0], indexing="ij")
     places = np.concatenate(
         [
@@ -104,9 +104,10 @@ def test_hair_under_the_skin_is_seen():
 
 
 def test_where_skin_folds_far_its_other_side_is_found_among_more_triangles():
-    """A hair beyond a fold of skin.
+    """A hair far from its root is measured from the near side of the skin only with more triangles.
 
-    The triangle nearest to its root is on the far side of the fold and is seen from inside.
+    The skin is a tube. The few triangles nearest to the hair's root are on the far side of the
+    tube, so the hair beyond the tube seems to be inside the skin.
     """
     around, along = 24, 5
     angle = 2 * np.pi * np.arange(around) / around
@@ -175,7 +176,7 @@ def test_a_blind_sheet_has_both_and_only_its_key_knows_which(tmp_path):
 
 
 def test_a_hair_beside_a_step_of_the_skin_lies_over_the_step():
-    """The hairs are compared with planes: the floor, which ends at the step, and the side."""
+    """Heights over a step in the skin equal the heights over its planes: floor and side."""
     floor = np.array(
         [[[0, 0, 0], [1, 0, 0], [0, 0, -1]], [[1, 0, 0], [1, 0, -1], [0, 0, -1]]], float
     )

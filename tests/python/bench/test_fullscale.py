@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The generator of a DNA file with the size and structure of a real head."""
+"""Tests the generator of a DNA file with the size and structure of a real head."""
 
 import sys
 
@@ -55,7 +55,7 @@ def test_its_neck_poses_are_those_of_a_real_head(dna):
     np.testing.assert_allclose(targets[1], up, atol=2e-3)
     turning, said = joint_controls(dna)
     assert ([item.name for item in turning], said) == (["neck_01", "neck_02", "head"], [])
-    # Looking up rotates each joint about its own z axis.
+    # If the head looks up, each joint rotates about its own z axis.
     for item in turning:
         x, y, z, w = item.values(head_turns(np.radians([[0.0, 25.0, 0.0]])))[0]
         assert (x, y, z, w) == pytest.approx((0, 0, 0.2164, 0.9763), abs=2e-4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`from risorius import *` imports each native class of the public API."""
+"""Tests that `from risorius import *` imports each native class of the public API."""
 
 import inspect
 

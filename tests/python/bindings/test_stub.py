@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The type stub of the native module has exactly the names of the module."""
+"""Tests that the type stub of the native module has exactly the names of the module."""
 
 import ast
 import inspect
@@ -10,13 +10,13 @@ import risorius._native as native
 from conftest import PROJECT
 
 STUB = PROJECT / "native" / "python" / "risorius" / "_native.pyi"
-# Attributes that Python adds to every class or module; the last one comes from pybind11.
+# Attributes that Python adds to every class or module; pybind11 adds the last one.
 GIVEN = {"__module__", "__doc__", "__weakref__", "__init__", "_pybind11_conduit_v1_"}
 ERROR = {"code", "offset", "where"}  # set on each DnaError object, not on the class
 
 
 def names_of(body: list[ast.stmt]) -> dict[str, ast.stmt]:
-    """Public names and special methods that statements define."""
+    """Public names and special methods that statements define: name -> statement."""
     found = {}
     for node in body:
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
@@ -27,7 +27,7 @@ def names_of(body: list[ast.stmt]) -> dict[str, ast.stmt]:
 
 
 def settable_of(body: list[ast.stmt]) -> set[str]:
-    """Attributes that may be assigned: annotated names and properties with a setter."""
+    """Attributes of a class that can be assigned: annotated names and properties with a setter."""
     found = set()
     for node in body:
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
@@ -40,7 +40,7 @@ def settable_of(body: list[ast.stmt]) -> set[str]:
 
 
 def differences(stub: str, module) -> list[str]:
-    """Names that the stub lacks or has in excess, one sentence each."""
+    """A sentence for each name that the stub lacks or that only the stub has."""
     top = names_of(ast.parse(stub).body)
     real = {n: v for n, v in vars(module).items() if not n.startswith("_")}
     out = [f"the stub lacks {n}" for n in real.keys() - top.keys()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius bench`; its measured times are not checked here."""
+"""Tests the command `risorius bench`, except for the times that it measures."""
 
 from __future__ import annotations
 

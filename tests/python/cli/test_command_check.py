@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius check`: all errors and warnings with their places, and the exit code."""
+"""Tests `risorius check`: all errors and warnings with their places, and the exit code."""
 
 import json
 import os
@@ -23,7 +23,7 @@ def check(*arguments):
 
 @pytest.fixture
 def two_errors(tmp_path):
-    """A file with a wrong name and a wrong first joint group, and the byte offsets of both."""
+    """A file with wrong counts of the name and of GUI table inputs, and both byte offsets."""
     data = bytearray((GOLDEN / "tiny_v22.dna").read_bytes())
     entries = struct.unpack_from(">16I", data, 11)
     descriptor, behavior = entries[2], entries[10]
@@ -41,7 +41,8 @@ def test_good_files_are_ok_with_what_they_hold():
     assert f"ok: {GOLDEN / 'medium.dna'} (2.8, 4 LODs, 122 joints)" in lines
     assert f"ok: {GOLDEN / 'tiny_v24.dna'} (2.4, 2 LODs, 14 joints" in done.stdout
     assert lines[-1] == f"{len(FILES)} files: {len(FILES)} ok, 0 bad"
-    # Solvers of the synthetic files read rotations of joints that these files lack.
+    # Additional lines say that solvers of synthetic files read rotations of joints which these
+    # files do not have.
     odd = [line for line in lines if "and no joint has that name" in line]
     assert len(lines) - len(odd) == len(FILES) + 1
 

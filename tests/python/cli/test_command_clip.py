@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius clip`: output, written files, exit codes."""
+"""Tests the command `risorius clip`: output, written files, exit codes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_converts_and_says_what_was_left_out(take, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert run("convert", take, "-o", out, "--rate", 60, "--rotations", "none") == 0
     controls = {control for row in arkit.mapping().values() for control in row}
-    # 89 steps of 1/30 s equal 178 steps of 1/60 s.
+    # 90 frames are 89 steps of 1/30 s, which equal 178 steps of 1/60 s between 179 frames.
     assert f"{len(controls)} controls, 179 frames, 60 fps" in capsys.readouterr().out
     clip = importing.read(out).clip
     direct, _ = importing.import_file(take, rotations="none")

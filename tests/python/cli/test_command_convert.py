@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius convert`: written files, messages, and refusals."""
+"""Tests the command `risorius convert`: written files, messages, and refusals."""
 
 import json
 import os
@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def convert(*arguments, stdin=b"", script=None):
-    """Run the command; with a script, run it after the script in a separate process."""
+    """Run the command; if there is a script, run it first, in the same separate process."""
     if script is None:
         return command_line.run("convert", *arguments, stdin=stdin)
     begin = f"{script}\nfrom risorius.cli import main; import sys; sys.exit(main())"
@@ -85,14 +85,17 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     lines = words(done).splitlines()
     assert done.returncode == 0
     assert all(line.startswith("risorius: warning: ") for line in lines)
-    # Layers that came after 2.3 in the format's table and that are not empty in this file.
+    # By the format's table these layers came after 2.3; they are not empty in this file.
     named = [line.split("has no layer ")[1].split(";")[0] for line in lines]
     assert named == ["rbfb", "rbfe", "jbmd", "twsw", "mlbe"]
     assert "twsw" in risorius.load(out).layers
 
 
 def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
-    """Joint groups of this file read controls of networks, which version 2.1 lacks."""
+    """If networks are left out, columns of joint groups for their controls are left out too.
+
+    Version 2.1 and the layer behavior contain no networks.
+    """
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)
@@ -250,7 +253,7 @@ FULL = (
 
 @pytest.mark.parametrize("name", ["face.dna", "face.json"])
 def test_a_full_disk_leaves_the_old_file(name, tmp_path):
-    """A limit on file size simulates a full disk, because root can write everywhere."""
+    """A limit of the file size simulates a full disk, because root can write everywhere."""
     out = tmp_path / name
     out.write_bytes(b"old")
     done = convert(GOLDEN / "medium.dna", out, script=FULL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius info --diff` describes every difference in words, and nothing else."""
+"""Tests that `risorius info --diff` describes every difference in words, and nothing else."""
 
 import copy
 import json
@@ -38,7 +38,8 @@ def texts(a, b):
 
 # ---- files that differ are never reported as equal
 
-# A word that the description of each property must contain; default: last word of its name.
+# Begin of a property's name -> pattern that the description of a change must contain. Other
+# properties must be described by the last word of their name.
 WORDS = {
     "archetype": "archetype",
     "metadata": r"metadata key",
@@ -118,7 +119,10 @@ for kind in ("twist", "swing"):
 
 
 def words_for(name):
-    """The word of the longest entry that fits; otherwise the last word of the name."""
+    """The pattern for a property: that of the longest entry of WORDS with which its name begins.
+
+    If there is none, the pattern is the last word of the name.
+    """
     fitting = [key for key in WORDS if name == key or (name.startswith(key) and key in name)]
     if fitting:
         return WORDS[max(fitting, key=len)]
@@ -126,8 +130,8 @@ def words_for(name):
 
 
 def tells(difference, name):
-    """Whether a difference names a property, its parent or a part of it."""
-    # Joints and weights of vertices are reported at skin_offsets.
+    """Whether a difference describes a property, its parent or a part of it."""
+    # Differences of skin joints and weights are reported as differences of skin_offsets.
     field = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", difference.field)
     name = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", name)
     related = field == name or name.startswith(field + ".") or field.startswith(name + ".")
@@ -135,7 +139,7 @@ def tells(difference, name):
 
 
 def every_change(dna):
-    """Every change of one field that changes the file: (path of the field, changed rig)."""
+    """Yields (path of a field, changed rig) for every change of one field that changes the file."""
     base = dna.to_bytes()
     for path, value in fields(dna):
         for other in others(value):
@@ -149,7 +153,8 @@ def every_change(dna):
 
 
 RIGS = {"full": full, "tiny": lambda: risorius.load(GOLDEN / "tiny_v28.dna")}
-# The small golden file has the fields of `full` in more structs, so four changes per field suffice.
+# Largest number of changes of each field. The small golden file has the fields of `full` in more
+# structs, so that four changes are enough.
 MOST = {"full": sys.maxsize, "tiny": 4}
 
 
@@ -175,7 +180,7 @@ def test_every_change_of_every_field_is_said(which):
             missed.append(name)
     assert missed == []
     names = {name_of(path) for path, value in fields(dna)}
-    # Structs have no text of their own; their fields have.
+    # Changes of structs are described by changes of their fields.
     structs = {name for name in names if any(other.startswith(name + ".") for other in names)}
     empty = {name_of(path) for path, value in fields(dna) if hasattr(value, "__len__")
              and not len(value)}  # fmt: skip
@@ -187,7 +192,7 @@ def test_every_change_of_every_field_is_said(which):
 
 @pytest.mark.filterwarnings("ignore")
 def test_changes_go_through_the_front_door(tmp_path, capsys):
-    """One change per layer, through files, JSON and the exit code of diff."""
+    """The command `info --diff` reports a change of each property, in both directions."""
     dna, seen = full(), set()
     a = saved(dna, tmp_path / "a.dna")
     for path, other in every_change(dna):
@@ -223,7 +228,7 @@ def test_any_two_files_of_the_collection_differ():
 def reordered(dna, order):
     """The same rig with its joints in another order.
 
-    Args: order  index of each new joint in the old list.
+    Args: order  for each new joint, its index in the old list.
     """
     out = copy.deepcopy(dna)
     new = np.argsort(order)
@@ -318,11 +323,11 @@ def edited(**values):
 
 
 def test_joints_are_renamed_moved_and_given_other_parents():
-    # A renamed parent counts as the same parent.
+    # A parent with another name counts as the same parent.
     assert texts(full(), edited(joint_names=["root", "chin", "lip"])) == [
         "joint jaw_joint renamed to chin"
     ]
-    # The renamed joint is also moved in the list: parent and neutral pose identify it.
+    # The renamed joint is also moved in the list, but its parent and neutral pose identify it.
     swapped = reordered(edited(joint_names=["root", "chin", "lip"]), [0, 2, 1])
     assert texts(full(), swapped) == [
         "joint jaw_joint renamed to chin",
@@ -465,7 +470,7 @@ def test_bytes_that_no_layer_reads_are_not_passed_over(tmp_path):
 
 
 def test_what_words_miss_is_said_all_the_same():
-    """The dictionary of metadata hides a duplicate key, so no property differs."""
+    """Faces that differ only in a duplicate metadata key, which no property shows, still differ."""
     facts = json.loads(full().to_json())
     facts["desc1.1"]["metadata"].insert(0, ["a", "hidden"])
     twice = risorius.Dna.from_json(json.dumps(facts))
@@ -528,7 +533,7 @@ def test_the_help_says_what_the_exit_codes_mean():
 
 
 def test_random_bytes_that_can_still_be_read_are_never_the_same(tmp_path):
-    """A changed byte that changes the content is always reported."""
+    """Each changed byte that changes the content is reported as a difference."""
     data = saved(full(), tmp_path / "a.dna").read_bytes()
     base = risorius.load(data)
     random = np.random.default_rng(7)

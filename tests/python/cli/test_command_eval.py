@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius eval` for the pose of control values."""
+"""Tests the command `risorius eval` for the pose of given control values."""
 
 import json
 

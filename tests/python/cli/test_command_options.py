@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All options that messages of commands name exist."""
+"""Tests that all options exist which commands name in their messages."""
 
 import argparse
 import ast
@@ -11,7 +11,7 @@ import risorius.cli
 
 ROOT = Path(risorius.cli.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
-# Modules that belong to commands of other names.
+# Module whose name is no command -> the commands that use it.
 PARTS = {
     "eval_clip": ["eval"],
     "diff": ["info"],
@@ -25,7 +25,7 @@ PARTS = {
 
 @pytest.fixture(scope="module")
 def options(monkeypatch_module):
-    """Command -> its options, including options of its subcommands."""
+    """Command -> all its options, including options of its subcommands."""
     parsers = []
     monkeypatch_module.setattr(
         argparse.ArgumentParser, "parse_known_args", lambda self, _: parsers.append(self)
@@ -55,7 +55,7 @@ def _options(parser):
 
 
 def _named(path):
-    """Options in the texts of a module's raise statements."""
+    """Yields the options that are named in the raise statements of a module."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Raise):
             for text in ast.walk(node):

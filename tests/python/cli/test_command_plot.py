@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius plot`: computed values, written files, and refusals."""
+"""Tests the command `risorius plot`: computed values, written files, and refusals."""
 
 import importlib.util
 import io
@@ -24,7 +24,7 @@ from risorius.plot.drawing import shade, skeleton
 FILES = sorted(path for path in GOLDEN.glob("*.dna"))
 NAMES = [path.stem for path in FILES]
 
-# Joint names of MetaHuman files -> their regions.
+# Joint name of a MetaHuman file -> its region.
 JOINTS = {
     "FACIAL_C_ForeheadSkin": "forehead, brow",
     "FACIAL_R_12IPV_ForeheadOut31": "forehead, brow",
@@ -82,7 +82,10 @@ def test_majority_of_a_group():
 
 
 def chain(**changes) -> risorius.Dna:
-    """A chain of three joints, children first: root, middle above it, tip on the middle."""
+    """A chain of three joints listed children first: tip, its parent middle, whose parent is root.
+
+    Args: changes  properties of the Dna to replace.
+    """
     dna = risorius.Dna()
     dna.rotation_unit, dna.coordinate_system = "degrees", ("right", "up", "front")
     dna.joint_names = ["tip", "middle", "root"]
@@ -95,7 +98,7 @@ def chain(**changes) -> risorius.Dna:
 
 
 def test_world_positions_of_a_known_chain():
-    # A quarter turn about z maps the root's x to y; a quarter turn about x keeps x.
+    # The root's rotation by 90 degrees about z maps x to y; the middle's about x keeps x.
     expected = [[10, 25, 30], [10, 22, 30], [10, 20, 30]]
     np.testing.assert_allclose(skeleton.world_positions(chain()), expected, atol=1e-5)
 
@@ -112,7 +115,7 @@ def test_world_positions_honour_the_unit_and_the_signs():
     [("xyz", [0, 0, -1]), ("yxz", [0, 0, -1]), ("zxy", [0, 1, 0]), ("xzy", [0, 1, 0])],
 )
 def test_world_positions_honour_the_sequence(sequence, place):
-    # Calculated by hand: rotation about y maps x to -z, about z to y, and about x keeps it.
+    # By hand: the rotation by 90 degrees about y maps x to -z, about z it maps x to y.
     dna = chain(
         rotation_sequence=sequence,
         neutral_joint_translations=np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0]], np.float32),
@@ -218,7 +221,7 @@ def test_the_nearer_triangle_hides_the_farther():
         shade.Surface(points, normals, triangles[1:], paint), (0, 4, 0, 4), 40, smooth=1
     )
     assert picture[35, 5, 0] > 3 * back[35, 5, 0] > 0
-    # The lower left half is covered by the triangle, the rest is transparent.
+    # The triangle covers the lower left half of the picture, and the rest is transparent.
     covered = picture[..., 3] == 255
     assert abs(covered.mean() - 0.5) < 0.03
     assert covered[38, 1]
@@ -249,7 +252,7 @@ def test_counts_are_those_of_the_file():
 
 
 class Page(HTMLParser):
-    """Counts images, and fails on external links and unclosed elements."""
+    """Reads a page: counts images, collects text, and fails on external links and open elements."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius solve`, and the files it reads."""
+"""Tests the command `risorius solve`, and the files that it reads."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from skin_oracle import skinned, small_face
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
-    """A face's DNA file, control curves, and the vertices of each frame."""
+    """A face's DNA file, its control curves, and its vertices in each frame."""
     dna = small_face()
     path = tmp_path_factory.mktemp("solve") / "face.dna"
     dna.save(path)
@@ -113,7 +113,7 @@ def test_a_file_that_makes_no_sense_is_one_sentence(tmp_path, content, said):
 
 
 def test_a_damaged_file_is_one_sentence_or_read(tmp_path):
-    """Flipped bits in compressed data and in NumPy's header, which raise various exceptions."""
+    """NumPy raises various exceptions for flipped bits and cut files; all become one sentence."""
     path = tmp_path / "take.npz"
     np.savez(path, vertices=np.zeros((2, 4, 3)), rate=24.0)
     plain = path.read_bytes()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius web`: contents of the page, and refusals.
+"""Tests the command `risorius web`: contents of the page, and refusals.
 
-packaging/ship/web.sh --check tests the page in a browser."""
+packaging/ship/web.sh --check tests the page in a browser.
+"""
 
 import base64
 import gzip
@@ -40,7 +41,7 @@ def _empty_page(monkeypatch):
 
 
 def parts(page):
-    """The parts of a page: the face table, and the bytes of the other elements by name."""
+    """The face table of a page, and the unpacked bytes of its other elements by name."""
     found = {}
     for name, text in ELEMENT.findall(page.decode()):
         found[name] = text
@@ -50,7 +51,7 @@ def parts(page):
 
 
 def unpacked(table, data):
-    """The arrays of each mesh, decoded as in native/web/geometry.js."""
+    """The meshes with their arrays, decoded as in native/web/geometry.js."""
     meshes, at = [], 0
     for about in table["meshes"]:
         own = dict(about)
@@ -72,9 +73,9 @@ def unpacked(table, data):
 
 
 def same_mesh(own, mesh, size):
-    """Check a mesh of the page against the DNA file's, within the page's quantisation.
+    """Check that a mesh of the page equals the DNA file's, within the page's quantisation.
 
-    The order of corners and weights may differ.
+    The order of joints and weights may differ.
     """
     positions = own["positions"].reshape(3, -1).T
     np.testing.assert_allclose(positions, mesh.positions, atol=size * 2**-17)
@@ -108,7 +109,7 @@ def test_the_page_holds_the_face_and_each_raw_control_once(tmp_path, capsys):
     page = out.read_bytes()
     table, inside = parts(page)
     dna = risorius.load(MEDIUM)
-    # The page contains the DNA file without meshes; meshes are stored separately, in fewer bytes.
+    # The page contains the DNA file without meshes, and the meshes separately in fewer bytes.
     rig_alone = risorius.load(MEDIUM, layers=pages.RIG)
     assert risorius.load(inside["face"]).to_json() == rig_alone.to_json()
     packed = unpacked(table, inside["geometry"])
@@ -154,7 +155,7 @@ def test_a_clip_and_its_sound_come_along(tmp_path):
 
 
 def painted(folder):
-    """A face with textures: skin, eye, hair with opacity, a wrinkle map, its mask, odd names."""
+    """Write a face with textures: skin, eye, hair with opacity, wrinkle map, mask, bad names."""
     dna = risorius.load(MEDIUM)
     head, eye, hair = (f"{part}_lod0_mesh" for part in ("head", "eyeLeft", "hair"))
     dna.mesh_names = [head, eye, hair, *(f"other{i}" for i in range(3, len(dna.mesh_names)))]

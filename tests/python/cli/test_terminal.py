@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All commands print names from files without control sequences of the terminal."""
+"""Tests that commands print names from files without control sequences of the terminal."""
 
 import io
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vocabularies of shape names: which names each one contains, and their meanings."""
+"""Tests vocabularies of shape names: the names in each of them, and their meanings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LISTS = tomllib.loads(
 
 
 def spelled(kind):
-    """All names of a list, with alternatives in braces expanded."""
+    """All names of a program's list, with alternatives in braces expanded."""
     out = []
     for word in LISTS[kind]["names"].split():
         parts = re.split(r"\{([^}]*)\}", word)
@@ -31,8 +31,8 @@ def spelled(kind):
     return out
 
 
-# Numbers of all names; of names that `author` recognises by words alone; of names that the best
-# mapping for clips contains.
+# Numbers of names of each program: all; those that `author` recognises by words alone; those that
+# the best mapping for clips contains.
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),

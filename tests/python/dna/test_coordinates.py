@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conversion of axes and units, compared with matrices, the reference and evaluated poses."""
+"""Conversion of axes and units, compared with matrices, the reference reader and posed faces."""
 
 import gzip
 import itertools
@@ -16,8 +16,8 @@ from coordinates_oracle import System
 
 EPS = float(np.finfo(np.float32).eps)
 FILES = ["tiny_v28", "units", "quatjoints", "medium"]
-# Bound of the rotation error from rounding Euler angles to float32; a chain of joints sums DEPTH
-# errors.
+# ANGLE is the largest rotation error in radians if angles up to 180 degrees are rounded to float32.
+# DEPTH is the largest number of joints in a chain, whose errors add up.
 ANGLE = 180 * EPS * np.pi / 180
 DEPTH = 40
 
@@ -34,7 +34,7 @@ def targets(count, seed):
 
 
 def keeping_order(source, count, seed):
-    """Random target systems whose rotation sequence keeps the order of the axes."""
+    """Random target systems that rotate about the same axes in the same order as the source."""
     rng = np.random.default_rng(seed)
     out = []
     while len(out) < count:
@@ -109,7 +109,7 @@ def test_positions_normals_and_deltas_map(name):
 
 
 def signed_faces(mesh):
-    """For each face the sign of its winding relative to the mean of its corner normals."""
+    """For each face, 1 or -1 if its winding agrees or disagrees with the mean of its normals."""
     out = []
     offsets = mesh.face_offsets.tolist()
     for begin, end in itertools.pairwise(offsets):
@@ -142,7 +142,7 @@ def test_faces_turn_with_handedness_and_winding(name):
 
 
 def raw_controls(dna, rng):
-    """Random raw controls; rotations are at rest, because their axes depend on the system."""
+    """Random raw controls; quaternions are at rest, because their axes depend on the system."""
     raw = rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
     for i, name in enumerate(dna.raw_control_names):
         part = name.rpartition(".")[2]
@@ -152,7 +152,7 @@ def raw_controls(dna, rng):
 
 
 def assert_pose_maps(dna, converted, raw, lod):
-    """Compare the world matrices of posed joints and all other outputs of two rigs.
+    """Check that posed joints of two rigs have mapped world matrices and all other outputs agree.
 
     Without solvers, other outputs must be equal bit for bit.
     """
@@ -167,7 +167,7 @@ def assert_pose_maps(dna, converted, raw, lod):
     world = oracle.world_matrices(dna, before.joints)
     expected = oracle.mapped_world(source, target, world)
     result = oracle.world_matrices(converted, after.joints)
-    # Angles of up to MANY degrees are float32 sums of about a hundred products.
+    # Angles are float32 sums of about a hundred products, so that large angles have large errors.
     size = max(180.0, float(np.abs(before.joints).max())) / 180
     assert np.abs(result - expected).max() <= 100 * size * ANGLE * size_of(expected)
 
@@ -187,7 +187,10 @@ def test_every_pose_maps_where_the_order_of_rotation_stays(name):
 
 
 def random_rig(seed, joints=7, raw=5):
-    """A chain of joints with rotated neutral poses; controls drive all attributes of one."""
+    """A chain of joints with random neutral poses and axes, and raw controls without effect.
+
+    Returns: the face, and the random generator.
+    """
     rng = np.random.default_rng(seed)
     dna = risorius.Dna(
         lod_count=1,
@@ -205,7 +208,7 @@ def random_rig(seed, joints=7, raw=5):
 
 
 def with_group(dna, rng, joints):
-    """Add one joint group: nine rows per joint in random order, one column per raw control."""
+    """Add a joint group with nine rows per joint in random order, and a column per raw control."""
     raw = len(dna.raw_control_names)
     outputs = rng.permutation(np.concatenate([np.arange(9) + 9 * j for j in joints]))
     values = rng.uniform(-1, 1, (len(outputs), raw))
@@ -255,7 +258,8 @@ def test_quaternion_joints_map_for_all_controls_at_once(seed):
     c = oracle.change(source, target)
     expected = oracle.mapped_rotation(c, oracle.rotation(source, before[:, 3:6]))
     result = oracle.rotation(target, after[:, 3:6])
-    # The evaluator's arc sine has an error of about sqrt(EPS) near the pole.
+    # The evaluator's arc sine has an error of about sqrt(EPS) if the middle angle is near 90
+    # degrees.
     assert np.abs(result - expected).max() <= 4 * np.sqrt(EPS)
     np.testing.assert_allclose(
         after[:, :3],
@@ -266,7 +270,7 @@ def test_quaternion_joints_map_for_all_controls_at_once(seed):
 
 
 def converted_columns(dna, target):
-    """Joint matrices converted column by column: {(group, output, input): value}."""
+    """For each group, joint -> converted (translations, rotations, scales) of its columns."""
     source = oracle.system_of(dna)
     c, unit = oracle.change(source, target), oracle.scale_of_unit(source, target)
     out = []
@@ -312,7 +316,7 @@ def test_joint_matrices_convert_column_by_column(name):
 
 
 def matrix_of(q):
-    """The row-vector matrix of a quaternion, from rotated axes: v' = q v conjugate(q)."""
+    """Rotation matrix for row vectors, by rotating the three axes with a quaternion."""
     q = np.asarray(q, float)
     conjugate = q * (-1, -1, -1, 1)
     product = oracle_behavior.multiply
@@ -380,7 +384,7 @@ def test_its_own_system_changes_no_bit(name):
 def test_places_and_signs_come_back_exactly(name):
     dna = load(name)
     source = oracle.system_of(dna)
-    # The same file, with -0 written as 0.
+    # The JSON of the same file, with -0 written as 0.
     fresh = json.loads(dna.to_json().replace("-0.0,", "0.0,"))
     for target in keeping_order(source, 12, 8):
         arguments = target.arguments()
@@ -493,10 +497,10 @@ def close_angles(system, actual, expected):
 
 
 def check_groups(system, groups, expected):
-    """Check that joint matrices equal the reference's where the reference keeps the numbers.
+    """Check that joint matrices equal the reference's where the reference keeps the values.
 
     The reference spreads a joint over nine rows in all LODs that use any of them, and loses the
-    signs of scales. Here each row keeps its LODs.
+    signs of scales. In Risorius each row keeps its LODs.
     """
     assert len(groups) == len(expected)
     for group, wanted in zip(groups, expected, strict=True):
@@ -535,7 +539,7 @@ def check_meshes(meshes, expected):
 
 
 def check_solvers(dna, converted, expected):
-    """Compare targets up to the quaternion's sign. The reference does not convert twist axes."""
+    """Compare solvers' targets, ignoring signs; the reference does not convert twist axes."""
     c = oracle.change(oracle.system_of(dna), oracle.system_of(converted))
     for before, solver, wanted in zip(
         dna.rbf_behavior.solvers, converted.rbf_behavior.solvers, expected, strict=True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""DNA files: reading, checking and writing."""
+"""Tests DNA files: reading, checking and writing."""
 
 import copy
 import json
@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def small():
-    """A face with every typed layer, built by hand through the public classes."""
+    """A face with every layer that has a class, made through the public classes."""
     dna = risorius.Dna(name="small", lod_count=1, gender="female", age=30)
     dna.coordinate_system = ("right", "up", "front")
     dna.metadata = {"licence": "CC0-1.0"}
@@ -183,7 +183,7 @@ def test_every_prefix_is_an_error_with_an_offset():
 
 
 def test_every_patched_byte_is_read_or_refused():
-    """No byte causes a crash; every accepted file can be written and evaluated."""
+    """No changed byte causes a crash; every file that is accepted can be written and evaluated."""
     data = small().to_bytes()
     refused = 0
     for at in range(len(data)):

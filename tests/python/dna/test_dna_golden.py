@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Complete, partial and LOD-filtered loads, compared with values of the reference's reader."""
+"""Compares complete, partial and LOD-filtered loads with values of the reference's reader."""
 
 import copy
 import zlib
@@ -23,7 +23,8 @@ MASKS = {
     131: ["joint_behavior_metadata"],
     259: ["twist_swing_behavior"],
 }
-# Files without digests: filtered loads are compared by name, which digests lack.
+# Files with complete lists instead of digests, because filtered loads are compared by names, which
+# digests do not contain.
 FILES = sorted(
     p.name
     for p in GOLDEN_SET.glob("*.decode.*")
@@ -48,7 +49,7 @@ def load(folder, golden, name):
 
 
 def comparable(view, dna):
-    """Remove values that the reference computes, or invents for older files."""
+    """Remove values that the reference computes, or adds to older files, from a decoded file."""
     view = copy.deepcopy(view)
     view.pop("load", None)
     view.pop("ok", None)
@@ -59,7 +60,7 @@ def comparable(view, dna):
         for derived in ("blendShapeChannelOutputIndices", "animatedMapOutputIndices"):
             pose.pop(derived, None)
     if dna.version < 6 or not dna.machine_learned_behavior_ext.types:
-        # The reference derives operations from the networks.
+        # The reference derives operations from the networks of older files.
         view["machineLearnedBehaviorExt"]["types"] = []
     if dna.version < 5:  # and pose controls from the poses
         view["rbfBehavior"]["poseControlNames"] = []
@@ -70,7 +71,7 @@ def comparable(view, dna):
 
 
 def is_digest_of(digest, values):
-    """Whether a digest fits a list: length, checksum in a type of the format, first values."""
+    """Whether a digest fits a list: count of values, checksum in a type of the format, begin."""
     found = np.asarray(values).ravel()
     sums = {zlib.crc32(found.astype(kind).tobytes()) for kind in ("<f4", "<u2", "<u4", "u1")}
     head = np.float32(digest["head"])
@@ -121,10 +122,10 @@ def check(folder, name):
 
 
 def without_kept_ancestors(expected, found):
-    """Remove parents of kept joints, which Risorius keeps.
+    """Remove joints that only Risorius keeps, because they are parents of kept joints.
 
-    The reference uses joint 0 as the parent instead and assigns weights of such joints to other
-    joints, so their vertices are not compared.
+    The reference uses joint 0 as the parent instead, and assigns weights of such joints to other
+    joints, so that vertices with these weights are not compared.
     """
     joints = found["joints"]
     extra = [name for name in joints if name not in expected["joints"]]

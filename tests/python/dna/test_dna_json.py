@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Dna as JSON: the names of the format, and no loss of bits."""
+"""Dna as JSON: it uses the names of the file format, and loses no bit of a number."""
 
 import json
 
@@ -35,14 +35,14 @@ def test_the_standard_library_reads_the_numbers_of_the_file():
         np.float32([mesh["positions"][axis] for axis in ("xs", "ys", "zs")]).T,
         dna.meshes[0].positions,
     )
-    # A file that the standard library wrote in another order loses nothing either.
+    # JSON that the standard library wrote in another order loses no value.
     shuffled = json.dumps(facts, sort_keys=True, separators=(",", ":"))
     assert risorius.Dna.from_json(shuffled).to_bytes() == dna.to_bytes()
 
 
 @pytest.mark.parametrize("minor", range(1, 9))
 def test_extra_the_names_are_those_of_the_format(minor):
-    """Compared with an independent parser, which has no index and writes all digits."""
+    """Each layer's JSON has the names and values of an independent parser's JSON."""
     require_extra(FIXTURES, "the reference's fixtures")
     facts = json.loads((FIXTURES / f"raw_v2{minor}.decoded.json").read_text())
     ours = json.loads(risorius.load(FIXTURES / f"raw_v2{minor}.dna").to_json())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""LOD filters: the result is a complete file with the meshes and motion of the original."""
+"""Tests LOD filters: the result is a complete file with meshes and motion of the original."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def mapping(rows):
 
 
 def many_lods(count):
-    """A face with one joint, channel, map and mesh per LOD, and their controls.
+    """A face with one joint, channel, map and mesh for each LOD, and one raw control.
 
     LOD l lists the joints from l on, channel l, map l and mesh l.
     """
@@ -33,7 +33,7 @@ def many_lods(count):
     dna.mesh_names = [f"mesh{i}" for i in range(count)]
     dna.mesh_blend_shape_channel_mapping = [[i, i] for i in range(count)]
     dna.joint_row_count, dna.joint_column_count = 9 * count, 1
-    # The highest LOD's rows come first, because each LOD uses the leading rows.
+    # Rows that the coarsest LOD uses come first, because each LOD uses the first rows of a group.
     order = list(range(count))[::-1]
     dna.joint_groups = [
         risorius.JointGroup(
@@ -131,7 +131,7 @@ def test_any_number_of_lods(count):
     last = count - 1
     part = risorius.load(data, lods=[last])
     assert (part.lod_count, part.max_lod) == (1, last)
-    # The root stays as the parent of the last joint.
+    # Joint 0 stays, because it is the parent of the last joint.
     assert part.joint_names == [f"joint{i}" for i in sorted({0, last})]
     assert part.joint_parents.tolist() == [0] * len(part.joint_names)
     assert part.blend_shape_channel_names == [f"channel{last}"]
@@ -172,7 +172,7 @@ def test_a_selection_that_makes_no_sense_is_refused(lods):
 
 
 def test_lods_past_the_last_are_passed_over_and_repeats_count_once():
-    """As in the reference's filter, which however counts repeated LODs several times."""
+    """The reference's filter also ignores LODs past the last, but counts repeats several times."""
     whole = risorius.load(GOLDEN / "core.dna")
     assert whole.filter_lods((1, 65535)).to_bytes() == whole.filter_lods([1, 1]).to_bytes()
     assert whole.filter_lods([1, 0]).to_bytes() == whole.to_bytes()
@@ -206,8 +206,8 @@ def test_extra_the_references_fixture_by_lod_1():
         dna.joint_groups[1].values.ravel(), np.float32(np.arange(1, 11) / 100)
     )
     maps = dna.animated_maps
-    # The first six entries drive AA AB AB AC AD AD; only AC remains. The reference keeps the old
-    # indices 0 1 1 2 3 3, which now mean other maps.
+    # Six entries drive the maps AA AB AB AC AD AD, of which only AC remains, with the new index 0.
+    # The reference keeps the old indices, although they mean other maps after the filter.
     assert maps.lods.tolist() == [1]
     assert maps.conditionals.output_indices.tolist() == [0]
     (mesh,) = dna.meshes

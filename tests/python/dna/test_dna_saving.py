@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Saving: after any failure the file is either the complete old one or the complete new one."""
+"""Tests saving: after any failure, the file is the complete old one or the complete new one."""
 
 import os
 import stat
@@ -27,7 +27,7 @@ def python(script, *arguments, **options):
 def test_a_full_disk_leaves_the_old_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
-    # A limit on file size simulates a full disk: writing fails in the middle.
+    # A limit of the file size simulates a full disk: writing fails in the middle of the file.
     script = (
         "import resource, signal, sys, risorius\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
@@ -46,7 +46,7 @@ def test_a_read_only_folder_leaves_the_old_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
     tmp_path.chmod(0o555)
-    # Root may write everywhere, so the child runs as the user nobody if possible.
+    # Root may write everywhere, so that the child process runs as the user nobody if possible.
     script = (
         "import os, sys, risorius\n"
         "dna = risorius.load(sys.argv[1]); dna.name = 'new'\n"
@@ -70,7 +70,7 @@ def test_a_read_only_folder_leaves_the_old_file(tmp_path):
 def test_a_kill_in_the_middle_leaves_one_whole_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
-    # The child alternates between two files of some megabytes until it is killed.
+    # The child process saves two files of 4 MB alternately under one name until it is killed.
     script = (
         "import sys, risorius\n"
         "faces = []\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conversion from every version to every version: layers that stay, warnings about the others."""
+"""Tests conversion of every version to every version: kept layers, warnings about others."""
 
 import json
 import warnings
@@ -10,7 +10,7 @@ import risorius
 from conftest import GOLDEN, SHARED, require_extra
 
 FIXTURES = SHARED / "data" / "fixtures"
-# The minor version in which each layer appeared (docs: dna-format, versions).
+# Minor version in which each layer appeared (docs: dna-format, versions).
 SINCE = {
     "desc": 1, "defn": 1, "bhvr": 1, "geom": 1, "mlbh": 3, "rbfb": 4, "jbmd": 4, "twsw": 4,
     "rbfe": 5, "mlbe": 6, "dsce": 7,
@@ -19,7 +19,7 @@ VERSIONS = range(1, 9)
 
 
 def known(minor):
-    """The layers of a version; 2.1 has four sections instead."""
+    """Names of the layers of a version; version 2.1 has four sections instead, counted as 2.2."""
     return {name for name, since in SINCE.items() if since <= max(minor, 2)}
 
 
@@ -38,12 +38,12 @@ def test_between_all_versions(source, target):
     data, words = written(dna, target)
     again = risorius.load(data)
     assert again.version == target
-    # 2.1 stores four layers, other versions all: newer layers are written for readers that know
-    # them.
+    # Version 2.1 stores four layers. Other versions store all, so that newer layers are written for
+    # readers that know them.
     kept = set(dna.layers) | known(source)
     expected = known(1) if target == 1 else kept | known(target)
     assert set(again.layers) == expected
-    # All content comes back, or a warning names its layer.
+    # Each layer that the target version cannot store, and that is not empty, is named in a warning.
     missing = {
         name for name in kept if SINCE[name] > max(target, 2) and holds_something(path, name)
     }
@@ -57,7 +57,7 @@ def test_between_all_versions(source, target):
 
 @pytest.mark.parametrize("source", range(3, 9))
 def test_what_a_lost_layer_drove_goes_with_it(source):
-    """A file converted to 2.1 evaluates like its source with networks and poses at rest."""
+    """In version 2.1, groups and channels lose the inputs that networks and poses drove."""
     dna = risorius.load(GOLDEN / f"tiny_v2{source}.dna")
     data, words = written(dna, 1)
     again = risorius.load(data)
@@ -88,7 +88,7 @@ def test_what_was_not_loaded_is_not_missed_by_the_written_file(layers):
     names += len(again.rbf_behavior_ext.pose_control_names)
     for group in again.joint_groups:
         assert all(i < names for i in group.input_indices)
-    # Pose controls keep their poses: their indices start after the correctives.
+    # Pose controls have new indices, which start after the correctives, but keep their order.
     first = len(again.raw_control_names) + again.psd_count
     for old, new in zip(dna.rbf_behavior_ext.poses, again.rbf_behavior_ext.poses, strict=True):
         shift = old.output_control_indices - new.output_control_indices
@@ -109,7 +109,7 @@ def test_a_winding_that_a_version_cannot_hold_is_named(target):
 
 
 def holds_something(path, name):
-    """Whether a layer of the file differs from an empty file of the newest version."""
+    """Whether a layer of the file differs from the same layer of an empty file."""
     if name == "dsce":
         dna = risorius.load(path)
         default = risorius.Dna()
@@ -160,7 +160,8 @@ def test_unknown_layers_are_kept_or_dropped_by_choice():
     assert risorius.load(data).unknown_layers == dna.unknown_layers
     assert risorius.load(data, unknown_layers="ignore").unknown_layers == []
     assert risorius.load(data).to_bytes() == data
-    # A newer version of a known layer is accepted and does not replace the known one.
+    # A newer version of a known layer is kept as an unknown layer, and does not replace the known
+    # one.
     assert len(risorius.load(data).machine_learned_behavior.neural_networks) > 0
 
 
@@ -174,7 +175,7 @@ def test_a_newer_minor_is_read_by_the_rules_of_the_newest(minor):
 
 
 def test_extra_downgraded_fixtures_hold_every_layer():
-    """No layer gets lost in files of a newer version whose version number was lowered."""
+    """Files whose version number was lowered keep the layers of the newer version."""
     require_extra(FIXTURES / "raw_v28.dna", "the reference's fixtures")
     names = [f"RawV2{n}DowngradedFromV2{n + 1}" for n in range(2, 8)]
     for name in names:

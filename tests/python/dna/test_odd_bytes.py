@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names with any bytes are read as text that is written back as the same bytes."""
+"""Tests that names with any bytes are read as text that is written as the same bytes."""
 
 import pytest
 import risorius

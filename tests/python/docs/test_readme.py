@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands in README.md: all are parsed, and the quick ones are run."""
+"""Tests the commands in README.md: all are parsed, and the quick ones are run."""
 
 import re
 import shlex
@@ -27,7 +27,7 @@ BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", (PROJECT / "README.md").read_text()
 
 
 def lines():
-    """The command lines of the README's shell blocks, with continued lines joined."""
+    """Command lines in the README's shell blocks; lines of a here-document are one command."""
     out = []
     for kind, text in BLOCKS:
         if kind == "bash":
@@ -39,7 +39,7 @@ def lines():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder like a clone after the demo: .venv, and build/demo as the working folder."""
+    """The working folder build/demo with the files that the demo makes."""
     place = tmp_path / "build" / "demo"
     place.mkdir(parents=True)
     dna = risorius.load(GOLDEN / "core.dna")

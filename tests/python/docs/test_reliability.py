@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All tests that docs/reliability.md names exist."""
+"""Checks that all tests exist which docs/reliability.md names."""
 
 import re
 
@@ -9,7 +9,7 @@ _NAMED = re.compile(r"`(?:(?P<file>test_\w+)::|::)(?P<test>test_[\w…]+|…[\w�
 
 
 def _missing(text):
-    """Names in the page for which no test exists; `…` stands for any letters."""
+    """Names in a page for which no test exists; `…` in a name stands for any letters."""
     homes = {}
     for folder in ("tests", "blender_tests"):
         for path in (PROJECT / folder).rglob("test_*.py"):

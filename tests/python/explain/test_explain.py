@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius.explain, compared with the evaluator, the oracle and faces made by hand."""
+"""Tests risorius.explain with the evaluator, the oracle and faces made by hand."""
 
 import json
 
@@ -17,7 +17,7 @@ SEEDS = (1, 2)
 
 
 def some_controls(dna, rig, seed):
-    """Raw controls with about a third of them active; rotations are unit quaternions."""
+    """Raw controls of which about a third are active; rotations are unit quaternions."""
     random = np.random.default_rng(seed)
     raw = np.where(random.random(len(rig.raw_control_names)) < 0.35, random.random(), 0)
     raw = (raw * random.random(len(raw))).astype(np.float32)
@@ -34,16 +34,20 @@ def some_controls(dna, rig, seed):
 
 
 def tolerance(dna, sizes):
-    """Allowed float32 error: 2e-5 times the sum of the parts plus one unit.
+    """Allowed float32 error of each of 9 attributes: 2e-5 times (size + 1 unit).
 
-    For rotations the unit is a radian, because values may be converted through quaternions.
+    The unit of rotations is a radian, because values may be converted through quaternions.
+
+    Args:
+        dna: the face, with the unit of rotations.
+        sizes: float[..., 9], sum of the absolute contributions to each attribute.
     """
     turn = 1.0 if dna.rotation_unit == "radians" else 57.3
     return 2e-5 * np.add(sizes, [1, 1, 1, turn, turn, turn, 1, 1, 1])
 
 
 def check_sums(dna, rig, raw, lod):
-    """Contributions sum to the pose and shares to 1; all moving joints are listed."""
+    """Check that contributions sum to the pose, shares to 1, and all moving joints are listed."""
     facts = explain(dna, rig, raw, lod=lod)
     pose = rig.evaluate(raw, lod=lod)
     moving = set(np.flatnonzero(np.any(pose.joints != 0, axis=1)).tolist())
@@ -90,7 +94,7 @@ def test_extra_full_scale():
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 def test_what_fires_is_what_the_oracle_says(file):
-    """Active correctives, channels and maps equal those of an evaluator that shares no code."""
+    """Active correctives and maps equal those of an evaluator that shares no code with Risorius."""
     dna = risorius.load(file)
     rig = risorius.Rig(dna)
     raw = some_controls(dna, rig, 1)
@@ -145,7 +149,7 @@ def test_weights_of_poses_give_what_the_evaluator_writes(name, seed):
 
 
 def hand_made():
-    """Two controls and a corrective move one joint; LOD 1 has only its translation."""
+    """Two controls and a corrective move one joint; LOD 1 has only its x translation."""
     dna = risorius.load(GOLDEN / "core.dna")
     group = dna.joint_groups[0].__copy__()
     group.input_indices = [0, 2, 4]
@@ -361,7 +365,7 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "CTRL_expressions.browRaiseInnerL=0.5, CTRL_expressions.browRaiseInnerR=0.5" in (
         captured.err
     )
-    # Calculated by hand: 1.5 * 0.5 * 0.75 for corrective 6, and the missing factor of corrective 5.
+    # By hand: corrective 6 is 1.5 * 0.5 * 0.75, and corrective 5 lacks a factor.
     assert "corrective 6 = 0.5625: browRaiseInnerR 0.5 * jawOpen 0.75, weight 1.5" in captured.out
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 
@@ -418,7 +422,10 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
 
 @pytest.mark.parametrize("name", ["quatjoints", "mlquat"])
 def test_a_rotation_order_that_nobody_knows_is_that_of_the_evaluator(name):
-    """Numbers that the format does not define are read, and evaluated as xyz, right, up, front."""
+    """A rotation order or axis with an undefined number is read, and evaluated as the default.
+
+    The defaults are xyz, right, up and front.
+    """
     dna = risorius.load(GOLDEN / f"{name}.dna")
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
     dna.coordinate_system = ("#7", "up", "#9")

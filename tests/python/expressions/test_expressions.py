@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: Risorius' own fit the standard controls; errors in files are reported."""
+"""Risorius' expressions use only standard controls; errors in files of expressions are reported."""
 
 from __future__ import annotations
 
@@ -53,13 +53,16 @@ def test_expressions_differ(standard_controls):
 
 
 def test_no_two_are_mistaken_for_each_other(standard_controls):
-    """Directions are compared, because one expression at two strengths is the same expression."""
+    """No two expressions have nearly proportional weights.
+
+    Proportional weights would be one expression at two strengths.
+    """
     shown = [e for e in expressions.load().values() if e.weights]
     vectors = np.array([expressions.pose_vector(e, standard_controls) for e in shown])
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
     alike = vectors @ vectors.T - np.eye(len(shown))
     first, second = divmod(int(alike.argmax()), len(shown))
-    # The nearest two are sounds of the tongue, which also look alike on people.
+    # The two most similar expressions are sounds of the tongue, which also look alike on people.
     assert alike.max() < 0.91, (shown[first].name, shown[second].name)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names inside files become valid file names, never paths."""
+"""Tests that names inside files become valid file names, never paths."""
 
 import re
 import unicodedata

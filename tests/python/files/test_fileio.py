@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing: the state of files after each kind of failure."""
+"""Tests atomic writing: the state of files after each kind of failure."""
 
 import contextlib
 import errno
@@ -111,7 +111,7 @@ def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(
 
 
 def _staged(target, files):
-    """Write files like an external writer with `staging`; without the target's name it raises."""
+    """Write files with `staging` like an external program; raise if none is the target."""
     with fileio.staging(target) as made:
         for name, data in files.items():
             path = made.with_name(name) if "/" not in name else made.parent / name
@@ -229,7 +229,7 @@ def test_a_folder_that_may_not_be_written_is_known_before(tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "a").write_text("old")
-    # Root may write everywhere, so the child runs as the user nobody if possible.
+    # Root may write everywhere, so that the child process runs as the user nobody if possible.
     for above in tmp_path.parents:
         if above.stat().st_uid == os.getuid() and above.name.startswith("pytest-"):
             above.chmod(above.stat().st_mode | 0o055)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""JPEG files of files.jpeg, read by Pillow."""
+"""Tests JPEG files of risorius.files.jpeg by reading them with Pillow."""
 
 import io
 
@@ -9,7 +9,7 @@ from risorius.files.jpeg import jpeg
 
 
 def read(data):
-    """Read a JPEG with Pillow as uint8; row 0 is the bottom."""
+    """Pixels of a JPEG as uint8, read by Pillow; row 0 is the bottom row."""
     image = pytest.importorskip("PIL.Image", reason="NOT RUN: no Pillow, which reads the files")
     return np.array(image.open(io.BytesIO(data)))[::-1]
 
@@ -37,7 +37,7 @@ def test_noise_single_pixels_and_one_colour_are_files_too(quality):
 
 
 def test_a_code_longer_than_files_allow_is_shortened():
-    # Frequencies from the Fibonacci numbers give a Huffman tree of the greatest depth.
+    # Frequencies that are Fibonacci numbers give a Huffman tree of the greatest depth.
     counts = [1, 1]
     while len(counts) < 22:
         counts.append(counts[-1] + counts[-2])

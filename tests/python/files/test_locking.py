@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Locks of folders: only one process at a time holds one."""
+"""Tests locks of folders: only one process at a time has the lock of a folder."""
 
 import errno
 import json
@@ -81,7 +81,7 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
         thread.join()
     assert broken == []
     assert most[0] == 1
-    # Windows does not remove a file that another process has open, so an empty file may stay.
+    # Windows does not remove a file that another thread has open, so that an empty file may stay.
     assert os.listdir(tmp_path) in ([], [NAME] if os.name == "nt" else [])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that other programs have open, and unusual names and folders, on every system."""
+"""Tests files that other programs have open, and unusual names and folders, on every system."""
 
 import os
 import shutil
@@ -75,7 +75,7 @@ def test_a_file_that_nobody_else_may_open_stays(save, face):
 
 
 def opened_alone(path):
-    """A file that is opened exclusively on Windows, as by a virus scanner or an editor."""
+    """A file object that excludes all others on Windows, as virus scanners or editors open it."""
     import ctypes
     import msvcrt
 
@@ -135,8 +135,8 @@ def test_the_command_line_takes_them_and_names_them(name, tmp_path):
     done = subprocess.run([*command, str(bad)], capture_output=True, env=utf8, check=False)
     assert done.returncode != 0
     assert bad.name in (done.stdout + done.stderr).decode()
-    # Pipes of Windows have their own code page, which may lack letters; the output must be the
-    # same.
+    # Pipes of Windows have their own code page, which may lack letters of the name; the command
+    # must end in the same way.
     old = {**os.environ, "PYTHONIOENCODING": "cp1252"}
     again = subprocess.run([*command, str(bad)], capture_output=True, env=old, check=False)
     assert again.returncode == done.returncode

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""VRM files and generated bodies: the tables that programs read, and refusals.
+"""Tests VRM files and generated bodies: the tables that programs read, and refusals.
 
-packaging/ship/gameface.sh tests them in three-vrm, TalkingHead and Blender's VRM reader.
+packaging/ship/gameface.sh tests such files in three-vrm, TalkingHead and Blender's VRM reader.
 """
 
 import re
@@ -48,7 +48,7 @@ def toml_of(table):
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face with a head at 1.5 m height and the controls of ARKit's and VRM's units."""
+    """A face whose head is 1.5 m high, with the controls of ARKit's and VRM's units."""
     dna = risorius.load(GOLDEN / "medium.dna")
     names = [c for row in arkit.mapping().values() for c in row]
     dna.raw_control_names = list(dict.fromkeys(names))[: len(dna.raw_control_names)]
@@ -248,8 +248,8 @@ def test_wishes_that_do_not_go_together(face, tmp_path, capsys):
     assert (code, "a joint called head was expected" in line) == (1, True)
 
 
-# For each engine: characters that it treats as part of a path or refuses in names of nodes and
-# targets, and whether upper and lower case are equal. The engines are not run here.
+# Engine -> (characters in names of nodes and targets that it refuses or treats as part of a path;
+# whether it ignores case). The engines are not run here.
 ENGINES = {
     "Godot": (r'[.:@/"%]', False),
     "Unity": (r"[/\x00-\x1f]", False),

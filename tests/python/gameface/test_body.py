@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face on a body of the user's own: its place, the body's meshes and bones, and bad files.
+"""Export of a face on the user's own body: position, the body's meshes and bones, bad files.
 
 packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`risorius export`: the exported file moves like the rig, and limits are reported.
+"""Tests `risorius export`: the exported file moves like the rig, and limits are reported.
 
 gltf_oracle.py reads the file and dna_bytes.py evaluates the rig; neither shares code with the
 exporter. packaging/ship/gameface.sh tests three.js and gltf-validator.
@@ -40,13 +40,13 @@ SAMPLE = PROJECT / "build" / "sample" / "man.dna"
 
 
 def controls():
-    """The 69 raw controls that ARKit's units use."""
+    """Names of the 69 raw controls that ARKit's units use."""
     return list(dict.fromkeys(c for row in arkit.mapping().values() for c in row))
 
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face with most of the controls of ARKit's units; a few are missing."""
+    """The path of a face with most of the controls of ARKit's units; some are missing."""
     dna = risorius.load(GOLDEN / "medium.dna")
     count = len(dna.raw_control_names)
     dna.raw_control_names = controls()[:count]
@@ -60,7 +60,7 @@ def face(tmp_path_factory):
 
 
 def poses(face):
-    """Target name -> (raw controls of the target, raw controls of its base pose)."""
+    """Yields (target name, its raw controls, raw controls of the pose that it is added to)."""
     there = set(risorius.load(face).raw_control_names)
     for name, row in arkit.mapping().items():
         raw = {control: value for control, value in row.items() if control in there}
@@ -76,7 +76,7 @@ def made(face, tmp_path, *more):
 
 
 def places(face):
-    """The oracle of a face, and its vertices at rest in metres."""
+    """The oracle of a face, and the face's vertices at rest in metres."""
     oracle = dna_bytes.Face(face.read_bytes())
     return oracle, oracle.vertices({}) / 100
 
@@ -163,7 +163,7 @@ def test_the_driver_brings_sums_of_two_to_the_rig(face, tmp_path):
 
 @pytest.mark.parametrize("kind", ["cubic", "early", "late", "middle", "triple"])
 def test_refinements_leave_exact_poses_alone(kind):
-    # If one target is active, or two fully, the other targets add nothing.
+    # If only one of the targets is active, or if two are at 1, a refinement adds nothing.
     many = {"cubic": 1, "triple": 3}.get(kind, 2)
     for on in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.0, 0.5)):
         weights = np.array([*on, 0.0])[:many]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Long hair that swings: its joints, their weights, and the tables of VRM.
+"""Tests long hair that swings: its joints, their weights, and the tables of VRM.
 
-packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
+packaging/ship/gameface.sh tests such files in three-vrm and Blender's VRM reader.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ LENGTH = 0.18  # metres
 
 @pytest.fixture(scope="module")
 def haired(face, tmp_path_factory):  # noqa: F811
-    """A face with hair that hangs 18 cm, behind and beside the head."""
+    """The path of a face with hair that hangs 18 cm behind the head."""
     dna = risorius.load(face)
     path = tmp_path_factory.mktemp("haired") / "anna.dna"
     dna.mesh_names = [name.replace("eyeLeft", "hair") for name in dna.mesh_names]
@@ -30,7 +31,7 @@ def haired(face, tmp_path_factory):  # noqa: F811
 
 
 def curtain(positions, length):
-    """Centimetres: a narrow strip behind the head that hangs."""
+    """Positions in cm of a narrow strip of hair that hangs down behind the head."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     share = (positions - low) / np.maximum(high - low, 1e-9)
     return ((share - [0.5, 1, 0.5]) * [5, 100 * length, 1] + [0, 165, -12]).astype(np.float32)
@@ -120,7 +121,7 @@ def test_vrm_0_lists_the_first_bones_of_chains(haired, tmp_path):
     [ball] = table["colliderGroups"][0]["colliders"]
     [sphere] = new.json["extensions"]["VRMC_springBone"]["colliders"]
     x, y, z = sphere["shape"]["sphere"]["offset"]
-    # The file looks back, so x and z are turned, and Unity's z is against glTF's.
+    # VRM 0.x faces back, which reverses x and z, and Unity's z axis is opposite to glTF's.
     assert np.abs([ball["offset"][k] for k in "xyz"] - np.array([-x, y, z])).max() < 1e-6
 
 
@@ -161,7 +162,7 @@ def test_hair_on_a_body_hangs_below_its_head_bone(haired, tmp_path):
 
 
 def balls_of(found):
-    """Where colliders are in the scene, the first node of each chain, and the way down."""
+    """Places of colliders in the scene, first nodes of chains, and directions of gravity."""
     tables, world, nodes = found.json["extensions"], found._world(), found.json["nodes"]
     if "VRMC_springBone" in tables:
         table = tables["VRMC_springBone"]

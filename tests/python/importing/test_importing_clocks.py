@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Times of captures: units in many spellings, and clocks that stop or run backwards."""
+"""Tests times of captures: units in many spellings, and clocks that stop or run backwards."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FEW = ["JawOpen", "MouthSmileLeft"]
 
 
 def convert(tmp_path, name, text, *options):
-    """Run `risorius clip convert`.
+    """Run `risorius clip convert` on a file with this text.
 
-    Returns the exit code and the clip; the CSV's times are in seconds.
+    Returns the exit code and the converted clip, or None.
     """
     path, out = tmp_path / name, tmp_path / "out.rzc"
     path.write_text(text)
@@ -58,7 +58,7 @@ SPELLINGS = [
     ("timestamp (nanosec)", 33333333), ("time (min)", 1 / 1800), ("Time (millisec)", 33.333),
     ("time_millis", 33.333), ("timestamp_ms", 33.333), ("time in seconds", 1 / 30),
     ("elapsed (Sec.)", 1 / 30), ("time (h)", 1 / 108000),
-    # Without a unit, but too large for seconds.
+    # These columns have no unit, but steps that are too large for seconds.
     ("timestamp", 33), ("time", 33333.0), ("t", 33333333),
 ]  # fmt: skip
 
@@ -119,12 +119,12 @@ def test_frame_numbers_need_a_rate(tmp_path, form, header, capsys):
 
 
 def stopped(form):
-    """A take whose times are whole seconds."""
+    """A take whose times are whole seconds, so that 20 frames have the same time."""
     return FORMS[form]("time (s)", [i // 20 for i in range(60)])
 
 
 def set_back(_):
-    """A take of Live Link Face whose clock jumps back an hour in its middle."""
+    """A take of Live Link Face whose clock is set back an hour in the middle."""
     seconds = 36000.0 + np.arange(60) / 30.0
     seconds[30:] -= 3600.0
     return live_link_face(capture(60, FEW), seconds, names=FEW)
@@ -154,7 +154,7 @@ def test_a_take_that_loses_over_a_third_names_what_mends_it(tmp_path, make, form
     "base", [15, 36, 40, 45, 72, 75, 80, 90, 100, 110, 120, 144, 200, 240, 1000]
 )
 def test_timecodes_of_any_rate_are_measured(tmp_path, base):
-    """Two and a half seconds, every or every third frame, with and without lost rows."""
+    """Takes of 2.5 s have every frame, every frame but some lost ones, or every third frame."""
     for stride, first, lost in ((1, 0, ()), (1, 7, (9, 10, 33)), (3, 2, ())):
         count = np.delete(np.arange(first, first + base * 5 // 2, stride), lost)
         text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)
@@ -167,7 +167,7 @@ def test_timecodes_of_any_rate_are_measured(tmp_path, base):
 
 @pytest.mark.parametrize("base", [30, 48, 50, 60])
 def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, base):
-    """One and a half seconds with lost rows before or after the second changes."""
+    """Takes of 1.5 s lack rows before, after or around the change of the second."""
     for lost in (range(base - 3, base), range(base, base + 4), range(base - 3, base + 3)):
         count = np.delete(np.arange(base * 3 // 2), [*lost, 3, 4, base + 9])
         text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)
@@ -178,8 +178,8 @@ def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, ba
             assert "give the timecode rate (clip convert --timecode-rate" in str(error)
             continue
         note = next(note for note in found.notes if note.startswith("the timecode counts"))
-        # Without the seconds' changes, rates of 48 and 50 look like 60, the rate of nearly all
-        # phones.
+        # If rows at the change of the second are lost, 48 and 50 frames a second look like 60, the
+        # rate of nearly all phones.
         assert note.split()[3] in (str(base), "60")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""JSON of named curves, in the forms of several programs."""
+"""Tests JSON of named curves in the forms of several programs."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_neurosyncs_nameless_rows(tmp_path, columns):
     assert found.clip.rate == 60.0
     assert any("60 frames a second were assumed" in note for note in found.notes)
     _, report = found.apply()
-    # Some meshes call their basis "Neutral", which the mapping leaves out.
+    # Some meshes call their basis "Neutral"; the mapping ignores this name.
     emotions = ["Angry", "Disgusted", "Fearful", "Happy", "Sad", "Surprised"]
     assert report.unmapped == (emotions if columns == 68 else [])
     assert ("Neutral" in report.ignored) == (columns == 68)

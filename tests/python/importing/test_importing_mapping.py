@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mappings of curves: valid content, matching of names, reports."""
+"""Tests mappings of curves: valid content, matching of names, reports."""
 
 from __future__ import annotations
 
@@ -93,23 +93,23 @@ def test_a_pattern_stands_for_many():
 
 
 def test_lips_that_a_capture_shuts_are_the_whole_share_of_its_jaw():
-    """mouthClose equals jawOpen if the lips are shut; the share control is 1 then."""
+    """If lips are shut, mouthClose equals jawOpen, and the control of the share must be 1."""
     jaw = [0.5, 0.5, 0.5, 0.0, 0.01, 0.01, 0.3]
     close = [0.5, 0.25, 0.7, 0.0, 0.005, 0.02, -0.1]
     take = importing.Imported(Clip(["JawOpen", "MouthClose"], [jaw, close], 30.0), "csv", "", "a")
     clip, _ = take.apply("live_link_face")
     lips = [RIG + "mouthLipsTogether" + quarter for quarter in ("UL", "UR", "DL", "DR")]
     for name in lips:
-        # Below a jaw of 0.02 the share falls to 0, because a quotient of noise would jump between 0
-        # and 1.
+        # If the jaw is open by less than 0.02, the share falls to 0, because a quotient of noise
+        # would jump between 0 and 1.
         np.testing.assert_allclose(clip.curve(name), [1, 0.5, 1, 0, 0.25, 1, 0], atol=1e-6)
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen"), jaw, atol=1e-6)
-    # A gain of the jaw in a mapping does not open the lips; the share has its own gain.
+    # A mapping's gain of the jaw does not open shut lips, because the share has its own gain.
     own = '[controls]\n"jaw*" = { gain = 2.0 }\n"mouthLipsTogether??" = { gain = 0.5 }'
     clip, _ = take.apply(parse_mapping('base = "arkit"\n' + own, "m"))
     np.testing.assert_allclose(clip.curve(lips[0])[:2], [0.5, 0.25])
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen")[0], 1.0)
-    # A mapping can remove the share; without a jaw curve nothing is divided.
+    # A mapping can switch off the share; without a curve of the jaw, mouthClose is not divided.
     none = 'base = "arkit"\nprefix = "CTRL_expressions."\n[shares]\n"mouthLipsTogether**" = ""'
     clip, _ = take.apply(parse_mapping(none, "m"))
     np.testing.assert_allclose(clip.curve(lips[3]), close)
@@ -274,7 +274,7 @@ def test_a_mapping_that_is_not_there_names_those_that_are(tmp_path):
 
 
 def test_a_take_and_the_live_stream_turn_the_same_way():
-    """Both convert the app's angles, in separate code."""
+    """The mapping for files and the live decoder, separate code, give angles the same signs."""
     from risorius.live import livelink
 
     rows = importing.load_mapping("live_link_face").rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The vocabulary of a file's names: VRM as in live captures; never by single letters."""
+"""Names of VRM are recognised in files as in live captures; single letters alone are not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VRM_1 = ["aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "look
 
 
 def table(names, moving=None):
-    """A CSV with a frame at rest, then a frame for each moving name in which it is 1."""
+    """CSV text: a frame at rest, then frames in which one name is 1: each in `moving`, or each."""
     rows = [["0"] * len(names)]
     for i, name in enumerate(names):
         if moving is None or name in moving:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Processing steps of clips, each compared with a formula."""
+"""Tests processing steps of clips; each is compared with a formula."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_the_neutral_becomes_0_and_full_stays_1():
 
 
 def test_a_face_at_rest_with_shut_lips_keeps_them_shut():
-    """At rest the jaw is slightly open and the lips are shut: the share is 1, and stays 1."""
+    """At rest the jaw is slightly open and mouthLipsTogether is 1; later shut lips still give 1."""
     lips = RIG + "mouthLipsTogetherDL"
     before = Clip([lips, RIG + "jawOpen"], [[1.0, 1.0, 0.5], [0.04, 0.52, 0.52]])
     after = process.calibrate(before, 0)
@@ -92,8 +92,8 @@ def test_smoothing_passes_cubics_and_takes_noise():
     np.testing.assert_allclose(only(process.smooth(clip(cubic), 0.2)), cubic, atol=1e-5)
     noise = np.random.default_rng(1).normal(size=5000)
     out = only(process.smooth(clip(noise), 0.2))  # half width 6: 13 frames
-    # Remaining variance of a cubic fit at the middle of 13 samples: 3 (3 m^2 + 3 m - 1) /
-    # ((2m+3)(2m+1)(2m-1)), m = 6.
+    # Remaining variance of noise at the middle of a cubic fit to 2 m + 1 = 13 samples: 3 (3 m^2 + 3
+    # m - 1) / ((2m+3)(2m+1)(2m-1)).
     expected = 3 * (3 * 36 + 18 - 1) / (15 * 13 * 11)
     assert abs(out[20:-20].var() / expected - 1.0) < 0.1
 
@@ -117,7 +117,7 @@ def test_smoothing_keeps_a_peaks_height_and_time():
     assert kept.max() > 0.97
     soft = only(process.gaussian(clip(blink), 0.05))
     assert int(np.argmax(soft)) == 60
-    # The squared widths of two successive Gaussians add up.
+    # The squared widths of successive Gaussians add up: the blink's 0.05 s and the filter's 0.05 s.
     assert soft.max() == pytest.approx(1 / np.sqrt(2), abs=0.01)
 
 
@@ -131,7 +131,7 @@ def test_short_clips_and_wrong_widths():
 
 
 def test_one_euro_holds_noise_and_follows_motion():
-    """Compared with the filter of the paper as a plain loop."""
+    """The filter gives the values of the paper's algorithm, written here as a plain loop."""
     rng = np.random.default_rng(2)
     values = np.where(AT > 1.0, 1.0, 0.0) + rng.normal(scale=0.01, size=120)
     out = only(process.one_euro(clip(values), 1.5, 5.0))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Values in other scales and heads in degrees are refused with a question.
+"""Values in other scales and head rotations in degrees are refused with a question.
 
-Options convert them.
+Options of the import convert them.
 """
 
 from __future__ import annotations

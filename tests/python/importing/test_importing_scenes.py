@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""glTF, GLB and FBX: files of Blender's exporters, and of test writers for other features."""
+"""Tests glTF, GLB and FBX: files of Blender's exporters, and made files for other features."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from risorius import importing
 
 DATA = PROJECT / "tests" / "data" / "importing"
 RIG = "CTRL_expressions."
-# Keys in make_blender_files.py: frame -> value, with linear interpolation.
+# The keys that make_blender_files.py sets: frame -> value, with linear interpolation.
 KEYS = {
     "jawOpen": {1: 0.0, 11: 1.0, 31: 0.25},
     "eyeBlinkLeft": {1: 1.0, 31: 0.0},
@@ -67,7 +67,7 @@ def test_gltf_with_its_buffer_beside_or_inside(tmp_path, where):
 
 
 def small(times, values, channel, way="LINEAR", kind=5126):
-    """A glTF with one sampler, and a mesh with two morph targets."""
+    """A glTF with a sampler, and a mesh with two morph targets: (document, bytes of its buffer)."""
     dtype = {5126: "<f4", 5121: "<u1"}[kind]
     first, second = np.array(times, "<f4").tobytes(), np.array(values, dtype).tobytes()
     binary = first + second
@@ -128,8 +128,8 @@ def test_steps_and_splines_are_sampled(tmp_path):
     clip = read_small(tmp_path, [0, 0.5, 1], [0, 1, 1, 0, 0, 1], WEIGHTS, "STEP").clip
     at = clip.frame_times()
     np.testing.assert_array_equal(clip.curve("jawOpen"), np.where((at >= 0.5) & (at < 1), 1, 0))
-    # In-slope, value and out-slope of each key: 3 t^2 - 2 t^3 with flat ends, then t with slope 1.
-    # Slopes before the first and after the last key (9) are ignored.
+    # For each of two keys, the in-slopes, values and out-slopes of two curves: 3 t^2 - 2 t^3 with
+    # flat ends, and t with slope 1. Slopes before the first and after the last key (9) are ignored.
     values = [9, 9, 0, 0, 0, 1, 0, 1, 1, 1, 9, 9]
     clip = read_small(tmp_path, [0, 1], values, WEIGHTS, "CUBICSPLINE").clip
     at = clip.frame_times()
@@ -325,7 +325,7 @@ def test_cubic_and_constant_keys_are_sampled(tmp_path):
     at = clip.frame_times()
     assert at.size == 61
     np.testing.assert_allclose(clip.curve("a"), 3 * at**2 - 2 * at**3, atol=1e-6)
-    # The cubic from 0 to 1 with slope 2 at the start and 0.5 at the end.
+    # b is the cubic curve from 0 to 1 with slope 2 at its start and 0.5 at its end.
     np.testing.assert_allclose(clip.curve("b"), 2 * at - 1.5 * at**2 + 0.5 * at**3, atol=1e-6)
     np.testing.assert_array_equal(clip.curve("c"), np.where((at >= 0.5) & (at < 1), 1, 0))
     np.testing.assert_allclose(clip.curve("d"), at, atol=1e-6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables: takes of Live Link Face as the app writes them, and CSV files of other programs."""
+"""Tests tables: takes of Live Link Face as the app writes them, and CSV of other programs."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_a_base_that_nothing_tells_is_asked_for(tmp_path):
 
 
 def test_drop_frame_timecodes_leave_out_two_numbers_a_minute(tmp_path):
-    """Frames 1798 to 1801 of 29.97 frames per second: 00:00:59;28, ;29, 00:01:00;02, ;03."""
+    """After 00:00:59;29 the next timecode is 00:01:00;02, one frame of 1001 / 30000 s later."""
     codes = ["00:00:59;28", "00:00:59;29", "00:01:00;02", "00:01:00;03"]
     body = "".join(f"{code},2,0.1,0.2\n" for code in codes)
     found = read(tmp_path, "Timecode,BlendShapeCount,JawOpen,JawLeft\n" + body, timecode_rate=29.97)
@@ -239,7 +239,7 @@ def test_tables_as_spreadsheets_write_them(tmp_path, form, encoding):
 
 @pytest.mark.parametrize("hole", ["", " ", "-", "N/A", "NULL"])
 def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
-    """In a take of Live Link Face: a cell, a column, a timecode, the end; in a table: cells."""
+    """A take of Live Link Face lacks a cell, a column, a timecode, its end; a table lacks cells."""
     rows = [line.split(",") for line in take(60).splitlines()]
     rows[5][2] = rows[9][0] = hole
     for row in rows[1:]:
@@ -455,6 +455,6 @@ def test_the_report_names_every_curve(tmp_path):
     assert all(name in words for row in report.mapped.values() for name in row)
     assert "more" not in words
     assert max(map(len, text.splitlines())) <= 100 + len(str(path))
-    # Curves of the clip that are no controls of the rig are reported too.
+    # The report also names curves that are no controls of the rig, but rotate the head.
     assert report.bones == list(clip.names) == ["head.yaw"]
     assert "for the bones of head and eyes: 1: head.yaw" in text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks of Rhubarb, Papagayo and Moho, and the curves that they become."""
+"""Tests viseme tracks of Rhubarb, Papagayo and Moho, and the curves made of them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_papagayo_and_moho_give_one_track(tmp_path, write):
     found = read(tmp_path, write(), rate=24.0 if write is moho_dat else None)
     assert found.mapping == "papagayo"
     marks = [(round(e.time * 24), e.value) for e in found.clip.events if e.name == "viseme"]
-    # Moho writes a rest twice, at the start and at the end of a pause.
+    # Moho writes a rest twice, at both ends of a pause; only the first is compared.
     marks = [mark for i, mark in enumerate(marks) if i == 0 or mark[1] != marks[i - 1][1]]
     assert marks == [
         (0, "rest"), (6, "AI"), (9, "L"), (13, "O"), (18, "rest"), (24, "MBP"), (28, "O"),
@@ -193,6 +193,6 @@ def test_a_table_that_is_said_to_be_rhubarbs_is_not(tmp_path):
         importing.AnimationFileError, match="shape A-H or X in each line .* a table"
     ):
         read(tmp_path, "time,jawOpen\n0,1\n", kind="rhubarb")
-    # Two columns of letters, or letters next to numbers, are not a viseme track.
+    # Two columns of letters are no viseme track, nor are letters next to numbers.
     with pytest.raises(importing.AnimationFileError, match="columns with curves were expected"):
         read(tmp_path, "time,a,b\n0,A,B\n1,C,D\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces with fewer joints, correctives and LODs, which still play the same animation."""
+"""Tests faces with fewer joints, correctives and LODs, which still play the same animation."""
 
 import copy
 import csv
@@ -55,8 +55,8 @@ def test_a_lighter_face_keeps_controls_and_named_joints(face, file, tmp_path):
     assert {row["corrective"] for row in rows} == {"", "kept", "removed"}
     sizes = [float(row["largest_mm"]) for row in rows]
     assert sizes == sorted(sizes, reverse=True)
-    # The corrective that the neck's solver reads is active in both faces, also the one that drives
-    # a map.
+    # The animated map and the corrective that reads the neck solver's pose have the same values in
+    # both faces.
     raw = risorius.Rig(face).initial_raw_controls
     raw[7:15] = [0, 0, 0.26, 0.9656] * 2
     raw[:7] = 1
@@ -74,7 +74,8 @@ def test_what_is_said_of_an_expression_is_so(face):
     row = said["CTRL_expressions.mouthSmileRight"]
     way = vertices(face, raw, row.lod, row.lod) - vertices(light, raw, row.lod, row.lod)
     assert row.largest_mm == pytest.approx(10 * np.linalg.norm(way, axis=1).max(), rel=1e-3)
-    # Remaining joints keep their motion, and vertices that only they move keep their weights.
+    # Remaining joints keep their motion, and vertices without weights on removed joints keep their
+    # weights.
     same = [face.joint_names.index(name) for name in light.joint_names]
     old, new = risorius.Rig(face).evaluate(raw).joints, risorius.Rig(light).evaluate(raw).joints
     np.testing.assert_array_equal(old[same], new)
@@ -107,7 +108,7 @@ def test_weights_are_fitted_and_both_sides_alike(face):
         squares["fitted"] += float(((vertices(light, raw, 0, 0) - goal) ** 2).sum())
         squares["plain"] += float(((vertices(plain, raw, 0, 0) - goal) ** 2).sum())
     assert squares["fitted"] < 0.35 * squares["plain"]
-    # A rotation of the neck moves the same vertices as before.
+    # A rotation of the neck moves the face as before, within 0.15 cm.
     moved = np.zeros((2, 62, 9))
     moved[1, 2, 5] = 15.0
     world = sk.world_matrices(face, moved)
@@ -137,12 +138,12 @@ def test_correctives_that_move_least_leave(face):
     assert light.joint_names == face.joint_names
     assert light.psd_count == 6
     names = [name.replace("CTRL_expressions.", "") for name in report.removed_correctives]
-    # By the formula for correctives, later ones move the face less; but the sixth drives the jaw's
-    # map, and the last moves the face as much as a smile.
+    # Later correctives move the face less, so that these leave; but number 6 drives the animated
+    # map, and the last one moves the face as much as a smile.
     assert all("jawOpen + neck" not in name for name in names)
     assert "eyeBlinkLeft + mouthSmileRight + jawOpen" not in names
     assert len(report.removed_correctives) == 3
-    # Only the channel of the removed corrective is removed.
+    # Of the channels, only the channel of a removed corrective leaves.
     none, _ = lighten(face, correctives=2, measured=False)
     assert none.psd_count == 2
     assert none.blend_shape_channel_names == face.blend_shape_channel_names[:-1]
@@ -160,7 +161,7 @@ def test_every_layer_is_counted_anew():
         _native.keep_parts(dna, joints=[True, False, True], correctives=[True, True])
     with pytest.raises(risorius.DnaError, match="one value for each"):
         _native.keep_parts(dna, joints=[True, True], correctives=[True, True])
-    # Networks and setups move two of the three joints, which must stay.
+    # Networks and setups move two of the three joints, so that these joints must stay.
     with pytest.raises(ArgumentError, match="must stay were expected"):
         lighten(dna, joints=1)
 
@@ -223,5 +224,5 @@ def test_json_says_all(file, tmp_path):
     said = json.loads(done.stdout)
     assert said["lods"] == [1]
     assert said["after"]["levels"] == 1
-    # A single LOD is the same face, without error.
+    # A face with only LOD 1 of the original has no errors at this LOD.
     assert max(row["largest_mm"] for row in said["expressions"]) < 1e-3

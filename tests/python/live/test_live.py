@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Live capture, with a program that sends packets through this machine's network."""
+"""Tests live capture with a program that sends packets through this machine's network."""
 
 import json
 import math
@@ -44,7 +44,7 @@ def send(port, *steps):
 
 
 def heard(receiver, packets):
-    """Wait for a number of packets. Returns the receiver's status."""
+    """Wait until a receiver has got this number of packets. Returns the receiver's status."""
     ends = monotonic() + PATIENCE
     while monotonic() < ends:
         status = receiver.status()
@@ -55,7 +55,7 @@ def heard(receiver, packets):
 
 
 def record(source, *steps, shaper=None):
-    """Record the packets of some steps. Returns the clip and the status."""
+    """Receive and record the packets of some steps. Returns the clip and the receiver's status."""
     with Receiver(source, 0) as receiver:
         take = receiver.record()
         send(receiver.port, *steps)
@@ -76,7 +76,7 @@ def test_frames_of_live_link_face_arrive_with_their_times():
 
 
 def test_every_curve_of_a_packet_has_its_name():
-    # The order of values in the packet, and the control of Apple's unit at each index.
+    # Checks the order of values in a packet; the first 52 are ARKit units.
     units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
@@ -85,12 +85,12 @@ def test_every_curve_of_a_packet_has_its_name():
     values = [(n + 1) / 100.0 for n in range(61)]
     packet = livelink.decode(packed(v6(1, values)))
     assert np.allclose(packet.values[:52], values[:52])
-    # In the app, angles to the face's right, down and left are positive.
+    # In the app, angles to the face's right, down and left shoulder are positive.
     assert np.allclose(packet.values[52:55], [-0.53, -0.54, 0.55])
 
 
 def packed(step):
-    """The bytes of a step, made by the sender program's code."""
+    """The bytes of the packet of a step, made by the sender program's code."""
     sys.path.insert(0, str(SENDER.parent))
     try:
         import face_sender
@@ -168,7 +168,7 @@ def test_two_phones_are_told_apart():
 
 
 def hostile():
-    """Packets with invalid content."""
+    """Packets with invalid content, as bytes."""
     good = packed(v6(1, face(i17=0.5)))
     bad = [good[:n] for n in range(0, len(good), 7)] + [good + b"\0", b"\xff" * 300]
     bad.append(good.replace(b"\0\0\0\x24", b"\xff\xff\xff\xff", 1))
@@ -193,7 +193,7 @@ def test_hostile_packets_are_counted_and_change_nothing():
 
 
 def faceless(junk):
-    """The number of truncated packets that look like packets of a phone without a face."""
+    """The number of truncated packets that equal packets of a phone which sees no face."""
     head = 1 + 4 + len(PHONE) + 4 + len("iPhone")
     return sum(len(data) in (head, head + 16) for data in junk if data[:1] == b"\x06")
 
@@ -238,8 +238,8 @@ def vmc(values, head=(0.0, 0.0, 0.0, 1.0)):
 def test_vmc_applies_a_whole_face_at_once():
     one = vmc({"A": 0.5, "Blink_L": 1.0}, (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
     two = vmc({"A": 1.0, "Blink_L": 0.0, "unheardOf": 0.5})
-    # The first face is sent as a bundle, the second as single messages with a pause before its
-    # Apply, the third in two bundles.
+    # The first face is sent as a bundle, the second as single messages with a pause before the
+    # message Apply, the third in two bundles.
     steps = [["bundle", one], *[["osc", *m] for m in two[:-1]], ["wait", 0.05], ["osc", *two[-1]]]
     steps += [["bundle", one[:5]], ["bundle", one[5:]]]
     clip, status = record("osc", *steps)
@@ -261,8 +261,8 @@ def test_units_of_perfect_sync_are_not_doubled_by_vrm():
 
 
 def test_face_cap_and_plain_messages():
-    # Without a receiver, because a receiver also ends a face after a pause, and a busy machine has
-    # pauses.
+    # The test uses no receiver, because a receiver also ends a face after a pause, and a busy
+    # machine makes pauses.
     decoder, packets = osc.Decoder(), []
     for n in range(3):
         face = [["osc", "/HR", [10.0 * n, 20.0, 0.0]], ["osc", "/W", [24, n / 4.0]]]
@@ -304,7 +304,7 @@ def test_a_head_as_a_quaternion_is_not_overruled_by_degrees():
     turned = [0.0, math.sin(half), 0.0, math.cos(half)]  # ARKit: about up, to the own left
     (face,), _ = faces_of(["/HRQ", turned], ["/HR", [40.0, 40.0, 40.0]])
     angles = {"head.yaw": math.radians(30.0), "head.pitch": 0.0, "head.roll": 0.0}
-    # The app's degrees and its quaternion describe the same rotation.
+    # The app's angles in degrees and its quaternion describe the same rotation.
     (degrees,), _ = faces_of(["/HR", [0.0, 30.0, 0.0]])
     assert face == pytest.approx(angles, abs=1e-6)
     assert degrees == pytest.approx(angles, abs=1e-6)
@@ -373,7 +373,7 @@ def test_hostile_osc():
     steps += [["osc", "/jawOpen", [0.25]]]
     clip, status = record("osc", *steps)
     assert clip.curve("CTRL_expressions.jawOpen")[-1] == 0.25
-    # Only a message without values and one with an odd name are valid OSC.
+    # At most four of these messages are valid OSC, for example one with an odd name, and the last.
     assert status.refused >= len(steps) - 4
     for data, words in ((deep, "too deep"), (b"/x\0\0,q\0\0", "a message of OSC was expected")):
         with pytest.raises(LiveError, match=words):
@@ -393,14 +393,14 @@ def test_names_without_end_do_not_stop_a_sender():
     make_up("n", 600)
     for letter in "abcdefghij":
         decoder.feed(units, "here", 1.0)
-        # Repeated names keep their places among unique names.
+        # Names that are sent again and again are kept, while names that were sent once are dropped.
         values = make_up(letter, 60)
         assert len(values) == 512
         assert [values[name] for name in livelink.NAMES[:52]] == [0.25] * 52
 
 
 def fed(receiver, step, now, sender="127.0.0.1"):
-    """Give a receiver a packet at a chosen time, as its thread would."""
+    """Give a receiver a packet with a chosen time, as its thread does."""
     receiver._take_in(packed(step), sender, now)
 
 
@@ -433,7 +433,7 @@ def test_subjects_that_stream_keep_their_places():
 
 
 def flood(receiver, seconds, at, steps=lambda n: ()):
-    """Send six packets per second for each of 32 invented subjects, and the packets of `steps`."""
+    """Send 6 packets per second for each of 32 invented subjects, and packets of steps(n)."""
     for n in range(round(6 * seconds)):
         for k in range(32):
             address = at(k)
@@ -589,7 +589,7 @@ def test_a_port_in_use_is_one_sentence():
 
 @pytest.fixture
 def bound(monkeypatch):
-    """The addresses that receivers listen at, as the system reports them."""
+    """A list to which the address of each receiver's socket is added, as the system reports it."""
     from risorius.live import receiver
 
     found, bind = [], receiver._bound
@@ -701,7 +701,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
     assert got["CTRL_expressions.eyeLookLeftL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookDownL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookRightL"] == got["CTRL_expressions.eyeLookUpL"] == 0.0
-    # If look units are sent, the angles are ignored.
+    # If a frame contains look units, angles of the eyes are ignored.
     got = shaper.apply(frame_of(eyeL__yaw=turn, eyeLookOutLeft=0.1))
     assert dict(zip(got.names, got.values, strict=True)) == {
         "CTRL_expressions.eyeLookLeftL": np.float32(0.1)
@@ -709,7 +709,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
 
 
 def test_smoothing_is_the_one_euro_filter():
-    """Compared with the paper's algorithm, value by value in plain Python."""
+    """Smoothed values equal the one-euro filter of its paper, written here in plain Python."""
     random = np.random.default_rng(3)
     raw = np.clip(
         0.5 + random.normal(0, 0.02, 200) + np.where(np.arange(200) > 120, 0.4, 0.0), 0, 1
@@ -743,7 +743,7 @@ def test_a_recording_is_not_smoothed():
 
 
 def saved(path):
-    """Names, times and curves of the written file."""
+    """Names, times and curves of a written file, .rzc or .csv."""
     if path.suffix == ".rzc":
         clip = risorius.Clip.load(path)
         return list(clip.names), clip.frame_times(), clip.curves

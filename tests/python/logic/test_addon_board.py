@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face board's table, its fit and its layout, tested without Blender."""
+"""Tests the face board without Blender: its table, its fit to raw controls and its layout."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _of_rows(names: list[str], rows: Rows, raw: int) -> Any:
 
 @pytest.fixture(scope="module")
 def sample() -> tuple[Any, list[str]]:
-    """The table of the sample man and the names of its raw controls."""
+    """The GUI table of the sample man and the names of its raw controls."""
     rows: Rows = []
     names, raw = [], []
     for gui, ways in sample_controls.gui_table():
@@ -47,7 +47,7 @@ def board(sample: tuple[Any, list[str]]) -> Any:
 
 
 def _raw_by_hand(table: Any, gui: np.ndarray) -> np.ndarray:
-    """The raw controls of a pose, from the table's rows one after the other."""
+    """Raw controls for GUI values, calculated row by row from the table."""
     out = np.zeros(table.raw_count)
     done = set()
     for row in table.rows:
@@ -91,7 +91,8 @@ def test_a_fit_finds_the_way_back(sample: tuple[Any, list[str]]) -> None:
 
 
 def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> None:
-    # raw 0 = a + b, raw 1 = a: for (0.9, 0.2) the solution is a = 0.2 and b = 0.7.
+    # The sliders a and b set raw control 0 to a + b and raw control 1 to a. The raw values 0.9 and
+    # 0.2 need a = 0.2 and b = 0.7.
     rows: Rows = [
         (0, 0, 0.0, 1.0, 1.0, 0.0),
         (0, 1, 0.0, 1.0, 1.0, 0.0),
@@ -103,7 +104,7 @@ def test_a_fit_of_controls_that_share_an_output_is_the_least_squares_one() -> No
 
 
 def test_what_a_fit_loses_is_said_by_name() -> None:
-    """Up 0.5 and down 0.3 of one slider: the larger value is kept, the other is lost."""
+    """If one slider should be 0.5 up and 0.3 down at once, the loss names the smaller control."""
     rows: Rows = [(0, 0, 0.0, 1.0, 1.0, 0.0), (0, 1, -1.0, 0.0, -1.0, 0.0)]
     table = _of_rows(["a.ty"], rows, 2)
     gui = fitting.fit(table, [[0.5, 0.3]], [[0.0]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's search, transfer and writing of edits, tested without Blender."""
+"""Tests the add-on's search, transfer and writing of edits without Blender."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ class TestKeyEdits:
         assert list(np.flatnonzero(mask)) == [4]
 
     def test_a_key_that_moved_along_with_its_basis_is_not(self) -> None:
-        """Blender adds the offset of the basis to each key in float32, in any order of sums."""
+        """A key that only follows an edit of its basis counts as unedited, despite rounding.
+
+        Blender adds the basis's offset to each key in float32, in any order of sums.
+        """
         imported = _basis(20000)
         deltas = RANDOM.normal(0, 0.02, imported.shape).astype(np.float32)
         offset = RANDOM.normal(0, 0.3, imported.shape).astype(np.float32)

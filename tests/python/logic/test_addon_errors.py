@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on translates error messages of the package by rows with {names} of values."""
+"""Tests the translation of the package's error messages by rows with {names} of values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ADDON = Path(__file__).resolve().parents[3] / "addon" / "risorius"
 
 
 def language(module: str) -> Any:
-    """A module of the add-on's language, under a name of its own."""
+    """A module of the add-on's folder language, loaded under another name."""
     name = "risorius_addon_errors"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, None, is_package=True)
@@ -86,7 +86,10 @@ def test_english_stays() -> None:
 
 @pytest.mark.parametrize("locale", language("tables").languages())
 def test_each_row_translates_itself(locale: str) -> None:
-    """With its names as values, so that braces which are none of a value are written twice."""
+    """Each {name} is replaced by NAME; the translation must contain all these values.
+
+    So braces that are not of a value must be doubled in a row.
+    """
     for english, translation in language("tables").error_rows(locale).items():
         names = [name for _, name, _, _ in string.Formatter().parse(translation) if name]
         values = {name: name.upper() for name in names}

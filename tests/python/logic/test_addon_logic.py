@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic, tested without Blender: names, regions, spaces, plans."""
+"""Tests the add-on's logic without Blender: names, regions, spaces, plans."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOGIC = Path(__file__).resolve().parents[3] / "addon" / "risorius" / "logic"
 
 
 def _load_logic() -> ModuleType:
-    """Load the package under another name, so that addon/ need not be on sys.path."""
+    """Load the logic as package risorius_addon_logic, so that addon/ need not be on sys.path."""
     name = "risorius_addon_logic"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(
@@ -345,7 +345,8 @@ class TestSpace:
     def test_rotation_carries_points_as_in_the_file(
         self, sequence: str, signs: tuple[int, int, int], axes: tuple[str, str, str]
     ) -> None:
-        # Rotating in the file and converting equals converting and rotating in Blender.
+        # A rotation in the file and then conversion to Blender equals conversion and then rotation
+        # in Blender.
         made = _space(rotation_sequence=sequence, rotation_signs=signs, coordinate_system=axes)
         angles = np.array([[20.0, -70.0, 130.0]])
         point = np.array([1.0, 2.0, 3.0])
@@ -409,7 +410,7 @@ class TestSpace:
 
 
 def _matrix(q: Any) -> Any:
-    """The matrix that rotates v like the quaternion w x y z: q v q*."""
+    """The rotation matrix of a quaternion w x y z."""
     w, v = float(q[0]), np.asarray(q[1:], np.float64)
     cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return np.eye(3) + 2 * w * cross + 2 * cross @ cross
@@ -534,7 +535,7 @@ def test_sliders_of_a_rotation_reach_below_0_and_rest_at_no_turn():
     assert all((c.rest, c.lowest) == (0.0, 0.0) for c in plans.plan_controls(raw_names))
 
 
-# Output of pip 23.2 for a self-signed certificate.
+# Output of pip 23.2 if the package index has a self-signed certificate.
 _CERTIFICATE = """\
 Looking in indexes: https://127.0.0.1:8443/simple
 WARNING: Retrying (Retry(total=0, connect=None, read=None, redirect=None, status=None)) after \
@@ -572,7 +573,7 @@ def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
 
 
 def _along(keys: Any, frames: Any) -> Any:
-    """Values of a curve at frames, with handles at a third of the distance between keys."""
+    """Values of a Bezier curve at frames; its handles are at a third of the keys' distance."""
     place = np.clip(np.searchsorted(keys.co[:, 0], frames, "right") - 1, 0, len(keys.co) - 2)
     first, after = keys.co[place], keys.co[place + 1]
     t = (frames - first[:, 0]) / (after[:, 0] - first[:, 0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic of materials: textures by name, effects of animated maps, folds of a face."""
+"""Tests the logic of materials: textures by name, effects of animated maps, folds of a face."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ class TestMaps:
 
 
 class TestFolds:
-    """A head of 18 by 20 by 25 cm, with eyes 6 cm apart and the mouth 7 cm below the eyes."""
+    """A head of 18 x 20 x 25 cm, with eyes 6 cm apart and the mouth 7 cm below the eyes."""
 
     eyes = (np.array([0.03, -0.06, 1.6]), np.array([-0.03, -0.06, 1.6]))
     head = np.array([[-0.09, -0.10, 1.47], [0.09, 0.10, 1.72]])

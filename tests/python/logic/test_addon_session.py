@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's session registry: events, and the entries that each event empties."""
+"""Tests the add-on's session registry: events, and the entries that each event removes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ADDON = Path(__file__).resolve().parents[3] / "addon" / "risorius"
 
 @pytest.fixture
 def session():
-    """A new session module with an empty registry."""
+    """A newly loaded session module with an empty registry."""
     spec = importlib.util.spec_from_file_location(
         "session", ADDON / "scene" / "base" / "session.py"
     )

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The studio: the picture contains head and shoulders.
-
-The lights follow portrait photography.
-"""
+"""The studio's camera shows head and shoulders, and its lights follow portrait photography."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ GIRL = (0.056, (-0.1, -0.09, -0.2), (0.1, 0.14, 0.13))  # a child whose mesh end
 
 
 def edges(plan):
-    """Heights of the picture's lower and upper edge relative to the eyes, at the eyes' distance."""
+    """Lower and upper edge of the picture, as heights above the eyes at the eyes' distance."""
     x, y, z = plan.camera
     away, whole = math.hypot(x, y), math.dist(plan.camera[:2], plan.target[:2])
     middle = z + (plan.target[2] - z) * away / whole

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The translation tables contain every text that the add-on shows, and no other text."""
+"""Checks that translation tables contain every text that the add-on shows, and no other text."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CLASSES = (
     "FileHandler",
     "PropertyGroup",
 )
-# function that translates a text -> index of the argument with the text
+# function that translates a text -> index of its argument that is the text
 SENTENCES = {"say": 0, "told": 0, "mark": 0, "write": 1, "prop_or": 4}
 SHOWN = {"report": 1, "poll_message_set": 0}  # Blender shows these texts unchanged
 
@@ -40,7 +40,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 class Reader(ast.NodeVisitor):
-    """Collects the texts in a source file, and code whose texts cannot be translated."""
+    """Collects the texts in a source file, and places of texts that cannot be translated."""
 
     def __init__(self, path: Path, only: Sequence[str] = ()) -> None:
         self.path, self.only = path, only
@@ -53,7 +53,7 @@ class Reader(ast.NodeVisitor):
         self.visit(self.tree)
 
     def note(self, node: ast.AST) -> None:
-        """Record the values of names from assignments, and from loops over literal rows."""
+        """Record expressions that a name may have, from assignments and loops over literal rows."""
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 if isinstance(target, ast.Name):
@@ -67,7 +67,7 @@ class Reader(ast.NodeVisitor):
                             self.values.setdefault(target.id, []).append(value)
 
     def add(self, node: ast.expr | None, context: str, only_plain: bool = True) -> None:
-        """Add all texts that an expression can have."""
+        """Add all texts that an expression can have to `found`."""
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if any(letter.isalpha() for letter in node.value):
                 self.found[context, node.value] = f"{self.path.name}:{node.lineno}"
@@ -82,7 +82,7 @@ class Reader(ast.NodeVisitor):
             self.hidden.append(f"{self.path.name}:{node.lineno}")
 
     def add_items(self, rows: Sequence[ast.expr]) -> None:
-        """The names and descriptions of an enumeration, whatever the case of its identifiers."""
+        """Add names and descriptions of an enum's items, whatever the case of their identifiers."""
         for row in rows:
             if isinstance(row, ast.Tuple) and len(row.elts) == 3:
                 self.add(row.elts[1], "Risorius")
@@ -157,7 +157,7 @@ def sources() -> Iterator[Path]:
 
 
 def sources_of_sentences() -> Iterator[Path]:
-    """Files with sentences that other files show."""
+    """Files in which the add-on calls told(): other files show these sentences."""
     yield ADDON / "native.py"
     for folder in ("scene", "logic"):
         for path in sorted((ADDON / folder).rglob("*.py")):
@@ -166,7 +166,7 @@ def sources_of_sentences() -> Iterator[Path]:
 
 
 def titles_of_the_package() -> Found:
-    """Titles and labels in the package's files that the add-on shows."""
+    """Titles and labels in data files of the package that the add-on shows."""
     found: Found = {}
     table = tomllib.loads((PACKAGE / "controls" / "regions.toml").read_text(encoding="utf-8"))
     found |= {("Risorius", row["title"]): "regions.toml" for row in table.values()}
@@ -233,7 +233,7 @@ def test_there_is_a_second_language() -> None:
 
 
 def _tables() -> Any:
-    """The add-on's reader of translation tables, loaded under another name."""
+    """The add-on's module that reads translation tables, imported in a package of another name."""
     name = "risorius_addon_language"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, None, is_package=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The primary board, tested without Blender: controls and places of its handles, and poses."""
+"""Tests the primary board without Blender: controls and places of its handles, and poses."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ primary: Any = importlib.import_module("risorius_addon_logic.character.primary_t
 drawing: Any = importlib.import_module("risorius_addon_logic.character.primary_layout")
 view_fit: Any = importlib.import_module("risorius_addon_logic.character.view_fit")
 
-# A 3D view in a window of 1366 x 768 pixels as Blender opens it (width, height); its part that
-# toolbar, sidebar and headers leave free (left, bottom, right, top; measured in 4.3.2 and 5.2.2);
-# its lens in mm.
+# Size of a 3D view in a window of 1366 x 768 pixels as Blender opens it (width, height); the part
+# of it that no toolbar, sidebar or header covers (left, bottom, right, top; measured in 4.3.2 and
+# 5.2.2); its lens in mm.
 VIEW, FREE, LENS = (1119, 663), (58, 0, 827, 609), 50.0
 HEAD = (-10.1, -17.1, 142.9), (10.1, 4.8, 173.5)  # corners of the sample man's head, in cm
 
 
 @pytest.fixture(scope="module")
 def labels() -> list[str]:
-    """Names of the sample's raw controls."""
+    """Names of the sample man's raw controls."""
     table = sample_controls.gui_table()
     return list(dict.fromkeys(name for _gui, ways in table for name, _numbers in ways))
 
@@ -91,7 +91,7 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
 
 
 def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
-    """One end of a brow is lowered while the other end is raised."""
+    """A fit finds both handles again if one end of a brow is raised and the other end lowered."""
     names = [f"face_L_brow_{end}.ty" for end in ("inner", "outer")]
     inner, outer = (table.names.index(name) for name in names)
     for up, down in ((inner, outer), (outer, inner)):
@@ -173,10 +173,10 @@ def test_a_handle_travels_40_pixels_in_a_small_window_beside_the_whole_head(
 
 
 def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None:
-    """Compares expressions with the handles that a click on them sets, on a face 240 mm high.
+    """Compares expressions with the poses of the handles that a click on an expression sets.
 
-    The error of a mesh, tongue and teeth included, is the root mean square over the vertices that
-    the expression moves by 0.1 mm or more.
+    The face is 240 mm high. The error of a mesh, tongue and teeth included, is the root mean square
+    over the vertices that the expression moves by 0.1 mm or more.
     """
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
@@ -191,7 +191,10 @@ def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None
 
 @dataclass
 class Near:
-    """Distance of an expression from rest and from the board's pose in mm; used handles."""
+    """An expression's distances in mm from rest (`way`) and from the board's nearest pose (`off`).
+
+    `handles` is the number of handles that the board's pose uses.
+    """
 
     way: float = 0.0
     off: float = 0.0
@@ -199,7 +202,7 @@ class Near:
 
 
 def primary_errors(dna: Any) -> dict[str, Near]:
-    """The error of the primary board for each expression, on the mesh with the largest error."""
+    """Expression -> its largest distances over all meshes, and the number of its handles."""
     surface = risorius.Surface(dna, risorius.Rig(dna), lod=1)
     table = primary.table_of(list(dna.raw_control_names))
     named = expressions.load()
@@ -226,7 +229,7 @@ def primary_errors(dna: Any) -> dict[str, Near]:
 
 
 def _at(surface: Any, raw: np.ndarray, mesh: int) -> np.ndarray:
-    """Vertices of a mesh in mm."""
+    """Vertices of a mesh in mm, for values of the raw controls."""
     places = surface.positions(raw.astype(np.float32), mesh)
     return np.asarray(places, np.float64) * surface.mm
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces mixed by region, compared with a calculation in this test."""
+"""Tests faces mixed by region, compared with a calculation in this test."""
 
 import copy
 import importlib.util
@@ -29,7 +29,7 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=4), lods=LodOptions(count=3))
 
 
 def stretched(dna, factors, lift):
-    """A copy of a face with blend shapes, scaled and raised, with eyes of another size."""
+    """A copy of a face with blend shapes, scaled by `factors` and then raised by `lift`."""
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -49,7 +49,10 @@ def stretched(dna, factors, lift):
 
 @pytest.fixture(scope="module")
 def faces(tmp_path_factory):
-    """Three faces of joints with equal topology; the second is narrow, the third is higher."""
+    """Three joint faces with equal topology.
+
+    The second is narrow; the third is 1.2 times as large and 30 units higher.
+    """
     folder = tmp_path_factory.mktemp("mixing")
     face_shapes.write_all(folder)
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
@@ -64,7 +67,7 @@ def faces(tmp_path_factory):
 
 
 def dense_joints(dna):
-    """The joint matrix as a dense array, float64[rows, columns]."""
+    """Values of all joint groups as one matrix, float64[rows, columns]."""
     out = np.zeros((9 * len(dna.joint_names), len(dna.raw_control_names) + dna.psd_count))
     for group in dna.joint_groups:
         out[np.ix_(group.output_indices, group.input_indices)] += group.values
@@ -84,7 +87,7 @@ def test_one_share_is_that_parent_bit_for_bit(faces, shares, at):
 
 
 def test_halves_are_the_mean_of_all_numbers(faces):
-    """With equal shares, every number is the mean of the parents' numbers."""
+    """If both shares are equal, each number of the mix is the mean of the parents' numbers."""
     one, narrow, _ = faces
     mixed = mix_faces([one, narrow], Mix([0.5, 0.5]))
     assert mixed.validate() == []
@@ -106,9 +109,9 @@ def test_halves_are_the_mean_of_all_numbers(faces):
 
 
 def test_a_mix_moves_half_way_between_its_parents(faces):
-    """In an independent reader, an expression of the mix is the mean of its parents'.
+    """An expression of the mix is the mean of its parents' expressions, within 0.3 mm.
 
-    The largest error is 0.3 mm.
+    The vertices are computed without the package.
     """
     one, narrow, _ = faces
     mixed = mix_faces([one, narrow], Mix([0.5, 0.5]))
@@ -162,12 +165,13 @@ def test_a_region_takes_the_other_ones_form_to_its_own_place(faces):
     mouth = masks[:, REGIONS.index("mouth")]
     before, after = (np.asarray(d.meshes[0].positions, np.float64) for d in (one, mixed))
     np.testing.assert_allclose(after[mouth < 1e-9], before[mouth < 1e-9], atol=1e-6)
-    # The other face is 30 units higher and a fifth larger, otherwise equal, so no difference
-    # remains.
+    # The other face is 30 units higher and a fifth larger, otherwise equal, so that its mouth at
+    # the size of the first face differs in nothing.
     np.testing.assert_allclose(after, before, atol=1e-4)
     other = copy.deepcopy(high)
     mesh = other.meshes[0]
-    # One half of its mouth is moved forward; the mix contains this in its own size.
+    # One half of the other face's mouth is moved forward. The mix contains this movement at the
+    # size of the first face.
     left = before[:, 0] > 0
     mesh.positions = np.asarray(mesh.positions) + np.outer(0.6 * (left & (mouth > 0.5)), [0, 0, 1])
     other.meshes = [mesh, *other.meshes[1:]]
@@ -279,7 +283,7 @@ def test_what_does_not_go_together_is_said(faces, change, why):
 
 @pytest.fixture
 def files(faces, tmp_path):
-    """Files of the faces, each with a skin texture of one colour and a wrinkle mask."""
+    """A folder with the faces' files, each with a one-coloured skin texture and a wrinkle mask."""
     for number, dna in enumerate(faces):
         own = copy.copy(dna)
         own.metadata = {f"texture:{dna.mesh_names[0]}:color": "skin.png"}
@@ -435,7 +439,10 @@ def test_pictures_are_read_back_or_refused():
 
 
 def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
-    """The man and the most different person, with blend shapes, mixed wholly and by region."""
+    """Mixes of the man and the girl, the most different person, as a whole and by region.
+
+    Their eyes are as round as the parents' eyes, and no polygon is flipped against both parents.
+    """
     both = [sample_people.assembled(name)[0] for name in ("man", "girl")]
     masks = Masks(both[0])
     mixes = [Mix([1.0, 1.0])]
@@ -449,13 +456,14 @@ def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
             assert off[0] <= 1.05 * max(off[1:])
         head = list(dna.mesh_names).index("head_lod0_mesh")
         own, *parents = (_normals(d.meshes[head]) for d in (dna, *both))
-        # Deep in nostrils and lips, faces of the two parents themselves have opposite normals.
+        # Normals are compared with both parents, whose normals are opposite deep in nostrils and
+        # lips.
         flipped = np.all([(own * p).sum(axis=1) < 0 for p in parents], axis=0)
         assert flipped.sum() == 0, mix.regions
 
 
 def _roundness(mesh):
-    """Deviation of an eye's vertices from the best fitting ball, relative to its radius."""
+    """Standard deviation of the radii of an eye's vertices, relative to their mean radius."""
     points = np.asarray(mesh.positions, np.float64)
     rows = np.column_stack([2 * points, np.ones(len(points))])
     solved, *_ = np.linalg.lstsq(rows, (points**2).sum(axis=1), rcond=None)

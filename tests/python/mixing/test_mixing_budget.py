@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Mixing, solving and authoring use memory in proportion to their files.
+"""Tests that mixing, solving and authoring use memory in proportion to their files.
 
-Large counts in a file do not lead to dense tables.
+Large counts in a file must not lead to dense tables.
 """
 
 import copy
@@ -29,7 +29,7 @@ BASE, BYTES_PER_BYTE = (
 
 
 def peak_of(work):
-    """Run work(). Returns its result and the peak of memory in bytes."""
+    """Run work(). Returns its result and the largest memory in use, in bytes."""
     tracemalloc.start()
     try:
         return work(), tracemalloc.get_traced_memory()[1]
@@ -91,7 +91,10 @@ def _other_skin(dna):
 
 
 def _groups_that_share_a_joint(dna):
-    """Replace the groups by a tall narrow and a low wide one that must be joined."""
+    """Replace the joint groups by two whose union has many empty cells.
+
+    One has all rows but the first and one column, the other one row and all columns.
+    """
     rows, columns = np.arange(9 * len(dna.joint_names)), np.arange(len(dna.raw_control_names))
     dna.joint_groups = [group(rows[1:], columns[:1]), group(rows[:1], columns)]
 
@@ -121,7 +124,10 @@ def test_mixing_holds_no_more_than_some_times_the_faces(sizes, change):
 
 
 def test_groups_of_others_rows_are_joined_row_by_row():
-    """The result equals the union of all groups without its empty cells."""
+    """Groups of two faces with different rows become groups in which each row occurs once.
+
+    Their values are the weighted sums of the faces' values.
+    """
     face = large_face(joints=40, controls=60)
     other = copy.copy(face)
     _groups_that_share_a_joint(other)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixing faces with all layers: equal data stay byte for byte, a difference gives one sentence."""
+"""Tests mixing of faces with all layers: equal data stay equal, a difference gives a sentence."""
 
 import copy
 
@@ -16,7 +16,7 @@ LAYERED = ["mlquat", "rbf", "tiny_v28", "twistswing"]
 
 
 def moved(dna):
-    """The face 1 unit higher: its meshes, and the root joint."""
+    """The face 1 unit higher: vertices of its meshes, and its root joint."""
     out = copy.copy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -41,7 +41,7 @@ def test_every_face_mixes_with_a_moved_copy_and_keeps_what_they_share(name):
     for m, mesh in enumerate(mixed.meshes):
         before = np.asarray(face.meshes[m].positions)
         np.testing.assert_allclose(mesh.positions, before + np.float32([0, 0.5, 0]), atol=1e-5)
-    # Except for the moved values, the file equals the face in all layers.
+    # Without the vertices and joint translations, the mix equals the face byte for byte.
     meshes = []
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):
         mesh.positions = own.positions
@@ -167,7 +167,7 @@ def test_faces_without_some_layers_mix_with_their_like_alone(layers, tmp_path, c
 
 
 def test_a_region_of_teeth_alone_has_a_size():
-    """The skin does not move, so all of it counts as skull."""
+    """A region without vertices of the skin can be mixed, although no skin shows its size."""
     face = risorius.load(GOLDEN / "ml.dna", layers="geometry")
     mixed = mix_faces([face, moved(face)], Mix([0.5, 0.5], {"mouth": {1: 1}}))
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):

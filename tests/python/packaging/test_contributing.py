@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Git hooks and CI workflows run the same checks as the tests, and their scripts exist."""
+"""Checks that git hooks, CI workflows and tests run the same checks, and that scripts exist."""
 
 import importlib.util
 import os
@@ -41,7 +41,7 @@ def test_the_hooks_are_the_checks_of_the_style_script():
 def test_the_whole_test_command_runs_each_check():
     text = (PROJECT / "packaging" / "test.sh").read_text(encoding="utf-8")
     named = " ".join(re.findall(r"for name in ([\w -]+); do\n +check \"\$name\" .*style", text))
-    # The checks of layers are Python tests.
+    # The check of layers is missing in this loop, because it consists of Python tests.
     assert [*named.split(), "layers"] == _checks()
 
 

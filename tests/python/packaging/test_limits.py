@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time limits of tests count CPU seconds and progress, not the clock (check/limits.py)."""
+"""Tests time limits of tests: they count CPU seconds and progress, not the clock."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ subprocess.run([sys.executable, "-c", {SPIN!r}], start_new_session=True)
 
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
-    """Make the limits check often enough for a short test."""
+    """Let `limits` look at programs every 0.05 s, so that tests are short."""
     monkeypatch.setattr(limits, "LOOK", 0.05)
 
 
@@ -29,7 +29,7 @@ def _python(code):
 
 
 def _left(mark):
-    """Command lines of running processes that contain the mark."""
+    """Command lines of running processes that contain `mark`."""
     done = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True)
     return [line for line in done.stdout.splitlines() if mark in line]
 
@@ -67,5 +67,5 @@ def test_no_script_limits_a_blender_by_the_clock():
         for path in (PROJECT / "packaging").rglob("*.sh")
         if by_clock.search(path.read_text(encoding="utf-8"))
     }
-    # Wine's processes are no children of the command that starts them.
+    # wine.sh may use the clock, because Wine's processes are no children of its command.
     assert found == {"wine.sh"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Results of packaging scripts: names of wheels in the zip, the version matrix, progress."""
+"""Tests results of packaging scripts: wheels' names in the zip, version matrix, progress."""
 
 import importlib.util
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parts of release.sh: refusals, notes, a zip for each platform, the repository, checksums."""
+"""Tests parts of release.sh: refusals, notes, zips of platforms, the repository, checksums."""
 
 import hashlib
 import importlib.util
@@ -37,7 +37,7 @@ def make():
 
 @pytest.fixture
 def clone(tmp_path, make):
-    """A small project with a git tag."""
+    """A small project in a git repository whose commit has a tag."""
     for name in make.VERSIONS:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         word = "__version__" if name.endswith(".py") else "version"
@@ -93,7 +93,7 @@ def test_the_changelog_has_the_present_version(make):
 
 @pytest.fixture(scope="module")
 def made(make, tmp_path_factory):
-    """Zips with empty wheels, and their repository, made by Blender's own tool."""
+    """(folder, version, zips, the same zips made again), with empty wheels, and a repository."""
     folder = tmp_path_factory.mktemp("release")
     version = tomllib.loads((PROJECT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     wheels = [
@@ -163,7 +163,7 @@ def test_the_sums_are_those_of_sha256sum(make, made):
 
 
 def test_the_sbom_reads_versions_where_they_are_pinned():
-    # Its library is not installed for the tests.
+    # The text is read, because a library that the script imports is not installed for tests.
     text = (PROJECT / "packaging" / "ship" / "release" / "sbom.py").read_text(encoding="utf-8")
     named = re.findall(r'pinned\("([\w-]+)", "([\w./]+)"\)', text)
     assert len(named) == 3

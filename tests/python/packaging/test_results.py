@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The gate counts every failure of a lane, of a test program or of a report."""
+"""results.py counts every failure of a lane (group of stages), a test program or a report."""
 
 import subprocess
 import sys
@@ -105,7 +105,7 @@ def test_a_lane_that_wrote_nothing_at_all_is_a_failure(tmp_path):
 def _lane(tmp_path, commands):
     """Run commands as a lane, with the shell functions that test.sh uses, and print the results.
 
-    Returns: the finished process. Its exit code is that of `results table`, which prints them.
+    Returns: the finished process; its exit code is the exit code of `results table`.
     """
     script = f"""
       set -uo pipefail; source {PACKAGING}/setup.sh; logs={tmp_path}; mkdir -p {tmp_path}/rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The documentation's site: pages, their places and links; packaging/ship/site.sh builds it."""
+"""Tests the documentation's site, which packaging/ship/site.sh builds: pages and links."""
 
 import importlib.util
 import sys
@@ -28,7 +28,7 @@ def test_every_page_of_the_navigation_and_all_that_it_links_to_is_there(tmp_path
     gather.copy_pages(tmp_path, names)
     for name in names:
         text = (tmp_path / name).read_text(encoding="utf-8")
-        # A menu's > at the start of a line would become a quotation in Markdown.
+        # A > between menu names must not begin a line, because Markdown would make it a quotation.
         assert not [line for line in text.splitlines() if line.startswith("> ")], name
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The sample people are a separate wheel.
+"""Tests that the wheel of sample people is separate.
 
-The package finds it, or asks for it in a sentence.
+The package finds this wheel, or asks for it in a sentence.
 """
 
 import tomllib
@@ -39,7 +39,7 @@ def test_without_the_wheel_the_command_asks_for_it(tmp_path, monkeypatch, capsys
     assert said.startswith("risorius: the wheel risorius-people is not installed")
     assert f"risorius-people {risorius.__version__}" in said
     assert not face.exists()
-    # Other commands do not need the wheel.
+    # Other commands work without the wheel; this one fails because of its argument.
     assert main(["info", str(tmp_path)]) == 1
     assert "people" not in capsys.readouterr().err
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample person: its parts compared with formulas, the whole with its source data."""
+"""Tests of the sample people: parts are compared with formulas, whole people with source data."""
 
 import os
 import sys
@@ -59,7 +59,10 @@ def test_the_mapping_holds_the_52_units_with_weights_up_to_one():
 
 
 def test_catmull_clark_of_a_cube_is_known():
-    """Corner of the unit cube: (F + 2 R + (n - 3) P) / n with n = 3 gives 5 / 9."""
+    """Subdivision moves the corners of a cube from 1 to 5 / 9 along each axis.
+
+    This follows from the formula of Catmull and Clark, (F + 2 R + (n - 3) P) / n with n = 3.
+    """
     finer, operator = polygons.subdivide(CUBE)
     p = operator.apply(CORNERS)
     assert (len(p), len(finer.faces)) == (26, 24)
@@ -121,7 +124,7 @@ def test_a_texture_shrinks_to_the_means_of_its_blocks(shape):
 
 
 class _Nobody:
-    """A body for tests that paint no texture."""
+    """A replacement for a Body, in tests that paint no texture."""
 
     positions, units = np.zeros((0, 3)), {}
 
@@ -137,9 +140,9 @@ class _Nobody:
 
 @pytest.fixture(scope="module", params=["girl", "man"])
 def sample(request):
-    """A real person: (source, dna, parts, shaped positions, person, body).
+    """A sample person: (source, dna, parts, shaped positions, person, body).
 
-    The persons are the one for whom the data are made, and the one that differs most.
+    The people are the man, for whom the source data are made, and the girl, who differs most.
     """
     data, person = sample_people.data(), people.PEOPLE[request.param]
     dna, parts, body = sample_people.assembled(request.param)
@@ -148,7 +151,7 @@ def sample(request):
 
 @pytest.fixture(scope="module")
 def packed():
-    """The sample face in the extension."""
+    """The sample face that is packed into the built Blender extension."""
     path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
         _not_run.add("the extension's sample face")
@@ -157,7 +160,7 @@ def packed():
 
 
 def skinned(dna, rig, raw, mesh_index, lod):
-    """Vertices of a mesh by linear blend skinning in float64, independent of the package."""
+    """Vertices of a mesh by linear blend skinning in float64, computed without the package."""
     pose = rig.evaluate(raw, lod=lod)
     mesh = dna.meshes[mesh_index]
     p = np.asarray(mesh.positions, float).copy()
@@ -173,7 +176,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
 
 
 def _moves(dna, joints):
-    """Matrices from rest to posed joints, float64[J, 4, 4]."""
+    """Matrices that move vertices from rest to posed joints, float64[J, 4, 4]."""
     rest = np.asarray(dna.neutral_joint_translations, float)
     (cx, cy, cz), (sx, sy, sz) = (f(np.radians(joints[:, 3:6])).T for f in (np.cos, np.sin))
     zero, one = np.zeros(len(rest)), np.ones(len(rest))
@@ -197,9 +200,9 @@ def _moves(dna, joints):
 
 
 def _rows():
-    """The rows of arkit.toml.
+    """Controls of each ARKit unit by arkit.toml: unit -> {control: value}.
 
-    To a control that is a share of another control, the other control is added with 1.
+    If a control is a share of another control, the other control is added with the value 1.
     """
     whole = shares()
     return {
@@ -209,9 +212,10 @@ def _rows():
 
 
 def _wanted(data, body, unit, row):
-    """The wanted displacement of an ARKit unit, float64[V, 3].
+    """The displacement that an ARKit unit should give, float64[V, 3], in the data's unit.
 
-    Shares of the jaw are measured with an open jaw; lids and eyes have tests of their own.
+    A unit that is a share of the open jaw is taken together with the open jaw. For eyes and lids,
+    which have other tests, it is the displacement of the person's own controls.
     """
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
@@ -231,7 +235,7 @@ def _wanted(data, body, unit, row):
 
 @pytest.mark.parametrize("lod", [0, 1])
 def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
-    """The error is at most 0.1 % of the head's height for every vertex of every mesh."""
+    """Each vertex deviates by at most 0.1 % of the head's height from the unit in the data."""
     data, dna, parts, positions, _, body = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
@@ -264,9 +268,10 @@ def _heads(dna, poses):
 
 
 def lips_apart(dna, *poses):
-    """For each pose, how far places of the lips that touch at rest move apart, in mm.
+    """How far lips open in each pose, at places of the lips that touch at rest, in mm.
 
-    Returns the least and the largest distance, and the largest sliding along each other.
+    Returns for each pose the least and the largest vertical distance, and the largest horizontal
+    one.
     """
     purse = {f"mouthLipsPurse{lip}{side}": 1 for lip in "UD" for side in "LR"}
     rest, jaw, purse, *posed = _heads(dna, [{}, {"jawOpen": 1}, purse, *poses])
@@ -287,7 +292,7 @@ def lips_apart(dna, *poses):
 
 
 def _takes(*values):
-    """Controls without prefix for captured values of jawOpen and mouthClose."""
+    """For each (jawOpen, mouthClose) of a capture, the rig's controls without prefix."""
     for jaw, close in values:
         curves = {"jawOpen": ([0.0], [jaw]), "mouthClose": ([0.0], [close])}
         clip, _ = importing.import_curves(curves)
@@ -308,16 +313,19 @@ def _check_lips(dna, most):
 
 
 def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
-    """Within 0.8 mm; a shut jaw moves no lips. The data's own shape moves them by 35 mm."""
+    """Captured lips stay together within 0.8 mm, and do not move if the jaw is shut.
+
+    The unchanged shape of the source data would move them by 35 mm.
+    """
     _check_lips(sample[1], 0.8)
 
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
 def test_extra_the_packed_face_gives_back_its_units(sample, packed):
-    """The extension's man reproduces the units within 0.8 mm.
+    """The extension's man reproduces ARKit units within 0.8 mm.
 
-    Also for lips that meet over an open jaw, where five controls and five correctives rotate the
-    same joints.
+    This includes lips that stay closed while the jaw opens, where five controls and five
+    correctives rotate the same joints.
     """
     data, before, parts, _, _, body = sample
     dna = packed
@@ -337,7 +345,8 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
         wanted = _wanted(data, body, unit, row)
         for part in parts:
             number = dna.mesh_names.index(part.name)
-            # At rest the man's sides differ, unlike his joints', so displacements are compared.
+            # The man's mesh is asymmetric, but his joints are symmetric, so that displacements are
+            # compared.
             rest = np.asarray(dna.meshes[number].positions, float)
             goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0
@@ -353,7 +362,7 @@ def test_extra_the_packed_face_has_what_all_expressions_ask_for(packed):
 
 
 def _carried(dna, mesh_name):
-    """Shares of spine, neck_01, neck_02 and head in each vertex's weights, float64[V, 4]."""
+    """Sums of each vertex's weights on spine, neck_01, neck_02 and head joints, float64[V, 4]."""
     carriers = ["spine_04", "neck_01", "neck_02", "head"]
     mesh = dna.meshes[dna.mesh_names.index(mesh_name)]
     out = np.zeros((len(mesh.positions), len(carriers)))
@@ -370,7 +379,8 @@ def _carried(dna, mesh_name):
 def test_extra_the_packed_face_turns_its_neck_as_before(sample, packed):
     apart = [_carried(dna, "head_lod0_mesh") for dna in (sample[1], packed)]
     deviation = np.abs(apart[0] - apart[1]).sum(axis=1) / 2
-    # With rotations of 16 and 18 degrees, the largest error is below 2.2 mm, the mean 0.02 mm.
+    # If neck and head rotate by 16 and 18 degrees, these limits mean errors of 2.2 mm and, on
+    # average, 0.02 mm.
     assert deviation.max() < 0.18
     assert deviation.mean() < 0.003
 
@@ -419,7 +429,10 @@ def test_extra_each_cheek_flushes_on_its_side(sample):
 
 
 def test_people_are_shares_of_the_data():
-    """The formula of the data's own program: age, muscle and weight are interpolated linearly."""
+    """A person's shape interpolates the data linearly by age, muscle and weight.
+
+    The program for which the data are made uses the same formula.
+    """
     girl = people.PEOPLE["girl"].shape()
     for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # her weight is 0.4
         for age, years in (("child", 0.7), ("baby", 0.3)):
@@ -493,7 +506,7 @@ def test_an_unknown_person_is_one_sentence(tmp_path, capsys):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The arguments with which the command calls build_sample."""
+    """A list to which the options of each call of build_sample are added; nothing is built."""
     calls = []
 
     def build_sample(path, **options):
@@ -542,7 +555,7 @@ def test_a_spec_that_makes_no_sense_is_one_sentence(tmp_path, asked, capsys, tex
 
 
 def test_the_joints_that_come_along_are_those_of_the_rig():
-    """Checks the stored joint reference that every person uses: joints, LODs and weights."""
+    """Checks the stored joint reference that all sample people use: joints, LODs and weights."""
     like = references.shipped()
     assert len(like.names) == build.RIG.fit.joints
     assert len(like.levels) == build.RIG.lods.count
@@ -564,7 +577,7 @@ def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
 
 
 def test_a_displacement_is_carried_by_the_change_of_form():
-    """On a stretched and sheared sheet, a motion along an edge stays along this edge."""
+    """On a stretched and sheared sheet, a carried motion along an edge remains along this edge."""
     side = 12
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)
@@ -606,7 +619,7 @@ def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
         source.Source(other)
 
 
-# A fake pip that writes a part of a file, waits for the test, and fails.
+# A fake pip that writes a part of a file, waits for a file from the test, and fails.
 PART = """
 import os, sys, tempfile, time
 path = os.path.join(tempfile.mkdtemp(), "part.whl")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample's eyes: their form compared with formulas, and lids that stay on the eyes."""
+"""Tests the eyes of sample people: their form by formulas, and lids that touch the eyes."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ LIMBUS = 5.85  # mm from the axis of the gaze, where a cornea with a radius of 7
 
 
 def _height(points, middle, radius, gaze):
-    """Heights of points above the eyeball and the sphere of the cornea, in the points' unit."""
+    """Heights of points above the eyeball and its cornea, in the points' unit; negative: inside."""
     scale = radius * eyeball.IRIS / LIMBUS
     ahead = np.sqrt(radius**2 - (LIMBUS * scale) ** 2) - np.sqrt(7.8**2 - LIMBUS**2) * scale
     arm = points - middle
@@ -25,7 +25,7 @@ def _height(points, middle, radius, gaze):
 
 
 def test_the_eye_has_the_measures_of_real_ones():
-    """In millimetres, scaled to the size of a human iris."""
+    """Cornea, iris and pupil have human sizes in mm if the iris is scaled to a human iris."""
     size = LIMBUS / eyeball.IRIS
     assert 12 <= size <= 15.5  # people's eyeballs have a radius of 12 mm, the data's up to 16
     top = size * float(eyeball.surface(np.zeros(1))[0])
@@ -72,10 +72,10 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
     rim, white = (light[np.abs(away - x) < 0.03].mean() for x in (1.0, 1.35))
     assert rim < 0.3 * white
     assert 0.55 < white < 0.85  # grey rather than white
-    # There is no step between limbus and sclera: a millimetre is a sixth of the iris.
+    # The brightness has no step between the iris, with radius 1, and the white of the eye.
     profile = [light[np.abs(away - x) < 0.01].mean() for x in np.arange(0.95, 1.25, 0.02)]
     assert np.abs(np.diff(profile)).max() < 0.25 * white
-    # Fibres: neighbours around the pupil differ, and no single frequency dominates.
+    # The iris has fibres: brightness varies around the pupil, and no single frequency dominates.
     around = np.linspace(0, 2 * np.pi, 2048, endpoint=False)
     x, y = (half + 0.72 * reach * f(around) for f in (np.cos, np.sin))
     power = np.abs(np.fft.rfft(light[y.astype(int), x.astype(int)]))[8:400] ** 2
@@ -84,7 +84,7 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
 
 @pytest.fixture(scope="module")
 def faces():
-    """The girl, and the man from whom all people are made."""
+    """Bodies of the girl and of the man from whom all people are made; base mesh with eyeballs."""
     girl = sample_people.body("girl")
     return {"girl": girl, "model": girl.man}, with_eyeballs(sample_people.data().base_mesh())
 
@@ -95,7 +95,7 @@ def face(request, faces):
 
 
 def _posed(face, side, **values):
-    """The grid of the lids at LOD 0 and the rotation of the eye, for some control values."""
+    """The lids' vertices at LOD 0 and the eye's rotation matrix, for some control values."""
     eye, letter = face.eyes.lids[side], side.upper()
     controls = {f"{name}{letter}": value for name, value in values.items()}
     grid = eye.grid(face.positions).copy()
@@ -118,7 +118,7 @@ LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLo
 
 
 def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
-    """The skin around the rim when several controls raise it at the same time."""
+    """Skin around the lids stays 0.4 mm outside the eye if several controls raise it together."""
     for side, eye in face.eyes.lids.items():
         for pose in (
             {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},
@@ -132,7 +132,7 @@ def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
 
 
 def test_extra_no_eye_goes_through_its_lids(face):
-    """For each gaze with open, half closed and closed lids, penetration is at most 0.5 mm."""
+    """For each gaze and each closure of the lids, an eye penetrates the lids by at most 0.5 mm."""
     for side, eye in face.eyes.lids.items():
         gaze = eyeball.gaze(side)[:, 2]
         for look in LOOKS:
@@ -145,7 +145,7 @@ def test_extra_no_eye_goes_through_its_lids(face):
 
 
 def test_extra_lids_touch_their_eyes(face):
-    """Lids leave no gap: their rim bends inwards until it is inside the ball."""
+    """Lids leave no gap, because their rims bend inwards and end inside the eyeball."""
     for side, eye in face.eyes.lids.items():
         gaze = eyeball.gaze(side)[:, 2]
         for look in LOOKS[:5]:

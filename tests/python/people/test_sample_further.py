@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample's controls that ARKit lacks, with the real data if available."""
+"""Tests the controls of sample people that ARKit lacks; with the real data if available."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def man():
 
 @pytest.fixture(scope="module")
 def motions(man):
-    """Names of controls, and the motion of a face's vertices, float64[controls, V, 3]."""
+    """Names of controls, and the motion of the vertices by each, float64[controls, V, 3]."""
     kept = [v for name, v in man.groups.items() if name == "body" or "teeth" in name]
     kept += [v for name, v in man.groups.items() if "tongue" in name or "eye" in name]
     some = np.unique(np.concatenate(kept))
@@ -41,17 +41,17 @@ def test_extra_all_but_one_of_the_standard_controls_are_there(motions):
 
 
 def test_extra_each_control_moves_something_that_no_other_does(motions):
-    """Each control moves at least 0.5 mm, in a direction of its own.
+    """Each control moves a vertex by at least 0.5 mm, and no two controls give the same motion.
 
-    The cosine with the motion of any other control is at most 0.95. Controls that close the lips
-    are tested with the jaw open.
+    The cosine between the motions of two controls is at most 0.95. Controls that close the lips are
+    tested with the jaw open.
     """
     names, moved = motions
     assert (np.linalg.norm(moved, axis=2).max(axis=1) >= 0.5 * MM).all()
     flat = moved.reshape(len(names), -1)
     flat = flat / np.linalg.norm(flat, axis=1, keepdims=True)
     alike = np.argwhere(np.triu(flat @ flat.T, 1) > 0.95)
-    # Opening further continues the same motion.
+    # jawOpenExtreme continues the motion of jawOpen, so that this pair is allowed.
     assert [(names[a], names[b]) for a, b in alike] == [("jawOpen", "jawOpenExtreme")]
 
 
@@ -76,7 +76,7 @@ def test_extra_lids_slide_on_the_eye_and_the_tongue_keeps_its_root(man):
     moved = np.linalg.norm(lower, axis=1) > 0.5 * MM
     assert moved.sum() > 30
     along = np.einsum("ij,ij->i", lower, arm)[moved] / np.linalg.norm(arm[moved], axis=1)
-    # Vertices move towards or from the eye's middle only because the cornea bulges;
+    # Lid vertices move towards or away from the eye's centre only where the cornea bulges;
     # test_sample_eyes tests the rest.
     assert np.abs(along).max() < 1.0 * MM
     assert np.median(np.abs(along)) < 0.1 * MM
@@ -103,10 +103,7 @@ def test_extra_what_closes_lips_needs_an_open_jaw(man):
 
 
 def test_extra_no_reaction_lifts_the_lower_lip_over_the_upper_one(man):
-    """At rest the lips are shut.
-
-    So a reaction must not contain controls that close an opened mouth.
-    """
+    """A reaction must not contain controls that close an open mouth, as lips are shut at rest."""
     body = man.groups["body"]
     middle = body[np.abs(man.positions[body, 0]) < 0.02]
     still = np.zeros_like(man.positions)

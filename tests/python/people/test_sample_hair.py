@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hair of the sample people: growth, orientation of hair cards, and contact with the skin."""
+"""Tests hair of sample people: growth, orientation of hair cards, and contact with the skin."""
 
 import zlib
 from dataclasses import replace
@@ -99,7 +99,7 @@ def test_guides_stay_over_the_skin_and_are_as_long_as_asked(ball):
 
 
 def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
-    """On flat skin a root's edge is at most 1.4 mm deep, and a curl moves away from the skin."""
+    """On flat skin, a rotated card is at most 1.4 mm deep in the skin, and a curl is above it."""
     n, rows = 50, 6
     roots = ball.scattered(np.ones(len(ball.positions)), 0.2, np.random.default_rng(3))
     roots = roots.taken(np.arange(n))
@@ -119,7 +119,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
 
 
 def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
-    """If a hair bends back past the skin's normal, left and right of its card must not swap."""
+    """If a hair bends back over its root, left and right of its card must not swap."""
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
     roots = roots.taken(np.arange(1))
     points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
@@ -130,7 +130,7 @@ def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
 
 @pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
 def test_hairs_of_a_card_fade_out_to_its_sides(who):
-    """A card with even hairs, or with hairs cut off at its edge, would look like a rectangle."""
+    """Otherwise a card with even hairs, or hairs cut off at its sides, looks like a rectangle."""
     cover = paint_strands(people.PEOPLE[who])[..., 3]
     curly = who in ("fighter", "woman")
     for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
@@ -148,7 +148,8 @@ def test_no_straight_hair_is_cut_off_by_a_side_of_its_card(who):
     left, low, width, height, count = TILES["scalp"]
     tiles = cover[low : low + height, left : left + count * width].reshape(height, count, width)
     sides = tiles[:, :, [0, 1, -2, -1]]
-    # Bent hairs may touch a side; if inclined hairs crossed it, the share would be 0.056.
+    # The painted share of the sides' texels: bent hairs may touch a side; if inclined hairs crossed
+    # it, the share would be 0.056.
     assert (sides > 0.5).mean() < 0.02
 
 
@@ -165,7 +166,7 @@ def test_an_eased_guide_goes_to_and_fro_no_more_and_keeps_its_ends():
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
-    """Hair of 5 mm rotates with the skin; hair of 20 mm rotates like its first 8 mm."""
+    """Hair of 5 mm rotates with the skin; hair of 20 mm moves like hair of 8 mm."""
     grid = np.array([[x, 0.0, z] for x in range(5) for z in range(5)], float)
     faces = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5] for i, j in np.ndindex(4, 4)]
     head = polygon_mesh(grid, np.tile([0.0, 1.0, 0.0], (25, 1)), faces, grid[:, [0, 2]] / 4, faces)
@@ -183,10 +184,11 @@ def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
 
 @pytest.fixture
 def stage():
-    """A face with one flat mesh, 2 decimetres wide.
+    """A face with one flat mesh, which is 2 decimetres wide.
 
-    Its only control raises the left half by a tenth of a decimetre, with a slope between x = 0.15
-    and 0.2.
+    The control `rise` raises the mesh by 0.1 decimetres from x = 0.2 on, with a slope from x =
+    0.15;
+    the control `idle` moves nothing.
     """
     side = np.arange(41)
     x, z = np.meshgrid(0.05 * side - 1, 0.05 * side - 1, indexing="ij")
@@ -218,7 +220,7 @@ def stage():
 
 
 def _lying(dna, roots_x, way):
-    """Hairs with a length of 0.3 along x, whose ends are 0.03 above the skin."""
+    """Hairs of length 0.3 along x or -x (way 1 or -1), whose ends are 0.03 above the skin."""
     n = len(roots_x)
     at = np.column_stack([roots_x, np.zeros(n), np.full(n, 0.02)])
     roots = nearest_places(dna.meshes[0].positions.astype(float), *corners_of(dna.meshes[0]), at)
@@ -238,14 +240,15 @@ def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, 
     kept = cut_clear(_lying(stage, [-0.055, 0.14], 1), stage, head, 1.0, faces)
     assert len(kept) == 1  # a hair with its root at the slope has no room
     np.testing.assert_array_equal(kept.points[0, 0], toward.points[0, 0])
-    # Shortened once to three quarters, it would end in the slope, at x = 0.17.
+    # The hair is shortened twice to three quarters; after the first time it would end in the slope,
+    # at x = 0.17.
     np.testing.assert_allclose(
         kept.points[0, -1] - kept.points[0, 0], 0.75**2 * np.array([0.3, 0.03, 0]), atol=1e-12
     )
 
 
 def test_a_face_that_no_control_makes_alone_counts(stage):
-    """Two controls of a fifth of the height do no harm alone, but together make a slope."""
+    """Each of two controls raises the skin too little to reach a hair; together they reach it."""
     head = stage.meshes[0]
     target = head.blend_shape_targets[0]
     low = 0.2 * np.asarray(target.deltas)  # 0.02 each; the ends are 0.03 high
@@ -263,7 +266,7 @@ def test_a_face_that_no_control_makes_alone_counts(stage):
     alone = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, [])
     both = [np.ones(2, np.float32)]
     together = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, both)
-    # At x = 0.17 the skin rises by 0.016, and at three quarters of its length the hair is 0.0225
+    # The hair is shortened once: at x = 0.17 the skin rises by 0.016, and there the hair is 0.0225
     # high.
     np.testing.assert_allclose(
         together.points[0, -1] - together.points[0, 0],
@@ -282,7 +285,7 @@ def test_no_edge_of_a_card_lies_deep_in_the_skin(ball, row, most):
         points, np.stack([out, out], axis=1), np.full(len(at), 0.1), np.ones(2),
         np.zeros(len(at), int), roots,
     )  # fmt: skip
-    # The second row is 0.1 above the skin, and one of its edges goes through the skin.
+    # Row 1 is 0.1 above the skin, row 0 on the skin; one edge of the card is moved below the skin.
     strips.sides[:, row] += (0.08, 0.18)[row] * out
     narrow_edges(strips, ball)
     edges = points[:, row] - strips.sides[:, row]
@@ -325,7 +328,7 @@ def test_styles_are_named_or_refused(tmp_path, text, sentence):
 
 @pytest.fixture(scope="module")
 def haired():
-    """Face of blend shapes with hair, its hair and person, for the man and a variant of him."""
+    """(face with hair, hair, person), for the man and a variant of him with other hair styles."""
     man = people.PEOPLE["man"]
     dna, parts, body = sample_people.assembled("man")
     base = sample_people.data().base_mesh()
@@ -339,7 +342,7 @@ def haired():
 
 
 def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
-    """A fringe adds hair on the forehead down to the chosen height, but never at the eyes."""
+    """A fringe adds hair before the forehead, down to the chosen height, not before the eyes."""
     _, parts, body = sample_people.assembled("man")
     base, even = sample_people.data().base_mesh(), body.man.positions
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
@@ -357,7 +360,7 @@ def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
 
 
 def moved(dna, raw, name):
-    """Vertices of a mesh after blend shapes and linear skinning."""
+    """Vertices of a mesh after blend shapes and linear blend skinning."""
     from risorius.author.geometry import skeleton as sk
 
     pose = risorius.Rig(dna).evaluate(raw)
@@ -396,7 +399,7 @@ def test_metadata_say_where_strands_wind(haired):
         assert wound["man"] == {}
         assert own
         assert set(wound["woman"]) == set(wound["fighter"]) == {f"coil:{n}" for n in own}
-        # Shorter hair has smaller coils.
+        # The fighter's hair is shorter than the woman's, so that its coils are smaller.
         for name in wound["woman"]:
             sizes = [float(wound[who][name].split()[0][7:]) for who in ("fighter", "woman")]
             assert 0.3 < sizes[0] <= sizes[1] < 3
@@ -404,7 +407,7 @@ def test_metadata_say_where_strands_wind(haired):
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):
-    """Within 2 mm, for several controls at 1."""
+    """Roots of hair stay within 2 mm of the skin for each of several controls at 1."""
     dna, hair, _ = haired[1]
     names = dna.raw_control_names
     worst = {}
@@ -443,7 +446,7 @@ def test_extra_lashes_have_controls_of_their_own(haired):
 
 
 def test_extra_lashes_turn_with_the_lid(haired):
-    """On a closed eye the upper lashes point downwards, rotated with the lid."""
+    """When an eye closes, its upper lashes rotate with the lid and point downwards."""
     dna, hair, _ = haired[0]
     rows = hair.strips["eyelashes"].rows
     raw = np.zeros(len(dna.raw_control_names), np.float32)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Teeth, lips, shirt, and differences between the sides, with the real data if available."""
+"""Teeth, lips and shirt of the sample people, and differences between the left and right side.
+
+Tests of the real data are skipped if the data are missing.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +35,7 @@ def man():
 
 
 def _pieces(polygons):
-    """The number of connected pieces, which is the same in these meshes' textures."""
+    """The number of connected pieces of a mesh, counted as its UV islands."""
     return len(np.unique(islands(polygons)))
 
 
@@ -49,7 +52,7 @@ def test_extra_there_are_28_single_teeth_as_large_as_those_of_people(base):
 
 
 def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
-    """Parts that the jaw moves keep their form on every person, also small lips."""
+    """Parts that the jaw moves keep their form on every person, even if their lips are small."""
     rng = np.random.default_rng(5)
     before = rng.uniform(-1, 1, (60, 3))
     before[:20] *= 0.2
@@ -63,7 +66,8 @@ def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
     )
     found, shift = rigid.rigid_fit(after, after + way)
     assert found == pytest.approx(turn, abs=1e-3)
-    # For all other vertices the difference is at most the limit of 0.5 mm.
+    # Vertices that the jaw moves by less than 0.5 mm get no jaw motion, so that they may differ by
+    # 0.5 mm.
     assert np.abs(after @ found.T + shift - after - way).max() < 0.006
 
 
@@ -89,13 +93,13 @@ def test_extra_lips_rest_on_each_other(data, base, man):
     assert len(gaps) > 15
     assert gaps.max() < 0.25 * MM
     assert gaps.min() > -0.6 * MM
-    # The lips of the original data are open.
+    # The lips of the unchanged data are open.
     raw = lips.gap_across(mouth, mouth.operator.apply(full.positions))[1]
     assert raw.max() > 0.5 * MM
 
 
 def _tongue_in_lip(dna, poses):
-    """How far the lower lip is above the underside of the tongue in each pose, in mm.
+    """The largest height of the lower lip above the underside of the tongue in each pose, in mm.
 
     Args:
         dna: a sample person.
@@ -128,7 +132,7 @@ def _tongue_in_lip(dna, poses):
 
 
 def test_extra_a_tongue_that_is_put_out_lies_on_the_lip():
-    """A smile raises the lower lip by six millimetres, but it must not come through the tongue."""
+    """A smile raises the lower lip by 6 mm, but the lip must not come through the tongue."""
     dna = sample_people.assembled("man")[0]
     others = ("mouthLipsPress", "mouthLowerLipRollIn", "mouthDown")
     lifts = [{}, {"mouthCornerPull": 0.5}, *({n: 1} for n in (*tongue.LIFTING, *others))]
@@ -149,9 +153,9 @@ def test_extra_a_shirt_has_a_collar_and_one_hem(base):
 
 
 def test_extra_skin_in_the_shirt_rests_in_every_expression(base, man):
-    """Otherwise the skin would come through the collar, for example in a shout.
+    """No control except breath moves skin below the shirt.
 
-    Only the controls of breath move it.
+    Otherwise the skin would come through the collar, for example in a shout.
     """
     skin = man.groups["body"]
     skin = skin[np.abs(base.positions[skin, 0]) < 1]

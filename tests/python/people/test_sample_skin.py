@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin texture of the sample people: layout, rasters, patterns, colours of regions."""
+"""Tests the skin texture of sample people: layout, rasters, patterns, colours of regions."""
 
 import dataclasses
 
@@ -14,7 +14,7 @@ SIDE = 33
 
 
 def grid(x, y, first=0):
-    """Faces of a grid whose vertices are numbered row by row."""
+    """Quads of a grid whose vertices are numbered row by row, beginning with `first`."""
     wide = len(x)
     return [
         [
@@ -30,7 +30,7 @@ def grid(x, y, first=0):
 
 @pytest.fixture(scope="module")
 def islands():
-    """A large UV island and two small ones, placed like the base mesh's islands."""
+    """A mesh with a large UV island and two small ones, placed like the base mesh's islands."""
     at = np.linspace(0, 1, 9)
     faces, places = [], []
     for number, (low, size) in enumerate(
@@ -58,7 +58,8 @@ def test_the_face_gets_the_texture_and_nothing_lies_on_another(islands):
         own = [f for f in islands.faces if label[f[0]] == number]
         count += raster.Raster(Polygons(own, own, out, len(out)), out, 256).covered
     assert count.max() == 1
-    # Upright: the point with the largest u is the lowest, and the centre is wider than the rim.
+    # The face is rotated upright: the point with the largest u is the lowest. Its centre gets more
+    # texels than its rim.
     rows = face.reshape(9, 9, 2)
     assert (np.diff(rows[..., 1], axis=1) < 0).all()
     widths = np.diff(rows[:, 0, 0])
@@ -113,7 +114,7 @@ def test_patterns_begin_again_without_a_seam():
 
 @pytest.fixture(scope="module")
 def mask():
-    """A flat face with the size of a head's front that looks along z, and its texels."""
+    """A flat face as large as the front of a head, which looks along z, and its texels."""
     x, y = np.meshgrid(np.linspace(-0.7, 0.7, SIDE), np.linspace(-1.3, 0.9, SIDE))
     places = np.column_stack([x.ravel(), y.ravel(), np.full(SIDE**2, 0.2)])
     faces = grid(np.zeros(SIDE), np.zeros(SIDE))
@@ -159,7 +160,7 @@ def test_blood_and_pigment_lie_where_faces_have_them(mask, who):
     assert forehead[1] / forehead[2] > 1.02 * cheek[1] / cheek[2]  # more yellow
     under = mean(0.25, -0.21)
     assert under.sum() < 0.97 * mean(0.25, -0.06).sum()
-    # No even patch: the colour varies within a centimetre.
+    # The colour is not even: it varies within a centimetre.
     inside = colour[near(texels, 0.42, -0.36, 0.1)]
     assert (inside[:, 1].std() / inside[:, 1].mean()) > 0.012
     assert red(mean(0, -0.72)) > 1.25 * red(forehead)  # the inside of the mouth
@@ -213,7 +214,7 @@ def test_the_relief_has_what_a_mesh_rounds_off(mask):
     np.testing.assert_allclose(form.form(polygons, flat, face, texels), 0, atol=1e-9)
 
     def groove(x, y):
-        """A groove beside the nose, 3 mm deep."""
+        """Depth of a groove beside the nose, as a fraction of 3 mm."""
         return np.exp(-(((x - 0.3) / 0.06) ** 2)) * (np.abs(y + 0.3) < 0.35)
 
     dug = flat - 0.03 * groove(face.x, face.y)[:, None] * [0, 0, 1]
@@ -225,7 +226,7 @@ def test_the_relief_has_what_a_mesh_rounds_off(mask):
     assert np.abs(found[near(texels, -0.3, -0.3, 0.2)]).max() < 1e-4
     assert form.hollows(found)[near(texels, 0.3, -0.3)].min() > 0.3
     assert form.hollows(found)[near(texels, -0.3, -0.3)].max() < 1e-3
-    # No vertex moves where the lips meet.
+    # Where the lips meet, the relief is flat, even if a groove is there.
     dug = flat - 0.03 * groove(face.x + 0.3, face.y + 0.4)[:, None] * [0, 0, 1]
     meet = form.form(polygons, dug, face, texels)[near(texels, 0, -0.72, 0.02)]
     assert np.abs(meet).max() < 1e-5
@@ -233,7 +234,10 @@ def test_the_relief_has_what_a_mesh_rounds_off(mask):
 
 
 def test_loops_are_counted_from_the_mouths_inside():
-    """Two UV islands: a ring of skin around an opening, and the inside of the mouth."""
+    """Loops of edges around the mouth are numbered from its inside.
+
+    The mesh has two UV islands: a ring of skin around an opening, and the inside of the mouth.
+    """
     turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     rings = np.concatenate(
         [

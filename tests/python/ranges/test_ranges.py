@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Capture ranges of a person's controls: learned, stored, edited and applied to takes."""
+"""Tests capture ranges of a person's controls: learned, stored, edited and applied to takes."""
 
 from __future__ import annotations
 
@@ -30,13 +30,20 @@ BLINKS = [90 + 120 * n for n in range(len(HEIGHTS))]  # frames of the blinks
 
 
 def bump(count, at, width, height):
-    """A movement up and down: cosines over `width` frames beside a flat top of 3 frames."""
+    """A curve that rises over `width` frames, is flat for 3 frames around `at`, and falls again.
+
+    Args:
+        count: number of frames of the curve.
+        at: frame of the middle of the flat top.
+        width: frames of the rise and of the fall, which are half cosines.
+        height: value of the flat top.
+    """
     distance = np.maximum(np.abs(np.arange(count) - at) - 1.0, 0.0)
     return height * np.where(distance < width, 0.5 + 0.5 * np.cos(np.pi * distance / width), 0.0)
 
 
 def performance():
-    """A speaking and blinking man whose phone never reports shut eyes, float[frames, columns]."""
+    """A man who speaks and blinks, whose phone never reports shut eyes, float[frames, columns]."""
     count, random = 1100, np.random.default_rng(5)
     lids = 0.05 + sum(
         bump(count, at, 7, height - 0.05) for at, height in zip(BLINKS, HEIGHTS, strict=True)
@@ -53,7 +60,7 @@ def performance():
 
 
 def range_of_motion():
-    """All extremes one after the other, a spike of one frame, and a trembling brow."""
+    """A take with extremes one after the other, a jaw spike of one frame, and a trembling brow."""
     count, random = 1500, np.random.default_rng(6)
     curves = {
         "EyeBlinkLeft": 0.1 + bump(count, 200, 40, 0.70),
@@ -86,7 +93,7 @@ def written(path, values):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with take.csv, rom.csv, and rom.range.toml that the command learned from rom.csv."""
+    """A folder with take.csv, rom.csv, and rom.range.toml that `clip learn` made of rom.csv."""
     found = tmp_path_factory.mktemp("ranges")
     written(found / "take.csv", performance())
     written(found / "rom.csv", range_of_motion())
@@ -111,7 +118,7 @@ def test_blinks_that_never_closed_the_eyes_reach_lid_contact(folder, capsys):
         lids = after.curve(f"{RIG}eyeBlink{side}")
         tops = np.array([lids[at - 1 : at + 2].max() for at in BLINKS])
         assert before.curve(f"{RIG}eyeBlink{side}").max() < 0.68
-        # Nine of ten full blinks close the lids, and the other full blinks nearly close them.
+        # At least six of the seven full blinks close the lids, and all nearly close them.
         assert (tops == 1.0).sum() >= 6
         assert np.delete(tops, 5).min() > 0.97
         assert tops[5] < 0.7  # the half blink stays half
@@ -152,7 +159,7 @@ def test_the_file_is_for_editing(folder, tmp_path, capsys):
     text = out.read_text()
     assert text == ranges_text(load_ranges(out))
     assert 'source = "rom.csv"' in text
-    # Edited by hand: the pucker is switched on, the jaw off; a name may lack its prefix.
+    # As a user may edit the file: use the pucker, switch the jaw off, and omit a control's prefix.
     text = text.replace(', off = "does not come near its extreme"', "")
     text = text.replace('"CTRL_expressions.jawOpen" = {', "jawOpen = { off = true,")
     out.write_text(text)
@@ -186,7 +193,7 @@ def test_what_is_at_rest_is_not_amplified_and_order_is_kept():
 
 
 def frames(values):
-    """The rows of a take as frames of Live Link Face."""
+    """Frames of Live Link Face with the rows of a take."""
     names = livelink.NAMES
     columns = [camel(name) for name in COLUMNS[:52]]
     places = [columns.index(name) for name in names[:52]]

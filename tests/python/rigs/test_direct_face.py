@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Final vertices from Python: compared with the oracle, rules of writing, and wrong arguments."""
+"""DirectFace computes final vertices like the oracle, writes only changes, refuses bad input."""
 
 import re
 import sys
@@ -14,7 +14,7 @@ TURN = np.array([[0.9238795, 0.0, 0.3826834, 0.0]], np.float32)  # 45 degrees ab
 
 
 class Face:
-    """The oracle's face with its six joints as bones, in another order, and one bone more."""
+    """The oracle's face, its six joints as bones in another order, and an additional root bone."""
 
     ROWS = (3, 0, 6, 1, 5, 4)
     OTHER = 2  # no joint of the file: a root above all others
@@ -65,7 +65,7 @@ def face():
 
 
 def one(direct, raw, out, **options):
-    """A frame of one face: (Pose, meshes that were written)."""
+    """Evaluate a frame of one face. Returns (Pose, indices of the meshes that were written)."""
     return risorius.evaluate_faces([direct], [raw], [0], [{0: out}], **options)[0]
 
 

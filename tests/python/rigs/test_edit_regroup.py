@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rebuilt joint groups: the same poses, without small values of other regions.
+"""Tests that rebuilt joint groups give the same poses, without small values of other regions.
 
 The test reads the joint groups of a file independently of the package: a dense matrix for each LOD,
 in which the last group that writes a row is used.
@@ -35,13 +35,13 @@ def control_count(dna):
 
 
 def turned(dna):
-    """Indices of joints that layer jbmd declares as quaternions."""
+    """Indices of joints whose rotation layer jbmd declares to be a quaternion."""
     flags = np.asarray(dna.joint_behavior_metadata.joint_representations).reshape(-1, 3)[:, 1]
     return {int(j) for j in np.flatnonzero(flags == 1) if j < len(dna.joint_names)}
 
 
 def matrix(dna, lod, width=None):
-    """float64[joints * 9, controls]: the rows at a LOD that belong to no quaternion."""
+    """Joint values at a LOD, float64[joints * 9, controls]; rotations of quaternion joints: 0."""
     out = np.zeros((len(dna.joint_names) * 9, width or control_count(dna)))
     quaternions = turned(dna)
     for group in dna.joint_groups:
@@ -55,7 +55,10 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, angles), ...]}: factors of each joint's quaternion, in order."""
+    """{joint: [(control, [x, y, z]), ...]}: factors of each joint's quaternion, in their order.
+
+    The angles have the file's unit.
+    """
     out = {}
     for group in dna.joint_groups:
         found, order = {}, oracle.column_order(dna, group)
@@ -74,7 +77,7 @@ def turns(dna, lod):
 
 
 def giant(dna):
-    """The face with all rows in one joint group: each LOD contains the coarser ones."""
+    """The face with all rows in one joint group, sorted so that coarser LODs use leading rows."""
     out = copy.deepcopy(dna)
     width = control_count(dna)
     rows = []
@@ -97,7 +100,7 @@ def giant(dna):
 
 
 def scattered(dna, seed):
-    """The face with rows spread over many groups of equal LODs, and columns in random order."""
+    """The face with each joint group divided into seven by rows; groups, columns are shuffled."""
     rng = np.random.default_rng(seed)
     out, groups = copy.deepcopy(dna), []
     for group in dna.joint_groups:
@@ -124,7 +127,7 @@ def random_poses(dna, count=12):
 
 
 def assert_same_poses(before, after, **options):
-    """Check that two faces give equal poses at every LOD, bit for bit."""
+    """Check that two faces give the same joints, shapes and maps at every LOD, bit for bit."""
     rigs = [risorius.Rig(dna, simd="scalar", **options) for dna in (before, after)]
     raw = random_poses(before)
     for lod in range(before.lod_count):
@@ -143,7 +146,7 @@ def assert_same_matrices(before, after):
 
 
 def effects(dna, coefficients):
-    """The effect of coefficients in mm, degrees or scale, float64[joints * 9, controls]."""
+    """Sizes of coefficients in mm, degrees or scale, float64[joints * 9, controls]."""
     units = [MM[dna.translation_unit]] * 3 + [DEGREES[dna.rotation_unit]] * 3 + [1.0] * 3
     return np.abs(coefficients) * np.tile(units, len(dna.joint_names))[:, None]
 
@@ -184,7 +187,7 @@ def test_random_faces_with_repeated_rows_and_columns(width):
     out, _ = edit.regroup(dna, timed=0)
     for lod in range(dna.lod_count):
         wide = control_count(dna)
-        # Values of duplicate columns are summed before rounding.
+        # A rebuilt group has one column for columns of the same control: their sum, rounded once.
         np.testing.assert_allclose(
             matrix(dna, lod, wide), matrix(out, lod, wide), rtol=2**-23, atol=0
         )
@@ -199,8 +202,8 @@ def test_random_faces_with_repeated_rows_and_columns(width):
 def overlapping_face(seed):
     """A face with few joints in many groups.
 
-    Rows are written twice, columns repeat in any order, joints are quaternions, LODs are skipped,
-    and correctives read correctives.
+    Some groups write a row twice, repeat a control, skip a LOD or rotate quaternion joints, and
+    some correctives read correctives.
     """
     rng = np.random.default_rng(seed)
     dna = random_face(seed, 5)
@@ -238,8 +241,8 @@ def test_faces_whose_groups_overlap(seed):
         assert rigs[0].joint_indices_written.tolist() == rigs[1].joint_indices_written.tolist()
         for lod in range(dna.lod_count):
             a, b = (rig.evaluate_batch(raw, lod=lod) for rig in rigs)
-            # Values of duplicate columns are summed before rounding: sums of 14 values below 3 *
-            # 1.5.
+            # Values of columns with the same control are summed before rounding: at most 14 columns
+            # with values below 3, and controls below 1.5.
             np.testing.assert_allclose(a.joints, b.joints, rtol=0, atol=14 * 4.5 * 14 * oracle.EPS)
             np.testing.assert_array_equal(a.animated_maps, b.animated_maps)
     assert edit.regroup(out, timed=0, combinations=0)[0].to_bytes() == out.to_bytes()
@@ -259,7 +262,7 @@ def test_correctives_that_others_read_are_computed_as_before(seed):
 
 
 def without_turns(dna):
-    """The face without quaternions, for which the order of columns matters."""
+    """The face with Euler angles instead of quaternions, so that the order of columns is free."""
     out = copy.deepcopy(dna)
     out.joint_behavior_metadata = risorius.JointBehaviorMetadata()
     return out
@@ -291,7 +294,10 @@ def test_quaternions_come_out_of_one_group_whole(name):
 
 
 def turning_face(*groups):
-    """Two quaternion joints at 2 LODs; groups: (rows of each LOD, controls, rows, values)."""
+    """A face with two quaternion joints and two LODs.
+
+    Args: groups  joint groups: (rows of each LOD, control indices, output indices, values).
+    """
     dna = risorius.Dna()
     dna.lod_count = 2
     dna.raw_control_names = [f"raw{i}" for i in range(4)]
@@ -309,10 +315,11 @@ def turning_face(*groups):
 
 COARSE, FINE = [0, 0, 20], [[30, 0, 10], [0, 25, 5]]
 TURNING = {
-    # In one group, control 3 of the coarser LOD would be multiplied first.
+    # If both groups became one, the rotation of control 3, which both LODs have, would come first.
     "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
     "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
-    # The angles of one joint start at two LODs, so the order of its columns must be kept.
+    # Angles of one joint belong to different LODs, so that the order of its columns must not
+    # change.
     "mixed": [([3, 1], [1, 2, 3], [12, 4, 13], [FINE[0], COARSE, FINE[1]])],
 }
 
@@ -329,7 +336,7 @@ def test_products_of_quaternions_stay_in_their_order(case):
 
 
 def face_of_regions(seed, regions=6, joints=12, controls=20):
-    """One group with dense regions of joints in random order, and small values elsewhere."""
+    """A face with one group: dense regions of joints, in random order, and small other values."""
     rng = np.random.default_rng(seed)
     count = regions * joints
     owner = rng.permutation(np.repeat(np.arange(regions), joints))
@@ -340,7 +347,8 @@ def face_of_regions(seed, regions=6, joints=12, controls=20):
         values[joint * 9 : joint * 9 + 9, reads[region]] = part
     clean = values.copy()
     for region in range(regions):
-        # At most a quarter of the region's joints, which still counts as foreign.
+        # Small values are in 3 of 12 joints of the region: a quarter, which still counts as
+        # foreign.
         for column in np.setdiff1d(np.arange(60), reads[region])[::2]:
             for joint in rng.choice(np.flatnonzero(owner == region), 3, replace=False):
                 values[joint * 9 + rng.integers(9), column] = rng.uniform(0.0001, 0.0009)
@@ -392,7 +400,7 @@ def test_what_goes_is_below_the_threshold(name, threshold):
         gone = np.count_nonzero(changed)
         assert turns(out, lod) == turns(dna, lod)
     assert report.removed == gone == report.before.nonzero - report.after.nonzero
-    # Controls are at most 1, so a joint changes by at most the sum of its lost values.
+    # Controls are at most 1, so that a joint changes by at most the sum of its removed values.
     lost = effects(dna, matrix(dna, 0, wide) - matrix(out, 0, wide)).sum(axis=1).reshape(-1, 9)
     assert report.translation_mm.value <= np.linalg.norm(lost[:, :3], axis=1).max() * 1.001
     assert report.rotation_degrees.value <= lost[:, 3:6].sum(axis=1).max() * 1.001
@@ -466,7 +474,7 @@ def test_regions_by_name_and_index():
     assert_same_matrices(dna, out)
     named = {str(i): [dna.joint_names[j] for j in half] for i, half in enumerate(halves)}
     assert edit.regroup(dna, regions=named, timed=0)[0].to_bytes() == out.to_bytes()
-    # Joints that no region lists form a group of their own.
+    # Joints that belong to no given region form groups of their own.
     out, report = edit.regroup(dna, regions=[halves[0]], timed=0)
     assert report.regions[0] == halves[0]
     assert sorted(j for region in report.regions[1:] for j in region) == halves[1]
@@ -706,11 +714,11 @@ def _face_of(values):
 @pytest.mark.parametrize(
     ("values", "groups"),
     [
-        # One control drives one joint: a group by regions has 4 x 4 values with 4 nonzero, groups
-        # by drivers 4 x 1.
+        # Each control drives one joint: one group by region would have 16 values with 4 nonzero,
+        # but four groups by driving controls have one value each.
         (np.eye(4), 4),
-        # Two controls drive two joints each: half of the values are 0, which is allowed in a
-        # region.
+        # Each pair of controls drives a pair of joints: half of the values are 0, which is allowed
+        # in a group by region.
         (np.kron(np.eye(2), np.ones((2, 2))), 1),
         (np.ones((4, 4)), 1),
     ],

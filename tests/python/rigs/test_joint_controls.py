@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Raw controls for rotations of joints: found in a file, and set from a clip's head curves."""
+"""Tests controls of joint rotations: found in a file, and set from head curves of a clip."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ UP = (0.0, 0.0, 0.2164396, 0.9762960)  # a quaternion: 25 degrees about the head
 
 
 def face(axes=("right", "up", "front"), sequence="xyz", signs=(1, 1, 1), unit="degrees"):
-    """A chain of three joints that ends with the head; the pose UP of the head drives a channel."""
+    """Three joints in a chain, the last is the head; pose UP of the head drives a shape channel."""
     dna = risorius.Dna()
     dna.lod_count, dna.coordinate_system = 1, axes
     dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = sequence, signs, unit
@@ -63,7 +63,7 @@ def about(axis, angle):
 
 
 def resting(dna):
-    """The head's axes at rest, in the file's space."""
+    """The rotation matrix from the head's axes at rest to the file's axes."""
     unit = np.pi / 180 if dna.rotation_unit == "degrees" else 1.0
     out = np.eye(3)
     for angles in dna.neutral_joint_rotations:
@@ -76,7 +76,7 @@ def resting(dna):
 
 
 def head_matrix(yaw, pitch, roll):
-    """The rotation of yaw to the face's left, pitch up, and roll to its left shoulder."""
+    """Head rotation by yaw to its left, pitch up, and roll to its left shoulder, in radians."""
     return about((0, 0, 1), yaw) @ about((-1, 0, 0), pitch) @ about((0, 1, 0), roll)
 
 
@@ -120,7 +120,7 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     dna.save(str(tmp_path / "face.dna"))
     character = load_face(tmp_path / "face.dna")
     (head,) = character.turning
-    # The head's angles for which its joint has the rotation of the pose.
+    # Angles of the head that rotate its joint as in the pose UP.
     x, y, z = np.linalg.inv(head.axes) @ UP[:3]
     turn = rotation_of((x, y, z, UP[3]))
     pitch = -np.arcsin(turn[2, 1])
@@ -133,13 +133,13 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     bake(ready, character, 0, {"npz": tmp_path / "out.npz"})
     with np.load(tmp_path / "out.npz") as out:
         assert out["blend_shapes"][:, 0] == pytest.approx([0.0, 1.0], abs=4e-3)
-    # A clip's own curves of these controls have precedence.
+    # If a clip has a curve of one of these controls, no curves of head controls are added.
     own = clip.replaced(names=[*names, "head.qx"], curves=np.vstack([clip.curves, [[0, 0]]]))
     assert prepared(own, character).names == own.names
 
 
 def neck_face(folder):
-    """A face whose last joint is neck_02, which takes half of the neck's rotation."""
+    """A face whose last joint is neck_02, which gets half of the neck rotation of a clip."""
     dna = face()
     dna.joint_names = ["spine", "neck_01", "neck_02"]
     dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rig and Morph for callers: wrong arguments, edited files, the choice of SIMD."""
+"""Tests Rig and Morph as callers use them: wrong arguments, edited files, choice of SIMD."""
 
 import copy
 import os
@@ -75,7 +75,7 @@ def test_faces_in_turn_and_in_threads_do_not_see_each_other(dna):
         one.joint_groups = groups
         rigs.append(risorius.Rig(one))
     raw = np.float32([0.5, 0.25, 0, 1])
-    # A batch has its own memory.
+    # A batch uses other memory than single frames, so that its values are correct in any case.
     wanted = [rig.evaluate_batch(raw[None]).joints[0] for rig in rigs]
     assert not np.array_equal(wanted[0], wanted[1])
 
@@ -233,7 +233,8 @@ def test_morph_is_the_sum_of_transformed_deltas():
         moved_size = np.abs(np.asarray(target.deltas, float)) @ np.abs(matrix.T.astype(float))
         np.add.at(expected, target.vertex_indices, weight * moved)
         np.add.at(size, target.vertex_indices, abs(weight) * moved_size)
-    # Roundings per vertex: 3 products and sums of the matrix, 1 of the weight, 5 terms of the sum.
+    # Number of roundings of a vertex: 3 for products with the matrix, 1 for the weight, 5 for the
+    # sum.
     bound = 9 * np.finfo(np.float32).eps * size
     assert (np.abs(morph.evaluate(weights, base) - expected) <= bound).all()
     assert morph.channel_indices.tolist() == [0, 3, 7]

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Networks, solvers, setups and quaternions at every LOD, compared with the reference's values.
+"""Compares networks, solvers, setups and quaternions with the reference's values at every LOD.
 
-Known deviations, left out by name below: - networks that move joints by Euler angles, read as Euler
-angles: the reference takes their
-  rotation and first scale for a quaternion;
-- where joints of networks come in another system of axes, the reference overwrites the network's
-  controls with converted values, and loses the sign of their scale;
-- of several twists that share a rotation with a swing the reference moves the joints of the first
-  by the weights of the last, and those of the others not at all;
-- a twist that shares a rotation with a swing of another axis: the reference turns its joints about
-  the axis of the swing;
-- a rotation of 0 0 0 0 is NaN there and identity here; - solvers that interpolate between targets
-that are the same: nothing decides between those.
+Values in which the reference is known to deviate are not compared:
+
+- Networks that move joints by Euler angles, evaluated as Euler angles: the reference takes their
+  rotation and first scale for a quaternion.
+- Networks whose joints have another system of axes: the reference overwrites the network's controls
+  with converted values, and loses the sign of their scale.
+- Several twists that share a rotation with a swing: the reference moves the joints of the first
+  twist by the weights of the last one, and does not move the joints of the others.
+- A twist that shares a rotation with a swing about another axis: the reference rotates the joints
+  of the twist about the axis of the swing.
+- A rotation of 0 0 0 0: the reference gives NaN, Risorius the identity.
+- Solvers that interpolate between equal targets: any weights of these targets are correct.
 """
 
 import numpy as np
@@ -25,20 +26,20 @@ from test_rig_golden import SIMD, Golden
 EVALUATIONS = evaluations()
 FACES = [name for name, tag, _ in EVALUATIONS if tag == ""]
 CASES = [(name, tag) for name, tag, _ in EVALUATIONS if tag in ("", ".quat")]
-# Faces for which the reference gave only Euler angles.
+# Faces of which the reference gave only Euler angles, not quaternions.
 EULER_ONLY = [name for name in FACES if (name, ".quat") not in CASES]
 SEQUENCES = [(name, tag) for name, tag, _ in EVALUATIONS if tag in (".seq", ".quat.seq")]
 FILTERED = [
     (name, tag, lods_of(about)) for name, tag, about in EVALUATIONS if lods_of(about) is not None
 ]
-# Interpolation multiplies the float32 error by the condition of its matrix; an arc near 0 has an
-# error of sqrt(8 eps) = 1e-3.
+# Interpolation multiplies the float32 error by the condition number of its matrix, so that solvers
+# above WELL_CONDITIONED are not compared. An arc near 0 has an error of sqrt(8 eps) = 1e-3.
 WELL_CONDITIONED = 1e3
 ARC = 1e-3
 
 
 class Face:
-    """A rig, its expected values, and the parts that are not compared."""
+    """A rig with comparisons of its poses, and with controls and joints that are not compared."""
 
     def __init__(self, name, rotation, simd=None, folder=GOLDEN_SET, **load):
         self.name, self.rotation = name, rotation
@@ -59,7 +60,7 @@ class Face:
         self.vague_joints[self.mixed_twists()] = True
 
     def vague_controls(self):
-        """Controls that solvers with a singular or nearly singular matrix write."""
+        """bool[controls]: controls written by solvers with a singular or nearly singular matrix."""
         out = np.zeros(self.rig.control_count, bool)
         poses = self.dna.rbf_behavior_ext.poses
         first = self.rig.control_count - len(self.dna.rbf_behavior.poses)
@@ -71,7 +72,10 @@ class Face:
         return out
 
     def stretched(self, record):
-        """Joints of setups whose input is no unit quaternion, so their angles differ."""
+        """Joints of setups whose input quaternion has not unit length.
+
+        For these, Risorius and the reference compute different angles.
+        """
         layer, controls = self.dna.twist_swing_behavior, self.expected_controls(record)
         out = []
         for s in (*layer.twists, *layer.swings):
@@ -104,7 +108,10 @@ class Face:
             )
 
     def bounds(self, pose, record, lod):
-        """Allowed errors [J, 9], from rounding of sums and from differences of controls."""
+        """float64[J, 9]: allowed error of each joint attribute.
+
+        It contains the rounding of sums, and the effect of the controls' deviations.
+        """
         wanted = self.expected_controls(record)
         error = np.abs(pose.controls - wanted)
         if self.converted:
@@ -119,7 +126,7 @@ class Face:
         return out.reshape(-1, 9) + 1e-6
 
     def mixed_twists(self):
-        """Joints of twists whose rotation another twist shares, or a swing with another axis."""
+        """Joints of twists that share a rotation with another twist or a swing of another axis."""
         layer = self.dna.twist_swing_behavior
         axes = {}
         for s in layer.swings:
@@ -154,7 +161,7 @@ class Face:
         sure = np.nonzero(~vague)[0]
         a, b = self.quaternions(actual[sure]), self.quaternions(wanted[sure])
         error = np.minimum(np.abs(a - b).max(1), np.abs(a + b).max(1))
-        # if the cosine of the middle angle is near 0, half of the digits are lost
+        # if the cosine of the middle Euler angle is near 0, half of the digits are lost
         pole = np.where(self.near_pole(wanted[sure]), 1e-3, 0)
         bad = np.nonzero(error > 0.5 * scale * bounds[sure, 3:6].sum(1) + 5e-6 + pole)[0]
         assert bad.size == 0, (
@@ -165,7 +172,7 @@ class Face:
     compared = 0
 
     def quaternions(self, rows):
-        """The quaternions [n, 4] of joint rows [n, 9] or [n, 10]."""
+        """Quaternions [n, 4] of joints [n, 9] with Euler angles, or [n, 10] with quaternions."""
         if rows.shape[1] == 10:
             return rows[:, 3:7]
         scale = oracle_behavior.radians_per_unit(self.dna)
@@ -266,10 +273,10 @@ def test_a_face_through_time(name, tag, simd):
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_filtered_loads_are_our_lods(name, tag, lods, simd):
-    """Compare filtered loads of the reference with our LODs.
+    """Compare filtered loads of the reference with the same LODs of a complete load.
 
-    They have the joints of their LODs and of no LOD. Quaternions are left out, because the order of
-    their columns depends on the load.
+    A filtered load has the joints of its LODs and the joints of no LOD. Quaternions are not
+    compared, because the order of their columns depends on the load.
     """
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)
@@ -300,7 +307,10 @@ def test_filtered_loads_are_what_the_reference_loads(name, tag, lods, simd):
 
 
 def reference_joints(name, lods, loaded):
-    """Indices of the reference's joints in our load, which also keeps the joints' ancestors."""
+    """Indices in Risorius' filtered face of the joints that the reference keeps.
+
+    Risorius also keeps ancestors of these joints. None if both keep the same joints.
+    """
     whole = risorius.load(GOLDEN_SET / f"{name}.dna")
     kept = set(range(len(whole.joint_names))) - set(whole.lod_joint_mapping[0].tolist())
     kept |= set().union(*(whole.lod_joint_mapping[lod].tolist() for lod in lods))
@@ -332,7 +342,7 @@ def test_oracle_agrees_and_settled_is_what_repeats_itself(name, rotation):
 
 @pytest.mark.parametrize("rotation", ["euler", "quaternion"])
 def test_euler_angles_of_networks_are_read_by_their_own_system(rotation):
-    """Angles in another order, with other signs and about other axes than the face's."""
+    """Euler angles of networks may have their own order, signs and axes, unlike the face's."""
     dna = risorius.load(GOLDEN / "ml.dna")
     joints = dna.machine_learned_behavior_ext.joints
     assert oracle_behavior.ml_stride(dna) == 9
@@ -368,7 +378,7 @@ def test_batch_rows_are_single_evaluations(name, simd, rotation):
 
 
 def random_raw(rng, dna):
-    """Sparse random controls; quaternions of setups and solvers have unit length."""
+    """Random controls, in 30 % of calls zeros; quaternions of setups and solvers are unit ones."""
     raw = rng.uniform(0, 1, len(dna.raw_control_names)) * (rng.random() < 0.7)
     names = list(dna.raw_control_names)
     for i, name in enumerate(names):
@@ -453,7 +463,7 @@ def test_rotation_is_one_of_two():
 
 
 def one_pose_solver(threshold):
-    """A solver with one pose at 0; its value 1 - x is written to a control that moves a joint."""
+    """A rig with a solver of one pose at 0: it writes 1 - x to a control that moves a joint."""
     dna = risorius.Dna()
     dna.lod_count, dna.rotation_unit = 1, "radians"
     dna.raw_control_names, dna.joint_names, dna.joint_parents = ["x"], ["joint"], [0]

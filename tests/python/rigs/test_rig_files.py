@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compiled rigs in files and in the cache, and the optional check of controls."""
+"""Tests compiled rigs in files and in the cache, and the optional check of controls."""
 
 import os
 import sys
@@ -61,7 +61,7 @@ def test_what_is_refused_names_the_file_and_the_field(tmp_path, rig):
 
 
 def forged(rig):
-    """The bytes of a rig with an index out of range, and with a matching hash."""
+    """Bytes of a rig with an axis out of range in the rotation order, and with a correct hash."""
     data = bytearray(rig.to_bytes())
     data[data.index(b"\x00\x01\x02\x00", HASH.stop)] = 9  # an axis in the rotation order
     data[HASH] = xxhash.xxh64_digest(data[HASH.stop :])[::-1]
@@ -101,7 +101,7 @@ class CompiledError(Exception):
 
 @pytest.fixture
 def no_compiling(monkeypatch):
-    """Returns a function after whose call a compilation raises CompiledError."""
+    """A function; after it is called, each compilation raises CompiledError."""
 
     def arm():
         def load(_):
@@ -156,7 +156,7 @@ def test_a_damaged_cache_is_made_anew(tmp_path, rig, no_compiling):
 
 
 def test_a_flipped_bit_in_the_cache_is_a_face_made_anew(tmp_path, rig):
-    """Flip bits in the header, in every array of the block, and between the arrays."""
+    """A bit in every 61 bytes is flipped: in the header, in every array, and between arrays."""
     risorius.compile_cached(FILE, tmp_path)
     (file,) = tmp_path.glob("*.rig")
     good = rig.to_bytes()
@@ -233,7 +233,7 @@ def test_a_control_that_is_not_finite_is_named_when_asked(rig):
     raw[1, jaw] = -np.inf
     with pytest.raises(risorius.DnaError, match=f"{JAW} is minus infinite"):
         rig.evaluate(raw[1], check=True)
-    # Values beyond float32 become infinite.
+    # Values above the range of float32 become infinite when they are converted.
     with pytest.raises(risorius.DnaError, match="is infinite"), np.errstate(over="ignore"):
         rig.evaluate(np.full(4, 1e39), check=True)
 
@@ -266,7 +266,7 @@ def test_a_refused_frame_leaves_an_instance_as_it_was(rig):
 
 
 def test_nan_spoils_what_its_control_drives_and_nothing_else(rig):
-    """The test follows the file's tables: all other outputs are unchanged."""
+    """Outputs that depend on the control by the file's lists may be NaN; others do not change."""
     dna = risorius.load(GOLDEN / "medium.dna")
     rig = risorius.Rig(dna)
     raw = np.full(len(rig.raw_control_names), 0.25, np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The evaluator, compared with values of an independent implementation at every LOD."""
+"""Compares the evaluator at every LOD with values of an independent implementation."""
 
 import gzip
 import json
@@ -16,9 +16,10 @@ BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
 
 
 def is_plain(name, about):
-    """Whether the oracle of this test evaluates a file quickly, because few joints are quaternions.
+    """Whether the oracle of this test can evaluate a file quickly.
 
-    test_rig_behavior tests all files.
+    The file has no networks, solvers or setups, and at most a quarter of its joints are
+    quaternions. test_rig_behavior tests all files.
     """
     if any(about["counts"][part] for part in BEYOND):
         return False
@@ -30,7 +31,7 @@ def is_plain(name, about):
 PLAIN = [e for e in evaluations() if is_plain(e[0], e[2])]
 RIGS = [name for name, tag, _ in PLAIN if tag == ""]
 SEQUENCES = [name for name, tag, _ in PLAIN if tag == ".seq"]
-# Files that the reference loaded with a filter: (file, tag, our LOD for each of its LODs).
+# Files that the reference loaded with a LOD filter: (file, tag, LODs of the file that it kept).
 FILTERED = [
     (name, tag, lods_of(about) or list(range(about["counts"]["lods"])))
     for name, tag, about in PLAIN
@@ -39,7 +40,7 @@ FILTERED = [
 
 
 class Golden:
-    """A pair of files <rig>.eval<tag>: description and values."""
+    """The reference's values of a rig: <rig>.eval<tag>.json describes the values in .bin.gz."""
 
     def __init__(self, folder, name, tag=""):
         self.about = json.loads((folder / f"{name}.eval{tag}.json").read_text())
@@ -58,10 +59,7 @@ class Golden:
 
 
 def assert_within(actual, expected, bound, what):
-    """Check
-
-    actual - expected| <= 2 bound, because both sides may round.
-    """
+    """Check that |actual - expected| <= 2 * bound, because both values may be rounded."""
     excess = np.abs(actual.astype(float) - expected) - 2 * bound
     worst = int(np.argmax(excess)) if excess.size else 0
     assert excess.size == 0 or excess[worst] <= 0, (
@@ -89,7 +87,7 @@ def raw_of_case(golden, rig, case):
     if case["kind"] == "raw":
         return values
     raw = rig.gui_to_raw(values)
-    # The generator then set the w of quaternion inputs to 1.
+    # The program that made the reference's values then set the w of quaternion inputs to 1.
     raw[[name.endswith((".w", ".qw")) for name in rig.raw_control_names]] = 1
     return raw
 
@@ -173,10 +171,10 @@ def test_a_face_through_time_has_the_reference_latency(name, simd):
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods, simd):
-    """Compare filtered loads of the reference with our LODs, joint by joint.
+    """Compare filtered loads of the reference with the same LODs of a complete load.
 
-    A filter keeps the joints of its LODs in order. Quaternions are left out, because the order of
-    their columns depends on the load.
+    A filter keeps the joints of its LODs in order. Quaternions are not compared, because the order
+    of their columns depends on the load.
     """
     dna = risorius.load(GOLDEN_SET / f"{name}.dna")
     rig = risorius.Rig(dna, simd=simd)

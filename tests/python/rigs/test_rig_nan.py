@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A NaN control affects only its own outputs, directly or through other controls.
+"""Tests that a NaN control affects only outputs that depend on it, directly or indirectly.
 
-Its outputs are found by following the lists of the file, without arithmetic.
+The test finds these outputs by following the lists of the file, without arithmetic.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def feeds(dna, lod):
 
 
 def graph_feeds(kind, lod):
-    """For each scatter operation: the controls that it depends on, and those it writes."""
+    """(inputs, outputs) of each operation that writes controls, as sets of controls."""
     reads, pairs = {}, []
     for s, operations in enumerate(kind.operations):
         for o in oracle_behavior.listed(kind.lod_operation_mappings[s], lod):
@@ -75,7 +75,7 @@ def driven_controls(dna, lod, control):
 
 
 def driven_joints(dna, lod, controls, stride):
-    """Attributes that the controls may change, bool[J, stride]; rotations as a whole."""
+    """bool[J, stride]: attributes that the controls may change; of a rotation, all attributes."""
     out = np.zeros((len(dna.joint_names), stride), bool)
     rotation = slice(3, stride - 3)
     for group in dna.joint_groups:
@@ -115,7 +115,7 @@ def driven_shapes(dna, lod, controls):
 
 
 def surely_spoiled(dna, lod, control, stride):
-    """(joint, attribute) of translations and scales that the control moves itself, int[K, 2]."""
+    """int[K, 2]: (joint, attribute) of translations and scales that the control drives directly."""
     out = []
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random faces compared with the double precision oracle, at sizes around the SIMD widths."""
+"""Compares random faces with the double precision oracle, at sizes around the SIMD widths."""
 
 import numpy as np
 import oracle
@@ -13,7 +13,7 @@ WIDTHS = [0, 1, LANES - 1, LANES, LANES + 1, 2 * LANES, 100]
 
 
 def random_group(rng, dna, control_count, rows, columns):
-    """A joint group with zeros, repeated columns and shrinking LODs."""
+    """A joint group with zeros, several columns of the same control, and fewer rows at each LOD."""
     values = rng.uniform(-3, 3, (rows, columns)) * (rng.random((rows, columns)) < 0.7)
     lods = sorted((int(n) for n in rng.integers(0, rows + 1, dna.lod_count - 1)), reverse=True)
     return risorius.JointGroup(
@@ -25,7 +25,7 @@ def random_group(rng, dna, control_count, rows, columns):
 
 
 def random_table(rng, rows, inputs, outputs):
-    """A table with runs of up to three rows of shared bounds, some with from and to swapped."""
+    """A table in which up to three rows in a row share input and output; some swap from and to."""
     pairs = [(rng.integers(inputs), rng.integers(outputs)) for _ in range(rows)]
     pairs = [pairs[r - r % 3] if rng.random() < 0.7 else pairs[r] for r in range(rows)]
     bounds = rng.choice([-0.5, 0, 0.25, 0.5, 0.75, 1, 1.5], (rows, 2))
@@ -56,7 +56,7 @@ def random_psds(rng, raw, count):
 
 
 def random_face(seed, width):
-    """A face with joint groups of `width` rows and columns, and of one SIMD width more."""
+    """A face with joint groups that have `width` or LANES + 1 rows and columns."""
     rng = np.random.default_rng(seed)
     raw, psds, joints, lods = 12, 9, 60, 3
     dna = risorius.Dna()
@@ -87,7 +87,7 @@ def random_face(seed, width):
 
 
 def random_raw(seed, count, frames=6):
-    """Sparse random controls, some outside 0 to 1, some exactly on the tables' bounds."""
+    """Sparse random controls, some outside 0 to 1, some exactly at bounds of table rows."""
     rng = np.random.default_rng(seed)
     raw = rng.uniform(-0.5, 1.5, (frames, count)) * (rng.random((frames, count)) < 0.6)
     raw[0] = rng.choice([0, 0.25, 0.5, 0.75, 1], count)

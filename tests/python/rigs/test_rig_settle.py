@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Settled poses of random chains of correctives, networks and solvers.
+"""Tests settled poses of random chains of correctives, networks and solvers.
 
-Each element is read by an earlier stage of a frame. The expected pose is a frame of the oracle that
-is repeated until nothing changes.
+Most nodes are read by nodes that a frame evaluates earlier, so that a pose settles only after
+several frames. The expected pose is a frame of the oracle, repeated until nothing changes.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from risorius import _native
 SIMD = _native.available_simd().split(", ")
 RAW, JOINTS = 4, 9
 KINDS = ("corrective", "network", "solver")
-# float32 rounds each sum of at most 9 products below 1. No node magnifies its inputs, so errors sum
-# along a chain of at most 12 nodes.
+# Largest error of a settled control. float32 rounds each sum of at most 9 products below 1. No node
+# magnifies its inputs, so errors add up along a chain of at most 12 nodes.
 LOSS = 12 * 10 * float(np.finfo(np.float32).eps)
 
 
 class Chain:
-    """A chain of nodes; each reads raw controls and earlier nodes."""
+    """A chain of nodes: each reads the previous node, and earlier nodes or raw controls."""
 
     def __init__(self, kinds, rng):
         self.rng, self.kinds = rng, kinds
@@ -63,7 +63,7 @@ def network(rng, inputs, outputs):
 
 
 def graph(networks):
-    """The same networks as a graph of operations: gather, run, scatter."""
+    """Networks as a graph of operations: one set gathers inputs, one runs, one writes outputs."""
 
     def operation(kind, parameters, before):
         return risorius.MlOperation(
@@ -112,7 +112,7 @@ def make_dna(chain, as_graph):
     rows = [rows[i] for i in rng.permutation(len(rows))]
     names = ("rows", "columns", "values")
     dna.psds = risorius.Psds(**{name: [r[i] for r in rows] for i, name in enumerate(names)})
-    # A joint uses every control at LOD 0, and the first half of them at LOD 1.
+    # A joint value uses each control at LOD 0, and each of the first half of controls at LOD 1.
     half = chain.count // 2
     dna.joint_groups = [
         risorius.JointGroup(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A thousand random rigs, with each instruction set, precision and kind of rotation.
+"""Compares a thousand random rigs with a short NumPy version and with the scalar code.
 
-They are compared with a short NumPy version and the scalar code: a single frame, a batch, and a
-settled face.
+Each rig is evaluated with each instruction set, precision and kind of rotation, as a single frame,
+a batch and a settled instance.
 """
 
 from collections import Counter
@@ -35,7 +35,7 @@ def random_shape(rng):
 
 
 def falling(rng, rows, lods):
-    """The number of rows for each LOD, from all rows down."""
+    """Random numbers of rows at each LOD: all rows at LOD 0, and never more at the next LOD."""
     return [rows, *sorted((int(n) for n in rng.integers(0, rows + 1, lods - 1)), reverse=True)]
 
 
@@ -71,7 +71,7 @@ def random_dna(rng, shape):
 
 
 def expected(dna, raw, lod, precision):
-    """A pose computed by NumPy in double precision, and bounds of float32 errors: two dicts."""
+    """A pose computed by NumPy in double precision, and bounds of float32 errors, as two dicts."""
     c = np.zeros(len(raw) + dna.psd_count)
     c[: len(raw)] = raw
     oracle.correctives(dna, c, oracle.used_controls(dna, lod), settle=True)
@@ -101,7 +101,7 @@ def expected(dna, raw, lod, precision):
 
 
 def turned(dna, values, losses):
-    """Convert poses and errors [J, 9] to [J, 10], with rotations as quaternions."""
+    """Convert joints [J, 9] with Euler angles, and their errors, to [J, 10] with quaternions."""
     scale = oracle_behavior.radians_per_unit(dna)
     out, lost = np.zeros((2, len(values), 10))
     out[:, :3], out[:, 7:] = values[:, :3], values[:, 6:]
@@ -109,8 +109,8 @@ def turned(dna, values, losses):
     out[:, 3:7] = oracle_behavior.from_euler(
         dna.rotation_sequence, dna.rotation_signs, values[:, 3:6] * scale
     )
-    # Half of the angle's error, the rounding of the angle, an error of 1e-7 of sines, three
-    # products.
+    # The error of a quaternion is half of the angles' error and rounding, 1e-7 for the sine of each
+    # of three angles, and the rounding of three products.
     angles = np.abs(values[:, 3:6]) * scale
     loss = 0.5 * (losses[:, 3:6] * scale + 4 * EPS * angles).sum(axis=1) + 3e-7 + 12 * EPS
     lost[:, 3:7] = loss[:, None]
@@ -131,7 +131,7 @@ def same(a, b, what):
 
 
 def check_frames(rig, raw, lod, threads, what):
-    """Check that rows of a batch and a settled instance equal single frames bit for bit."""
+    """Check that frames of a batch and a settled instance equal single frames bit for bit."""
     batch = rig.evaluate_batch(raw, lod=lod, threads=threads)
     alone = [rig.evaluate(values, lod=lod) for values in raw]
     for field in FIELDS:

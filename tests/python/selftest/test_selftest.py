@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The self-test of the wheel passes, and reports faults that the test plants."""
+"""Checks that the self-test of the wheel passes, and that it reports faults planted by a test."""
 
 import subprocess
 import sys
@@ -33,7 +33,7 @@ def test_it_passes_here_with_every_instruction_set():
 
 
 def test_the_values_are_those_of_the_reference_at_every_lod():
-    """The faces equal files of tests/data/golden, and all their outputs are compared."""
+    """The self-test's faces equal files of tests/data/golden, and it compares all their outputs."""
     golden = PROJECT / "tests" / "data" / "golden"
     for name, source in (("core", "core"), ("units", "units"), ("solvers", "tiny_v28")):
         assert checks.content(f"{name}.dna") == (golden / f"{source}.dna").read_bytes()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Dragging points of the skin, handles, and control curves from a moving mesh."""
+"""Tests dragging of skin points, placing of handles, and control curves from a moving mesh."""
 
 import math
 
@@ -66,7 +66,7 @@ def test_a_drag_arrives_with_the_smallest_change(face):
     assert solved.raw.max() <= 1
     assert solved.raw[IDLE] == 0
     assert solved.change == pytest.approx(np.linalg.norm(solved.raw - at), abs=1e-5)
-    # Compared with the pseudo-inverse of the Jacobian, because no limit is reached.
+    # A small step equals the step by the Jacobian's pseudo-inverse, because no limit is reached.
     small = surface.positions(at, 0, [vertex])[0] + [0.0, 0.004, 0.002]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6}
     step = risorius.solve_drag(surface, at, [(0, vertex)], [small], **free).raw - at
@@ -125,7 +125,7 @@ PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_partners_change_alike_and_as_little_as_they_can(face, method):
-    """Compared with the pseudo-inverse for one common number of both partners."""
+    """Both partners change by one number, which the pseudo-inverse of their joint column gives."""
     surface = face[1]
     vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
     here = surface.positions(begin, 0, vertices).astype(float)
@@ -149,7 +149,7 @@ def test_partners_change_alike_and_as_little_as_they_can(face, method):
 
 
 def test_partners_keep_the_limits_of_both(face):
-    """The narrower limits of the two partners apply to both."""
+    """If two partners have different limits, the narrower limits apply to both."""
     surface, points = face[1], [(0, 14 * 3 + 5), (0, 14 * 10 + 5)]
     begin = raw(left=0.5, right=0.5)
     both = {"free": np.isin(np.arange(7), [LEFT, RIGHT]), "partners": PARTNERS}
@@ -166,7 +166,7 @@ def test_partners_keep_the_limits_of_both(face):
 
 @pytest.mark.parametrize("eases", [(1, 0.01), (0.01, 1)])
 def test_partners_change_as_readily_as_the_readier_one(face, eases):
-    """Both partners use the smaller ease, because the pair moves as one."""
+    """Both partners use the larger of their eases, because the pair moves as one."""
     surface, vertex = face[1], 14 * 5 + 6
     axis = np.array([0, 0.6, 0.8])
     target = surface.positions(raw(), 0, [vertex]) + 0.1 * axis
@@ -183,7 +183,7 @@ def test_partners_change_as_readily_as_the_readier_one(face, eases):
 
 
 def test_of_opposites_one_alone_is_used(face):
-    """The left smile and the puff both raise this vertex; both together fit slightly better."""
+    """Two opposites, left smile and puff, raise a vertex; only one of them is used."""
     surface, vertex = face[1], 14 * 5 + 6
     target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
     drag = [(0, vertex)], target
@@ -194,7 +194,7 @@ def test_of_opposites_one_alone_is_used(face):
     assert max(one.raw[LEFT], one.raw[PUFF]) > 0.05
     more = LEFT if both.raw[LEFT] > both.raw[PUFF] else PUFF
     assert one.raw[more] > 0.05
-    # An active control first returns to rest; only then does its opposite start.
+    # An active control first returns to 0; only then does its opposite become active.
     begin = raw(left=0.3)
     rest, puffed, here, lower = (
         surface.positions(raw(**at), 0, [vertex])
@@ -205,7 +205,7 @@ def test_of_opposites_one_alone_is_used(face):
         assert min(found.raw[LEFT], found.raw[PUFF]) <= 1e-6
         assert (found.raw[PUFF] > 0.1) == gone
         assert (found.raw[LEFT] > 0.01) == (not gone)
-    # Two opposites that are already active may stay, but do not increase.
+    # Two opposites that are both active before the drag may stay active, but do not both increase.
     begin = raw(left=0.3, puff=0.2)
     found = risorius.solve_drag(surface, begin, *drag, opposites=[(LEFT, PUFF)])
     assert min(found.raw[LEFT], found.raw[PUFF]) <= 0.2 + 1e-6
@@ -241,7 +241,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """At most 1.3 mm farther away; no active slider has an active opposite."""
+    """It ends at most 1.3 mm farther from the goal; no active slider has an active opposite."""
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
@@ -265,7 +265,7 @@ def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mir
 
 
 def test_a_sparse_drag_moves_few_and_arrives(face):
-    """Along two axes two controls are enough; least squares would use all controls that help."""
+    """To move a point along two axes, two controls are enough; least squares uses more."""
     surface, vertex = face[1], 14 * 5 + 6
     axes = np.eye(3)[None, 1:]
     target = surface.positions(raw(left=0.5, jaw=0.2), 0, [vertex])
@@ -313,9 +313,9 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """Compared with coordinate descent on the penalised problem.
+    """The change costs as much as a solution by coordinate descent with the same error.
 
-    Its penalty is chosen so that both have the same error.
+    The penalty of the coordinate descent is chosen so that the errors are equal.
     """
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2
@@ -342,7 +342,7 @@ def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # the twin moves like the jaw
     alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
     assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
-    # Compared with least squares weighted by the inverse of the squared ease.
+    # A small step equals least squares that are weighted by the inverse of the squared ease.
     small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
     step = risorius.solve_drag(surface, raw(), points, [small], **free).raw
@@ -363,7 +363,7 @@ def test_what_cannot_be_reached_ends_at_the_limits(face):
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_a_control_beyond_its_limits_stays_or_comes_back(face, method):
-    """A pose may be beyond the limits; a drag neither increases this nor jumps."""
+    """A drag neither moves a control farther beyond its limits nor makes it jump to the limit."""
     surface, vertex = face[1], 14 * 7
     only = {"free": np.arange(7) == JAW, "method": method}
     for start, wanted, found in (
@@ -483,7 +483,7 @@ def test_a_structure_beside_its_fields_or_an_unknown_keyword_is_refused(face):
 
 
 def performance(face, frames=40):
-    """Curves of four visible controls, and the vertices of each frame, float32[F, V, 3]."""
+    """Curves float32[F, 7] of four controls that move the mesh, and vertices float32[F, V, 3]."""
     t = np.arange(frames) / 30
     curves = np.zeros((frames, 7), np.float32)
     curves[:, JAW] = 0.5 - 0.5 * np.cos(7 * t)
@@ -516,7 +516,7 @@ def test_a_baked_clip_comes_back(face):
     assert not {"CTRL_expressions.idle", "CTRL_expressions.widen"} & set(solved.clip.names)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1, abs=0.01)
-    # The reported residual equals the error of the mesh that these curves give.
+    # The reported residual equals the error of the mesh that the solved curves give.
     left = np.stack([pose(face, row) for row in found]) - vertices
     rms = np.sqrt((left**2).sum(axis=2).mean(axis=1))
     np.testing.assert_allclose(solved.frame_residual, rms, atol=1e-4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech to animation: sound files, transcripts, phonemes compared with espeak-ng's, the mouth."""
+"""Tests speech to animation: sound files, transcripts, phonemes (with espeak-ng), the mouth."""
 
 import json
 import os
@@ -46,7 +46,7 @@ P = "CTRL_expressions."
 
 @pytest.fixture
 def voice(tmp_path):
-    """Returns a function that speaks a text into a file; the test is skipped without espeak-ng."""
+    """A function that speaks a text into a file; the test is skipped if espeak-ng is missing."""
     if not espeak_truth.is_installed():
         conftest.require_extra(Path("espeak-ng"), "speech of espeak-ng (apt install espeak-ng)")
     pytest.importorskip("pocketsphinx")
@@ -60,7 +60,7 @@ def voice(tmp_path):
 
 
 def wav(kind, bits, channels, rate, body, *, block=None, size=None, extra=b""):
-    """A WAV file according to the specification."""
+    """Bytes of a WAV file; block and size replace the correct values of its header."""
     block = channels * bits // 8 if block is None else block
     form = struct.pack("<HHIIHH", kind, channels, rate, rate * block, block, bits) + extra
     chunks = b"fmt " + struct.pack("<I", len(form)) + form
@@ -356,7 +356,7 @@ def test_silence_is_taken_from_a_phoneme_but_not_from_a_stop_within_a_word():
 
 
 class Fake:
-    """A recogniser with a fixed result."""
+    """A recogniser that finds the same phonemes and words in every sound."""
 
     def __init__(self, phones, words):
         self.phones = [Segment(*phone, "") for phone in phones]
@@ -384,7 +384,7 @@ def test_votes_elect_the_viseme_first_and_words_outvote_phonemes():
 
 
 def spell(*sounds, length=0.1):
-    """A Heard with these sounds, each `length` seconds long, in a vowel-like tone."""
+    """A Heard with these sounds, each `length` seconds long, and a tone of 150 Hz as its audio."""
     phones = [Phoneme(i * length, (i + 1) * length, name) for i, name in enumerate(sounds)]
     samples = sine(150, RATE, len(sounds) * length).astype(np.float32)
     return Heard(phones, samples, True, [])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech recognition in a separate process, independent of the state and the end of this one."""
+"""Tests that speech recognition in a separate process does not depend on this process."""
 
 import os
 import shutil
@@ -29,7 +29,7 @@ def voice(tmp_path):
 
 @pytest.fixture
 def endless(tmp_path):
-    """A sound file without an end: a named pipe without a writer."""
+    """The path of a sound file that never ends: a named pipe into which nobody writes."""
     if not hasattr(os, "mkfifo"):
         pytest.skip("pipes with names")
     os.mkfifo(tmp_path / "endless.wav")
@@ -38,7 +38,7 @@ def endless(tmp_path):
 
 @pytest.fixture
 def processes(monkeypatch):
-    """The processes that were started."""
+    """The list of the recogniser's processes that the test starts."""
     found, begin = [], apart._started
 
     def spy(said):
@@ -54,7 +54,7 @@ def test_it_is_the_same_speech(voice, monkeypatch):
     options = {"seed": 3, "rate": 30.0, "library": {"aa": own}}
     wanted = speak(voice, WORDS, **options)
     assert "CTRL_expressions.open_A" in wanted.names
-    # The state of this process does not matter, even if it cannot import the recogniser.
+    # The other process does not depend on this one, even if this one cannot import the recogniser.
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     with pytest.raises(MissingError):
         speak(voice, WORDS)
@@ -91,7 +91,7 @@ def test_another_libpocketsphinx_in_this_process_does_not_matter(voice, tmp_path
     done = limits.run(command, 120)
     said = done.stdout.splitlines()
     assert said[-1:] == ["apart: aligned"], done.stderr
-    # The libraries do clash: in one process, recognition fails.
+    # The libraries do clash: recognition in the process that loads both fails.
     assert said[:1] == ["in one process: RuntimeError"]
 
 
@@ -123,7 +123,7 @@ def test_it_ends_with_the_process_that_began_it(endless, tmp_path):
         process = apart._started(said)
         task = {"paths": sys.path, "path": str(endless), "transcript": None, "options": {}}
         apart._write(process, task)
-        # Open at both ends, so the other process waits for sound that does not come.
+        # This process keeps the pipe open, so that the other process waits for sound.
         with endless.open("wb"):
             assert process.poll() is None
             process.stdin.close()  # the system does this when a process dies

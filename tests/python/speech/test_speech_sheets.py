@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words and phonemes in files: written, corrected by other programs, and read."""
+"""Tests files of words and phonemes: written, corrected by other programs, and read."""
 
 import json
 import sys
@@ -41,7 +41,7 @@ def test_what_was_written_is_read(name):
 
 
 def test_files_of_praat_and_of_aligners_are_read():
-    """TextGrid in short form and UTF-16, with stress, points, other tier names and gaps."""
+    """A short TextGrid in UTF-16 is read, with stress, a point tier, other tier names and gaps."""
     short = """File type = "ooTextFile"
         "TextGrid" 0 0.8 <exists> 3
         "TextTier" "clicks" 0 0.8 1 0.4 "here" ! nobody asks

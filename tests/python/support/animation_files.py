@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Writes animation files as other programs do: header order, decimals, quotes, line ends.
+"""Writes animation files exactly as other programs do, for tests of importers.
 
 Sources of the formats:
 
-* Live Link Face: takes of the app as published recordings show them. 63 columns, 10 decimals, LF;
-  BlendShapeCount 61; timecode HH:MM:SS:FF.sss where FF counts 60 per second although there are
+* Live Link Face: recordings of the app that were published. 63 columns, 10 decimals, LF;
+  BlendShapeCount 61; timecode HH:MM:SS:FF.sss, where FF counts 60 per second although there are
   30 rows per second; rows that the phone could not write are missing; head columns are
   0.0000000000 if head streaming is off.
 * Audio2Face: the solver's export {exportFps, trackPath, numPoses, numFrames, facsNames, weightMat,
@@ -47,7 +47,7 @@ def camel(name: str) -> str:
 
 
 def timecode(seconds: float, base: int) -> str:
-    """Seconds since midnight as HH:MM:SS:FF.sss, with thousandths of a frame."""
+    """Seconds since midnight as HH:MM:SS:FF.sss: frames of 1 / base seconds, and thousandths."""
     units = round((seconds % 86400.0) * base * 1000)
     frames, rest = divmod(units, 1000)
     whole, frame = divmod(frames, base)
@@ -62,7 +62,7 @@ def live_link_face(
     names: list[str] = COLUMNS,
     count: int | None = None,
 ) -> str:
-    """CSV text of a take. Args: rows: [rows, names]; seconds: time of each row since midnight."""
+    """CSV text of a take. rows: [frames, names]; seconds: times of the frames since midnight."""
     lines = ["Timecode,BlendShapeCount," + ",".join(names)]
     stated = len(names) if count is None else count
     for at, row in zip(seconds, rows, strict=True):
@@ -71,7 +71,7 @@ def live_link_face(
 
 
 def capture(count: int, names: list[str] = COLUMNS) -> np.ndarray:
-    """Values [count, names] with 10 decimals, different per column; rotations within 0.6."""
+    """Values [count, names] in 0 to 1 with 10 decimals, by column; rotations in -0.6 to 0.6."""
     at = np.arange(count)[:, None]
     column = np.arange(len(names))[None, :]
     values = 0.5 + 0.5 * np.sin(0.11 * at + 0.7 * column)
@@ -133,7 +133,7 @@ def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
 
 
 def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
-    """Rhubarb's XML, formatted like Boost's property tree with 2 spaces per level."""
+    """Rhubarb's XML, formatted by Boost's property tree with 2 spaces per level."""
     rows = [
         f'    <mouthCue start="{start:.2f}" end="{end:.2f}">{shape}</mouthCue>\n'
         for start, end, shape in cues
@@ -148,7 +148,7 @@ def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
 
 
 def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
-    """Rhubarb's JSON, with one cue per line like Rhubarb."""
+    """Rhubarb's JSON, which has one cue per line."""
     rows = [
         f'    {{ "start": {start:.2f}, "end": {end:.2f}, "value": "{shape}" }}'
         for start, end, shape in cues
@@ -161,8 +161,8 @@ def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
     )
 
 
-# Two words of a Papagayo document with 24 frames per second: (text, first and last frame,
-# phonemes).
+# Words of a Papagayo document with 24 frames per second: (text, first frame, last frame, [(first
+# frame, phoneme)]).
 WORDS = [
     ("hello", 6, 17, [(6, "AI"), (9, "L"), (13, "O")]),
     ("bob", 24, 35, [(24, "MBP"), (28, "O")]),
@@ -170,7 +170,7 @@ WORDS = [
 
 
 def papagayo_pgo() -> str:
-    """The document in version 1 of Papagayo: tabs show levels, "|" stands for a line end."""
+    """WORDS in Papagayo's version 1: tabs show the level of a line, "|" replaces line ends."""
     out = ["lipsync version 1", "voice.wav", "24", "72", "1"]
     out += ["\tVoice 1", "\thello|bob", "\t1", "\t\thello bob", "\t\t6", "\t\t35", "\t\t2"]
     for text, first, last, phonemes in WORDS:
@@ -180,7 +180,7 @@ def papagayo_pgo() -> str:
 
 
 def papagayo_pgo_json() -> str:
-    """The document of papagayo_pgo in version 2, the JSON of Papagayo-NG."""
+    """WORDS in version 2, the JSON of Papagayo-NG."""
     words = [
         {
             "id": i, "text": text, "start_frame": first, "end_frame": last, "tags": [],
@@ -214,7 +214,7 @@ def papagayo_pgo_json() -> str:
 
 
 def moho_dat() -> str:
-    """The same words in Papagayo's export for Moho: frames from 1, a rest ends each pause."""
+    """WORDS in Papagayo's export for Moho: frames from 1, a rest at both ends of each pause."""
     rows = [
         "1 rest",
         "6 rest",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes pairs of heads with different vertices and known correspondences.
 
-A head by formula is a function from directions to points: points of the same direction correspond,
+A head by formula is a function from directions to points: points in the same direction correspond,
 whatever the vertices of the two meshes. All people of the generator have corresponding vertices;
 `remeshed` replaces the vertices of one of them.
 """
@@ -16,12 +16,13 @@ from risorius import _native
 from risorius.anyhead.surface import Surface
 
 HEAD_MM = 240.0
-# Landmarks of a head by formula: angles to the left and up in degrees.
+# Landmarks of a head by formula: angles to the left and up from the front, in degrees.
 MARKS = (
     *((-24, 12), (24, 12), (-9, 12), (9, 12), (0, -8), (-14, -26), (14, -26), (0, -52)),
     *((90, 0), (-90, 0), (0, 89)),
 )
-# Bumps: angles to the left and up and width in degrees, height as a fraction of the radius.
+# Bumps of a head: angles to the left and up, and width, in degrees; height as a fraction of the
+# head's radius.
 _BUMPS = (
     (0, -8, 9, 0.22),  # nose
     (-17, 12, 9, -0.10),  # eyes
@@ -41,7 +42,7 @@ def direction(left: float, up: float) -> np.ndarray:
 
 
 def form(directions: np.ndarray, seed: int = 0, size: float = 12.0) -> np.ndarray:
-    """float64[n, 3], the points of a head in these directions.
+    """Points of a head by formula in the given directions, float64[n, 3].
 
     Args:
         directions: float64[n, 3] unit vectors.
@@ -86,7 +87,7 @@ def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.n
 
 
 def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.ndarray]:
-    """A template, a target, and float64[V, 3]: true places of the template's vertices on it."""
+    """Template, target, and the template's vertices at their true places on the target, [V, 3]."""
     directions, triangles = sphere(30, 44)
     others, corners = sphere(47, 61, turn=0.9)
     template = Surface(form(directions), triangles)
@@ -94,7 +95,7 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """(vertex, true point) at MARKS. Args: noise: random error of points, in the unit of `true`."""
+    """(vertex, true point) of each of MARKS. noise: random error of a point, in units of `true`."""
     random = np.random.default_rng(seed)
     looks = template.points / np.linalg.norm(template.points, axis=1, keepdims=True)
     vertices = [int(np.argmax(looks @ direction(*mark))) for mark in MARKS]
@@ -102,7 +103,7 @@ def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 
 
 
 def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """float64[V]: distances to the true places along the surface, in the surface's unit."""
+    """float64[V]: distances from the true places in tangent planes, in the surface's unit."""
     normals = Surface(true, template.triangles).normals()
     away = found - true
     return np.linalg.norm(away - (away * normals).sum(1, keepdims=True) * normals, axis=1)
@@ -110,7 +111,7 @@ def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray
 
 @functools.cache
 def generator():
-    """The data of the generator's people; without the data, the test is skipped."""
+    """The data of the generator's people; without this data, the test is skipped."""
     import sample_people
 
     return sample_people.data()
@@ -165,9 +166,10 @@ def skin_of(person, source) -> Surface:
 
 
 def remeshed(skin: Surface, share: float = 0.5, seed: int = 0) -> Surface:
-    """The same surface with new vertices at random places of edges, simplified afterwards.
+    """The same surface, subdivided at random places of its edges and then simplified.
 
     Args:
+        skin: the surface.
         share: number of triangles of the result, relative to the skin's.
         seed: seed of the random places.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions that replace the work of batch workers in tests: slow, or killing their process."""
+"""Functions that replace the work of batch workers in tests: slow work, failing workers."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def slow(job, threads=1):
 
 
 def deadly(job, threads=1):
-    """Kill the worker in the middle of writing a file, if the clip is named deadly."""
+    """Work that kills its worker in the middle of writing a file, if the clip is named deadly."""
     if job.clip.stem == "deadly":
         path = job.outputs[0][1]
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,7 @@ def deadly(job, threads=1):
 
 
 def deadly_once(job, threads=1):
-    """Like deadly, but only one worker dies, even if two run such a job at the same time."""
+    """Work that kills only the first worker that gets a clip named deadly, even of two at once."""
     if job.clip.stem == "deadly":
         with contextlib.suppress(FileExistsError):
             job.clip.with_suffix(".mark").touch(exist_ok=False)
@@ -40,7 +40,7 @@ def deadly_once(job, threads=1):
 
 
 def beside_deadly(job):
-    """The deadly job kills its worker each time; the other job waits for the third death."""
+    """Kill the worker if the job is the deadly one; any other job waits for the third death."""
     deaths = job.clip.with_name("deaths")
     if job.clip.stem == "deadly":
         with deaths.open("ab") as file:

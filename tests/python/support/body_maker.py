@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small bodies in glTF, written by the specification alone, whose vertices at rest are known."""
+"""Writes small glTF bodies by the specification, without a library, and knows their vertices."""
 
 import base64
 import json
@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-# name: parent, metres to the left, up, to the front
+# bone -> parent, then metres to the left, up, and to the front, from the origin
 BONES = {
     "Hips": ("", 0, 1.0, 0), "Spine": ("Hips", 0, 1.1, 0), "Spine1": ("Spine", 0, 1.25, 0),
     "Neck": ("Spine1", 0, 1.5, 0), "Head": ("Neck", 0, 1.6, 0.02),
@@ -28,10 +28,10 @@ TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])  # what exporters put abov
 
 
 class BodyFile:
-    """A body. `shown` has the vertices of each mesh at rest: name -> float64[V, 3] in metres."""
+    """A body file. shown: name of a mesh -> its vertices at rest in metres, float64[V, 3]."""
 
     def __init__(self, *, unit=1.0, back=False, eyes=False, prefix="mixamorig:"):
-        """unit: metres of a unit; back: looks against z; eyes: has bones of eyes."""
+        """unit: length of a unit in metres; back: the body looks along -z; eyes: add eye bones."""
         self.json = {"asset": {"version": "2.0"}, "nodes": [], "accessors": [], "bufferViews": [],
                      "meshes": [], "skins": [], "scene": 0, "scenes": [{"nodes": [0]}]}  # fmt: skip
         self.binary, self.shown = b"", {}
@@ -80,7 +80,7 @@ class BodyFile:
         )
 
     def add_skinned(self, name, places, joints, targets=()):
-        """The mesh lies in its own space, turned and moved."""
+        """Add a skinned mesh whose vertices are stored in a rotated, moved and scaled space."""
         space = np.eye(4)
         space[:3, :3], space[:3, 3] = 2.0 * TURN.T, [0.1, 0.2, 0.3]
         own = np.c_[places, np.ones(len(places))] @ np.linalg.inv(space).T

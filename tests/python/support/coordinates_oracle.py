@@ -25,7 +25,7 @@ ALL_SIGNS = list(itertools.product((1, -1), repeat=3))
 
 @dataclass(frozen=True)
 class System:
-    """Axes, rotations and units of a file, in Dna's spelling."""
+    """Axes, rotations and units of a file, with the values that Dna uses."""
 
     coordinate_system: tuple = ("right", "up", "front")
     rotation_sequence: str = "xyz"
@@ -47,7 +47,7 @@ def system_of(dna):
 
 
 def random_system(rng):
-    """A random system of all axes, sequences, signs, windings and units."""
+    """A random choice of axes, rotation sequence, rotation signs, winding order and units."""
     return System(
         ALL_AXES[rng.integers(48)],
         ALL_SEQUENCES[rng.integers(6)],
@@ -57,25 +57,25 @@ def random_system(rng):
 
 
 def change(source, target):
-    """The matrix C from source to target, float64[3, 3]."""
+    """The matrix C that converts row vectors from source axes to target axes, float64[3, 3]."""
     rows = [np.array([DIRECTIONS[a] for a in s.coordinate_system], float) for s in (source, target)]
     return rows[0] @ rows[1].T
 
 
 def scale_of_unit(source, target):
-    """The factor for lengths from source to target."""
+    """The factor that converts lengths from the source's unit to the target's unit."""
     centimetres = {"cm": 1.0, "m": 100.0}
     return centimetres[source.translation_unit] / centimetres[target.translation_unit]
 
 
 def radians(system, angles):
-    """Convert stored angles to signed angles in radians about the system's axes."""
+    """Convert a file's angles to radians about the system's axes, with rotation signs applied."""
     unit = np.pi / 180 if system.rotation_unit == "degrees" else 1.0
     return np.asarray(angles, float) * system.rotation_signs * unit
 
 
 def rotation(system, angles):
-    """Rotation matrix of stored angles [..., 3] -> [..., 3, 3]."""
+    """Rotation matrices for row vectors [..., 3, 3] of angles of a file [..., 3]."""
     angles = radians(system, angles)
     out = np.broadcast_to(np.eye(3), (*angles.shape, 3))
     for name in system.rotation_sequence:
@@ -91,19 +91,19 @@ def rotation(system, angles):
 
 
 def mapped_rotation(c, matrices):
-    """The rotation matrices in the new axes: transpose(C) R C."""
+    """Rotation matrices R in the target axes of change(): transpose(C) R C."""
     return c.T @ matrices @ c
 
 
 def order_stays(source, target):
-    """Whether each Euler angle maps to a single one, because both apply the axes in one order."""
+    """Whether both systems rotate about the same axes in the same order: angles map one to one."""
     c = change(source, target)
     moved = ["xyz"[int(np.argmax(np.abs(c["xyz".index(a)])))] for a in source.rotation_sequence]
     return "".join(moved) == target.rotation_sequence
 
 
 def local_matrices(dna, deltas=None):
-    """Matrices relative to the parents, float64[joints, 4, 4]: scale, rotate, translate.
+    """Joint matrices relative to the parents, float64[joints, 4, 4]: scale, rotate, translate.
 
     deltas: float[joints, 9], added to the neutral pose, in the file's units; None: neutral pose.
     """
@@ -124,7 +124,7 @@ def local_matrices(dna, deltas=None):
 
 
 def world_matrices(dna, deltas=None):
-    """World matrices, float64[joints, 4, 4]; parents may come after their children."""
+    """World matrices of joints, float64[joints, 4, 4]; a parent's index may exceed its child's."""
     local = local_matrices(dna, deltas)
     parents = np.asarray(dna.joint_parents)
     world = [None] * len(local)
@@ -141,7 +141,7 @@ def world_matrices(dna, deltas=None):
 
 
 def mapped_world(source, target, matrices):
-    """World matrices in the target system: inverse(C) M C, with translations in its unit."""
+    """World matrices M in the target system: inverse(C) M C, with translations in its unit."""
     c = np.eye(4)
     c[:3, :3] = change(source, target)
     out = np.linalg.inv(c) @ matrices @ c

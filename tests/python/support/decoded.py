@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Converts a Dna to the JSON form of the reference's golden files, by index or by name.
 
-A LOD filter of the reference keeps some indices of the complete file (design ruling 1), so filtered
-files are compared by the names of the elements.
+A LOD filter of the reference does not renumber some indices of the complete file, so filtered files
+are compared by the names of the elements.
 """
 
 import gzip
@@ -28,7 +28,7 @@ def listed(array):
 
 
 def lods(mapping, name, lod_count):
-    """A LOD mapping in the form of the golden files: number of rows, and the list of each LOD."""
+    """The number of rows of a LOD mapping and the indices of each LOD, as in golden files."""
     rows = [listed(mapping[lod]) for lod in range(min(lod_count, len(mapping)))]
     return {
         f"{name}IndexListCount": len(mapping.rows),
@@ -61,7 +61,7 @@ def descriptor(dna):
 
 
 def pairs_in_lods(dna):
-    """For each LOD the entries of the mesh/channel mapping whose mesh and channel it lists."""
+    """For each LOD, indices of the mesh/channel pairs whose mesh and channel belong to the LOD."""
     pairs = listed(dna.mesh_blend_shape_channel_mapping)
     return [
         [
@@ -311,7 +311,7 @@ def with_defaults(view, dna):
 
 
 def stride(keys, values):
-    """Numbers per joint in the ext layer: 10 if rotations are quaternions, otherwise 9."""
+    """Values per joint in layer `ext` of ML: 10 if rotations are quaternions, otherwise 9."""
     quaternions = any(k == 1 and v == 1 for k, v in zip(keys, values, strict=True))
     return 10 if quaternions else 9
 
@@ -329,13 +329,14 @@ class Names:
 
 
 def by_name(view, unmapped=None):
-    """Replace indices in the view by names.
+    """Replace indices in a decoded file by names.
 
     Args:
         view: result of decoded(), or a decoded golden file.
-        unmapped: Names of the unfiltered file, for indices that the reference does not change:
-            outputs of channels and animated maps, channels of targets, networks; default: the
-            view's own.
+        unmapped: Names of the unfiltered file, for indices that the reference's LOD filter does not
+            change: outputs of channels and animated maps, channels of targets, networks. None: use
+                the
+            names of `view`.
     """
     own = Names(view)
     old = unmapped or own
@@ -415,7 +416,7 @@ def _group_by_name(g, own):
 
 
 def _outputs_by_name(behavior, name, old, kept):
-    """The entries of each LOD whose output is kept, with the name of the output."""
+    """For each LOD, the entries whose output is in `kept`, with names of outputs, not indices."""
     fields = [
         k
         for k in behavior
@@ -443,7 +444,7 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Operations with the contents of their networks instead of indices, without LOD row counts."""
+    """Operations with the contents of networks, without network indices and LOD row counts."""
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

@@ -2,8 +2,8 @@
 """Computes vertices of a DNA file from its bytes, with struct and NumPy, without Risorius.
 
 Written from the description of the format (big-endian; an index table of layers; sections of
-lists), for files from version 2.2 on with Euler angles in the order x y z, positive signs, and a
-behavior of raw controls, correctives (products), joint groups and blend shapes.
+lists). Reads files from version 2.2 on that rotate in the order x, y, z with positive signs, and
+whose behavior has only raw controls, correctives (products), joint groups and blend shapes.
 """
 
 import struct
@@ -132,7 +132,7 @@ class Face:
         self._ends("geom", c)
 
     def _controls(self, raw):
-        """Raw controls by name, followed by correctives: clamped products of their inputs."""
+        """All controls: raw controls (others 0), then correctives as clamped products of inputs."""
         out = np.zeros(len(self.raw) + self.correctives)
         for name, value in raw.items():
             out[self.raw.index(name)] = value
@@ -145,7 +145,7 @@ class Face:
         return out
 
     def _world(self, delta):
-        """World matrices of joints, float64[J, 4, 4], for row vectors: v' = v M."""
+        """World matrices of joints in the neutral pose plus `delta`, float64[J, 4, 4]: v' = v M."""
         angles = self.rotations + delta[:, 3:6]
         angles = np.radians(angles) if self.degrees else angles
         out = []
@@ -164,7 +164,7 @@ class Face:
         return np.array(out)
 
     def vertices(self, raw, lod=0):
-        """Vertices of all meshes of a LOD, joined, float64[V, 3].
+        """Posed vertices of all meshes of a LOD, concatenated, float64[V, 3].
 
         Args:
             raw: raw control -> value; all others are 0.

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-# espeak's names of the sounds of its American voice, by viseme class. The classes follow phonetics,
-# not a recogniser. A diphthong has the class of its nucleus.
+# Viseme class -> espeak's names of the sounds of its American voice. The classes follow phonetics,
+# not the output of a recogniser. A diphthong has the class of its nucleus.
 CLASSES = {
     "sil": "_ _: _:: _! _| ?",
     "PP": "p b m m-",
@@ -33,14 +33,14 @@ CLASSES = {
 }
 CLASS_OF = {name: viseme for viseme, names in CLASSES.items() for name in names.split()}
 
-# Sounds that begin with a closed mouth: espeak reports the time of the burst, and counts the
-# silence of the closure to the previous sound.
+# Sounds that begin with a closed mouth. espeak reports the time at which the mouth opens again; the
+# silence before it belongs to the previous sound.
 STOPS = {"p", "b", "t", "d", "k", "g", "tS", "dZ", "t2"}
 
 
 @dataclass
 class Spoken:
-    """Sounds with times: sound i lasts from times[i] to times[i + 1] seconds."""
+    """Speech with its sounds: sound i lasts from times[i] to times[i + 1], in seconds."""
 
     rate: int
     samples: np.ndarray  # int16
@@ -48,7 +48,7 @@ class Spoken:
     times: list[float]
 
     def classes(self, at: np.ndarray) -> np.ndarray:
-        """The viseme class at each time in seconds, as strings."""
+        """The viseme class at each time in seconds, as an array of strings."""
         visemes = np.array([CLASS_OF[name] for name in self.names])
         place = np.searchsorted(self.times, at, side="right") - 1
         found = visemes[np.clip(place, 0, len(visemes) - 1)]
@@ -100,7 +100,7 @@ def is_installed() -> bool:
 
 
 def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> Spoken:
-    """Speak a text.
+    """Synthesise a text.
 
     Args: voice with its variant (en-us+f2), speed in words per minute, pitch 0 to 100.
     """
@@ -135,7 +135,7 @@ def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> S
 
 
 def _with_closures(samples, rate, names, times):
-    """Begin times in seconds; the silence before a stop is counted to it, except after a pause."""
+    """Begins of sounds in seconds; a stop includes the silence before it, except after a pause."""
     moved = list(times)
     for i in range(1, len(names)):
         if names[i] in STOPS and CLASS_OF[names[i - 1]] != "sil":

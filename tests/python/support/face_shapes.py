@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face by formula with 506 vertices and expressions: half an ellipsoid, 26 cm high."""
+"""Makes a face by formula: half an ellipsoid, 25 cm high, with 506 vertices and expressions."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ ACROSS, DOWN = 23, 22
 
 
 def head():
-    """Positions float64[V, 3] in cm, and quads int[F, 4]."""
+    """Vertices float64[V, 3] in cm and quads int[F, 4] of the face."""
     u, v = np.meshgrid(np.linspace(-1.3, 1.3, ACROSS), np.linspace(1.3, -1.3, DOWN))
     x, y = 8 * np.sin(u) * np.cos(v), 13 * np.sin(v)
     z = 10 * np.cos(u) * np.cos(v)
@@ -52,7 +52,7 @@ def write_obj(path, positions, faces):
 
 
 def write_all(folder, joints=40, more=""):
-    """Write neutral.obj, shapes/*.obj and spec.toml. Returns the path of spec.toml."""
+    """Write neutral.obj, shapes/*.obj and spec.toml to a folder. Returns the path of spec.toml."""
     positions, faces = head()
     (folder / "shapes").mkdir(parents=True)
     write_obj(folder / "neutral.obj", positions, faces)

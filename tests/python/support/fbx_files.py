@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Writes binary FBX in the layout of Autodesk's SDK, limited to the parts that the reader uses.
 
-Header, records of (end, count, length, name), values by type letter, arrays packed with zlib from
-128 bytes on, an empty record at the end of each list; 32 bit offsets to version 7.4, 64 bit from
-7.5. An animated user property belongs to its node; its curve is linked to a curve node through
-"d|NAME", and the curve node to the node through "NAME", as by Unreal's exporter for float curves.
-Key times are in units of 1/46186158000 s; slopes after a key and before the next are per second.
+A file has a header and records of (end, count, length, name). Values begin with a type letter,
+arrays from 128 bytes on are compressed with zlib, and an empty record ends each list. Offsets have
+32 bits up to version 7.4, and 64 bits from 7.5 on. An animated user property belongs to its node;
+its curve is linked to a curve node through "d|NAME", and the curve node to the node through "NAME",
+as in float curves of Unreal's exporter. Key times are in units of 1/46186158000 s; the slopes after
+a key and before the next key are per second.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ USER, AUTO = 0x400, 0x100
 
 
 class I64(int):
-    """A 64-bit integer; other integers are written with 32 bits."""
+    """An integer that is written with 64 bits; other integers are written with 32 bits."""
 
 
 def value(v) -> bytes:
@@ -63,7 +64,7 @@ def fbx(tops, version: int = 7400) -> bytes:
 
 
 def curve(identity: int, times, values, flags=LINEAR, slopes=None):
-    """An AnimationCurve; slopes: float[keys, 2], after the key and before the next key."""
+    """Record of an AnimationCurve. slopes: float[keys, 2], after the key and before the next."""
     count = len(times)
     data = np.zeros((count if slopes is not None else 1, 4), "<f4")
     if slopes is not None:
@@ -85,7 +86,7 @@ def curve(identity: int, times, values, flags=LINEAR, slopes=None):
 
 
 def animation(tracks, *, version=7400, stacks=("Take 001",), time_mode=3):
-    """An FBX file. Args: tracks: (kind, object, property, {component: AnimationCurve}, stack)."""
+    """Bytes of an FBX file. tracks: (kind, object, property, {component: curve record}, stack)."""
     objects, links, ids = [], [], iter(range(1000, 9999))
     layers, owners = [], {}
     for name in stacks:

@@ -12,7 +12,7 @@ import risorius
 
 
 def full() -> risorius.Dna:
-    """2 LODs, 3 joints, 2 meshes; controls: raw 0-4, correctives 5-6, networks 7-8, poses 9-10."""
+    """A Dna with 2 LODs and controls: raw 0-4, correctives 5-6, networks 7-8, RBF poses 9-10."""
     dna = risorius.Dna(
         name="full", archetype="other", gender="female", age=30, metadata={"a": "1", "b": "2"},
         translation_unit="cm", rotation_unit="degrees", coordinate_system=("right", "up", "front"),
@@ -215,7 +215,7 @@ def changed(dna: risorius.Dna, path: tuple[Step, ...], value: Any) -> risorius.D
 
 
 def others(value: Any) -> Iterator[Any]:
-    """Values that differ slightly from this one and are mostly valid in its place."""
+    """Values that differ slightly from a given value and are mostly valid in the same field."""
     if isinstance(value, bool | int):
         yield from (value + 1, max(0, value - 1))
     elif isinstance(value, float):

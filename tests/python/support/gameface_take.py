@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compares a .glb's weighted morph targets, as a client adds them, with the evaluated rig."""
+"""Compares a .glb's sum of weighted morph targets, as a client computes it, with the rig."""
 
 import json
 
@@ -13,7 +13,7 @@ from risorius.gameface.targets import find_targets
 
 
 def units_of(take):
-    """ARKit unit -> value, for each frame of a take of Live Link Face."""
+    """ARKit unit -> value in each frame of a Live Link Face recording."""
     clip = importing.read(take).clip
     lower = {name.lower(): row for name, row in zip(clip.names, clip.curves, strict=True)}
     rows = {unit: lower[unit.lower()] for unit in arkit.mapping()}
@@ -21,7 +21,7 @@ def units_of(take):
 
 
 def driven(weights, table):
-    """Target weights with the weights of combination targets, as combinations.js computes them."""
+    """Weights of all targets; combination targets get the weights that combinations.js computes."""
     out = dict(weights)
     for row in table["combinations"]:
         a, b, c = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0, 0.0)[:3]
@@ -37,7 +37,7 @@ def driven(weights, table):
 
 
 class Posed:
-    """The meshes of a .glb for target weights, and the rig's meshes in the same order."""
+    """Vertices of a .glb for target weights, and the rig's vertices in the same order."""
 
     def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
@@ -52,7 +52,7 @@ class Posed:
             self._where[mesh] = _nearest(self._own(mesh, rig.initial_raw_controls), rest)
 
     def targets(self, groups):
-        """The morph targets that the export finds for these groups."""
+        """The morph targets that the export finds for these groups of shapes."""
         return find_targets(self.rig, groups, "the face")[0]
 
     def sum(self, weights):
@@ -78,13 +78,13 @@ class Posed:
         return raws
 
     def _own(self, mesh, raw):
-        # The sample has the axes of glTF, but centimetres instead of metres.
+        # The sample face has glTF's axes and centimetres, so only its unit is converted to metres.
         found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
         return found * self._sides / 100
 
 
 def frames(path, take, *, lod, every):
-    """For every `every`-th frame: errors of the sum and of the sum with combinations, in mm."""
+    """Largest errors in mm, float64[n, 2], of the sum without and with combination targets."""
     dna, rig = risorius.load(path), risorius.compile_cached(path)
     made = export(dna, rig, path, "face.glb", Wishes(shapes=("arkit",), lod=lod, within=0.5))
     table = json.loads(made.files["face.combinations.json"])
@@ -102,7 +102,7 @@ def _apart(a, b):
 
 
 def _nearest(points, wanted):
-    """The index of the point nearest to each wanted place, int64[n]."""
+    """For each wanted place, the index of the nearest of the points, int64[n]."""
     out = np.empty(len(wanted), np.int64)
     for begin in range(0, len(wanted), 256):
         part = wanted[begin : begin + 256]

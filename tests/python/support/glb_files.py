@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes GLB files for tests, with or without compression, such as the head of face_shapes."""
+"""Writes GLB files for tests, with or without compression."""
 
 import json
 import struct
@@ -14,7 +14,7 @@ MESHOPT = "EXT_meshopt_compression"
 
 
 class Glb:
-    """A GLB that is built piece by piece."""
+    """A GLB to which views and accessors are added one after the other."""
 
     def __init__(self):
         self.binary = b""
@@ -26,7 +26,8 @@ class Glb:
     def packed(self, data, stride, mode="ATTRIBUTES", filter_name="NONE", seen=True):
         """Add a view compressed by meshoptimizer, like gltfpack; its fallback buffer has no data.
 
-        `filter_name` names the filter that was already applied to the data.
+        `filter_name` names the filter that was already applied to the data. seen: state a
+        byteStride.
         """
         count = len(data) // stride
         packed = _native.pack_buffer(data, count, stride, mode, filter_name)
@@ -103,7 +104,7 @@ def world(points):
 
 
 def egg(path, *, sparse=True, change=None, matrices=None):
-    """Write the head of face_shapes as two primitives; vertices of its second column are double."""
+    """Write the head of face_shapes as two primitives; the second one uses duplicated vertices."""
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

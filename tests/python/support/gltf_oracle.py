@@ -38,7 +38,7 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """The numbers of an accessor as float[n, k], after a check of its stated min and max."""
+        """Values of an accessor, float64[n, k]; asserts that they have the stated min and max."""
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]
         out = np.zeros((about["count"], width), kind)
@@ -77,7 +77,12 @@ class GlbFile:
         """Vertices of a mesh in the scene, float64[V, 3], for weights of its targets.
 
         Args:
-            world: node index -> float64[4, 4], world matrices of joints; None: at rest."""
+            name: name of the node that has the mesh.
+            weights: morph target -> weight; all others are 0.
+            kind: attribute of the vertices to return; only positions are moved into the scene.
+            world: node index -> float64[4, 4], world matrices of joints; None: at rest.
+
+        """
         node, mesh = self.meshes()[name]
         [primitive] = mesh["primitives"]
         out = self.numbers(primitive["attributes"][kind])

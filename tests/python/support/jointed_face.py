@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A complete face by formula: 62 joints, 9 correctives, a neck solver, animated maps, 3 LODs."""
+"""Makes a complete face by formula: 62 joints, 9 correctives, a neck solver, a map and 3 LODs."""
 
 import face_shapes
 import numpy as np
@@ -19,7 +19,7 @@ TURNS = [f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw"]
 
 
 def build() -> risorius.Dna:
-    """Build the face; joints of both sides move symmetrically."""
+    """Build the face; joints of both sides move symmetrically, except for a noise of 0.004 cm."""
     positions, _ = face_shapes.head()
     moved = face_shapes.expressions(positions)
     names = list(moved)
@@ -50,7 +50,7 @@ def build() -> risorius.Dna:
 
 
 def _skin_places(positions):
-    """Places of skin joints: pairs of both sides, then places on the middle line."""
+    """Places of skin joints: pairs on both sides, four on the middle line, one above these."""
     grid = positions.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)
     right = grid[2::4, 1:11:2].reshape(-1, 3)[:24]
     middle = grid[2::5, face_shapes.ACROSS // 2][:4]
@@ -109,7 +109,8 @@ def _meshes(dna, positions, places, moved):
 def _behavior(dna, positions, skin, moved, raw):
     names, first = list(moved), len(NAMED)
     dna.gui_to_raw = _ramp(range(len(names)), range(len(names)))
-    # Correctives of two and three factors; one is a factor of another, one reads a solver's pose.
+    # Correctives with two or three factors. The sixth and the seventh also have the factors of an
+    # earlier one, the eighth reads a corrective, and the ninth reads the pose of a solver.
     on = [(0, 1), (2, 3), (4, 5), (0, 2), (1, 3), (0, 1, 6), (2, 3, 6), (raw + 1, 4), (raw + 9, 6)]
     dna.psd_count = len(on)
     dna.psds = risorius.Psds(
@@ -121,7 +122,8 @@ def _behavior(dna, positions, skin, moved, raw):
     rng = np.random.default_rng(1)
     nearest = [int(np.linalg.norm(positions - place, axis=1).argmin()) for place in skin]
     shifts = [moved[name][nearest] for name in names]
-    # Later correctives move less, except for the last one.
+    # Each corrective moves the joints by a smaller fraction of a control's shift; the last one
+    # moves them by the whole shift of the first control.
     shifts += [0.2 / (i + 1) * shifts[i % len(names)] for i in range(len(on) - 1)] + [shifts[0]]
     values = np.concatenate(shifts, axis=1).reshape(len(skin), len(shifts), 3).transpose(0, 2, 1)
     columns = [*range(len(names)), *range(raw, raw + len(on))]

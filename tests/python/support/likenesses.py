@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads by formula with the meshes and shape names of other programs, saved as GLB."""
+"""Makes heads by formula, with mesh and shape names of other programs, and saves them as GLB."""
 
 import json
 import struct
@@ -7,8 +7,8 @@ import struct
 import face_shapes
 import numpy as np
 
-# Name of a direction -> rotation of a head that looks along +z, with y up and x left; rows are
-# the images of x, y and z.
+# Direction in which a head looks -> rotation of a head that looks along +z, with y up and its left
+# side at +x. Rows are the images of the axes x, y and z.
 STANDS = {
     "+z": np.eye(3),
     "-z": np.array([[-1, 0, 0], [0, 1, 0], [0, 0, -1]]),
@@ -60,7 +60,7 @@ def joined(*pieces):
 
 
 def skull(lopsided=False):
-    """(positions, triangles, shapes) of the face of face_shapes with a nose and a skull."""
+    """(positions, triangles, shapes): the face of face_shapes, with a nose and a closed skull."""
     points, quads = face_shapes.head()
     moved = face_shapes.expressions(points)
     nose = face_shapes.bump(points, 0, -1, 2.0)[:, None] * [0, 0, 2.5]
@@ -79,7 +79,7 @@ def eyes():
 
 
 def teeth():
-    """(positions, triangles) of the upper teeth, then of the lower teeth."""
+    """The upper and the lower row of teeth, each as (positions, triangles)."""
     return slab([-2, -4.5, 5], [2, -3.2, 7]), slab([-2, -8, 5], [2, -6.8, 7])
 
 
@@ -90,7 +90,7 @@ def mesh(name, geometry, shapes=None, **more):
 
 
 def with_moving_teeth(shapes):
-    """Both rows of teeth as one mesh, and its shapes: the lower row moves with the jaw."""
+    """Both rows of teeth as one mesh, and its shapes; only jawOpen rotates the lower row."""
     whole, faces = joined(*teeth())
     half = len(whole) // 2
     hinge, angle = np.array([0, 0, -2.0]), 0.3
@@ -105,7 +105,7 @@ def with_moving_teeth(shapes):
 
 
 def ready_player(lopsided=False):
-    """Like Ready Player Me: head, eyes and teeth with equal targets, hair and body without any."""
+    """Like Ready Player Me: head, eyes and teeth have equally named shapes, hair and body none."""
     points, faces, shapes = skull(lopsided)
     left, right = eyes()
     none = {name: np.zeros_like(left[0]) for name in shapes}
@@ -125,7 +125,7 @@ def rename(shapes, names):
 
 
 def vroid():
-    """Like VRoid: a face mesh with Fcl names and four materials, still teeth, hair, and a body."""
+    """A head like VRoid's: the face has three Fcl shapes; hair and body have no shapes."""
     points, faces, shapes = skull()
     told = {"jawOpen": "Fcl_MTH_A", "eyeBlinkLeft": "Fcl_EYE_Close_L",
             "eyeBlinkRight": "Fcl_EYE_Close_R"}  # fmt: skip
@@ -137,7 +137,7 @@ def vroid():
 
 
 def everything_in_one():
-    """Like ICT FaceKit: a face with eyes and teeth as islands of the same mesh."""
+    """A head like ICT FaceKit's: one mesh with face, eyes and teeth as separate islands."""
     points, faces, shapes = skull()
     row, moved = with_moving_teeth(shapes)
     whole = joined((points, faces), *eyes(), row)
@@ -150,7 +150,7 @@ def everything_in_one():
 
 
 def face_cap():
-    """Like Face Cap: a head with names such as browDown_L; eyes and teeth have no shapes."""
+    """A head like Face Cap's with shape names such as browDown_L; eyes and teeth have no shapes."""
     points, faces, shapes = skull()
     spelled = {n: n.replace("Left", "_L").replace("Right", "_R") for n in shapes}
     return [
@@ -163,7 +163,7 @@ def face_cap():
 
 
 def placed(meshes, stand="+z", scale=0.01, shift=(0, 0, 0)):
-    """The meshes rotated by STANDS[stand], then scaled and shifted."""
+    """Meshes rotated by STANDS[stand], then scaled and shifted."""
     turn = STANDS[stand].T * scale
     return [
         {**m, "points": m["points"] @ turn.T @ np.eye(3) + shift,

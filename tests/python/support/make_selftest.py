@@ -4,8 +4,8 @@
     python tests/python/support/make_selftest.py
 
 For each face of COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases
-that the reference is known to evaluate differently (test_rig_behavior.py explains them) are left
-out. Their number is printed; a larger number than before indicates a mistake in Risorius.
+that the reference is known to evaluate differently (test_rig_behavior.py explains them) are
+omitted. Their number is printed; a larger number than before indicates a mistake in Risorius.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ CASES = 12  # per face, evenly spread over its golden cases
 
 
 def rows_of(name):
-    """Rows of float32 (lod, raw, joints, shapes, maps), and how many are left out."""
+    """Float32 rows (lod, raw, joints, shapes, maps) of golden cases, and the number omitted."""
     dna = risorius.load(SOURCE / f"{name}.dna")
     rig = risorius.Rig(dna, simd="scalar")
     golden = Golden(SOURCE, name)

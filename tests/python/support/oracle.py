@@ -2,9 +2,9 @@
 """Evaluates DNA files in double precision, directly by the semantics of the format.
 
 It shares no code with the native evaluator and does not optimise. For each value it also returns a
-bound of the float32 error: a sum of n products rounded in any order errs by at most
-(n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by (factors +
-1) * eps relative.
+bound of the float32 error. A sum of n products k x, rounded in any order, errs by at most
+(n + 1) * eps * sum|k x|. The inputs of a sum are correctives, whose relative error is already
+(number of factors + 1) * eps.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ def correctives(dna, controls, used, settle):
 
 
 def used_controls(dna, lod):
-    """The set of control indices that are read at the LOD."""
+    """The set of indices of controls that joints, shapes or maps read at the LOD."""
     used = set()
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
@@ -72,7 +72,7 @@ def used_controls(dna, lod):
 
 
 def rotation_matrix(dna, angles):
-    """Row-vector rotation matrix of Euler angles in the file's sequence, signs and unit."""
+    """Rotation matrix for row vectors, from Euler angles in the file's sequence, signs and unit."""
     out = np.eye(3)
     for axis in ("xyz".index(a) for a in dna.rotation_sequence):
         angle = angles[axis] * dna.rotation_signs[axis]
@@ -85,7 +85,7 @@ def rotation_matrix(dna, angles):
 
 
 def matrix_to_quaternion(m):
-    """Quaternion (axis * sin, cos) of half the angle with w >= 0, as eigenvector of a matrix."""
+    """Quaternion x y z w with w >= 0 of a rotation matrix, as the eigenvector of a 4 x 4 matrix."""
     k = np.zeros((4, 4))
     k[:3, :3] = m.T + m - np.trace(m) * np.eye(3)
     k[3, :3] = k[:3, 3] = [m[1, 2] - m[2, 1], m[2, 0] - m[0, 2], m[0, 1] - m[1, 0]]
@@ -95,7 +95,7 @@ def matrix_to_quaternion(m):
 
 
 def quaternion_to_matrix(q):
-    """Row-vector rotation matrix of a unit quaternion."""
+    """Rotation matrix for row vectors, from a unit quaternion x y z w."""
     x, y, z, w = q
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return (np.eye(3) + 2 * w * cross + 2 * cross @ cross).T
@@ -108,10 +108,11 @@ def is_quaternion(dna, joint):
 
 
 def column_order(dna, group):
-    """Columns that rotate quaternion joints, in the order that the reference stores them.
+    """Columns of a joint group that rotate quaternion joints, in the reference's order.
 
-    For each LOD, finest first: search backwards from the end for a column that is zero in all
-    rotation rows of the LOD, swap it with the column at the end, and move the end back by one.
+    The order is built for each LOD, finest first: search backwards from the end for a column that
+    is zero in all rotation rows of the LOD, swap it with the column at the end, and move the end
+    back by one.
     """
     matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
     turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]
@@ -131,8 +132,9 @@ def column_order(dna, group):
 def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     """Calculate in place the Euler angles of the joints that the file declares as quaternions.
 
-    Bound: float32 products of n unit quaternions err by about 8 (n + 2) eps, the reference's arc
-    sine by 1e-6; both are divided by the squared cosine of the middle angle.
+    Also sets their error bounds: float32 products of n unit quaternions err by about 8 (n + 2) eps,
+    the reference's arc sine by 1e-6; both are divided by the squared cosine of the middle Euler
+    angle.
     """
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)

@@ -2,8 +2,8 @@
 """Evaluates networks, RBF solvers, twist/swing setups and rotations in double precision.
 
 It has no schedule: a frame runs networks, then solvers, then correctives, in the order of the file.
-Values that are computed later in a frame are read from the frame before. A pose is settled when a
-frame repeats itself. Quaternions are rows x y z w.
+A value that is computed later in a frame is read from the previous frame. A pose is settled when a
+frame changes no control. Quaternions are rows x y z w.
 """
 
 import numpy as np
@@ -15,9 +15,10 @@ SEQUENCES = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 
 
 def multiply(a, b):
-    """The product of quaternions, [..., 4]."""
-    # Written out, because np.cross of three numbers takes fifty times as long, and NumPy scalars
-    # ten times.
+    """The products of quaternions, float64[..., 4]."""
+    # The formula is written out, because np.cross of three numbers takes fifty times as long.
+    # Single quaternions are converted to Python floats, because NumPy scalars take ten times as
+    # long.
     single = np.ndim(a) == np.ndim(b) == 1
     (ax, ay, az, aw), (bx, by, bz, bw) = (
         map(float, q) if single else np.transpose(q) for q in (a, b)
@@ -40,7 +41,7 @@ def unit(q):
 
 
 def from_euler(sequence, signs, angles):
-    """Quaternions [..., 4] of angles [..., 3] in radians, in the order of the sequence."""
+    """Quaternions [..., 4] of Euler angles [..., 3] in radians, applied in the sequence's order."""
     angles = np.asarray(angles, float)
     q = np.broadcast_to([0, 0, 0, 1.0], (*angles.shape[:-1], 4))
     for axis in ("xyz".index(a) for a in sequence):
@@ -159,7 +160,7 @@ def run_networks(dna, lod, c, masks):
 
 
 def reduced(q, method, axis):
-    """The swing (method 2) or the twist (method 3) of a quaternion."""
+    """The twist about the axis (method 3) or the remaining swing (method 2) of a quaternion."""
     if method < 2:
         return q
     twist = np.zeros(4)
@@ -171,7 +172,8 @@ def reduced(q, method, axis):
         return twist / length
     if length == 0:
         return q
-    # q times the inverse of its twist, with the opposite sign
+    # the swing is q times the inverse of its twist; its sign is opposite, which is the same
+    # rotation
     return -multiply(q, conjugate(twist)) / length
 
 
@@ -191,7 +193,7 @@ def kernel(function, d, r):
 
 
 class Solver:
-    """A solver's targets and matrix, computed once."""
+    """An RBF solver with its target poses and the matrix of their kernel values, computed once."""
 
     def __init__(self, dna, solver):
         self.solver = solver
@@ -264,7 +266,7 @@ def initial_controls(dna, count):
 
 
 def frame(dna, solvers, c, lod, masks=None):
-    """Run one frame on the controls `c`, whose raw controls are set, and change `c` in place."""
+    """Run one frame with the raw controls in `c`, and set all other controls in `c`."""
     regions = sum(len(mesh) for mesh in dna.machine_learned_behavior.region_network_indices)
     run_networks(dna, lod, c, np.ones(regions) if masks is None else masks)
     run_solvers(dna, solvers, lod, c)
@@ -281,7 +283,7 @@ def used_controls(dna, lod):
 
 
 def settled(dna, solvers, raw, lod, count):
-    """The controls of the settled pose."""
+    """Controls after frames have been repeated until none changes a control."""
     c = initial_controls(dna, count)
     for _ in range(count + 2):
         c[: len(raw)] = raw
@@ -304,7 +306,7 @@ def ml_stride(dna):
 
 
 def blended(dna, group, joint, controls, order):
-    """The product of the rotations of a joint's columns, in this order."""
+    """Quaternion of a joint: the product of the rotations of its group's columns in this order."""
     matrix, outputs = np.asarray(group.values, float), np.asarray(group.output_indices)
     total = np.array([0, 0, 0, 1.0])
     for column in order:
@@ -333,7 +335,7 @@ def toward_identity(q, weight):
 
 
 def twist_swing_rotations(dna, c):
-    """joint -> quaternion of its twist or swing."""
+    """Joint index -> quaternion of its twist or swing setup."""
     out = {}
     layer = dna.twist_swing_behavior
     swung = [s.input_control_indices.tolist() for s in layer.swings]
@@ -354,7 +356,7 @@ def twist_swing_rotations(dna, c):
 
 
 def ml_values(dna, c, lod):
-    """joint -> (translation, quaternion, scale, Euler angles or None) in the file's system."""
+    """Joint -> ML (translation, quaternion, scale, Euler angles or None) in the file's axes."""
     joints, stride = dna.machine_learned_behavior_ext.joints, ml_stride(dna)
     settings = dict(
         zip(joints.parameter_keys.tolist(), joints.parameter_values.tolist(), strict=True)
@@ -388,7 +390,7 @@ def ml_values(dna, c, lod):
 
 
 def joints(dna, c, lod, rotation):
-    """Joints of a pose from its controls: [J, 9] (Euler angles) or [J, 10] (quaternions)."""
+    """Joints of a pose from its controls, [J, 9] (Euler angles) or [J, 10] (quaternions)."""
     count = len(dna.joint_names)
     linear = np.zeros(count * 9)
     turned, q_of = {}, {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A simple face by formulas: a mask with two eyes and lids, a mouth and teeth, in cm.
+"""Makes a simple face by formulas: a mask with two eyes and lids, a mouth and teeth, in cm.
 
 Its expressions have the faults of a bad transfer: lids and lips that do not close completely.
 """
@@ -28,7 +28,8 @@ def mask(short=0.3, apart=0.2, *, painted=False):
     """Make the skin and its expressions.
 
     Args:
-        short: missing fraction of a complete blink, 0 to 1.
+        short: a blink moves the upper lid by (1.9 - short) times half the height of the eye
+            opening.
         apart: distance in cm between lips that should meet.
         painted: True: the skin has no eye openings.
     """
@@ -60,7 +61,7 @@ def mask(short=0.3, apart=0.2, *, painted=False):
 
 
 def _over_eye(points, side):
-    """Move skin in front of an eye at least 0.6 mm outside of the ball."""
+    """Move skin in front of an eye at least 0.6 mm outside of the eyeball."""
     middle = EYE * [side, 1, 1]
     flat = points[:, :2] - middle[:2]
     inside = np.maximum((1.05 * RADIUS) ** 2 - (flat**2).sum(axis=1), 0)
@@ -70,7 +71,7 @@ def _over_eye(points, side):
 
 
 def _slit(points, faces):
-    """Cut the skin along the mouth: polygons below the line get copies of its vertices."""
+    """Cut the skin along the mouth: polygons below the cut get copies of the vertices on it."""
     line = np.flatnonzero(
         (np.abs(points[:, 1] - MOUTH) < STEP / 4) & (np.abs(points[:, 0]) < HALF - STEP / 2)
     )
@@ -121,7 +122,7 @@ def part(name, points, faces):
 
 
 def ball(middle, radius, rings=14, around=18):
-    """Points and polygons of a sphere with poles in front and behind."""
+    """Points and polygons of a sphere whose poles are in front and behind."""
     t = np.linspace(0, np.pi, rings + 1)[1:-1]
     a = np.linspace(0, 2 * np.pi, around, endpoint=False)
     ring = np.stack(
@@ -142,7 +143,7 @@ def ball(middle, radius, rings=14, around=18):
 
 
 def arch(height, sign, depth=7.0):
-    """A row of teeth as a closed, bent box with counter-clockwise polygons."""
+    """A row of teeth as a closed, bent box; it extends from `height` up (sign 1) or down (-1)."""
     a = np.linspace(-1.2, 1.2, 13)
     rows = []
     for radius, y in ((2.2, 0), (2.2, 0.8), (1.7, 0.8), (1.7, 0)):
@@ -162,7 +163,7 @@ def arch(height, sign, depth=7.0):
 
 
 def eyes_and_teeth(named=True):
-    """Parts of two eyeballs and two rows of teeth; their names tell the kind only if `named`."""
+    """HeadParts of two eyeballs and two rows of teeth; names tell their kind only if `named`."""
     out = []
     for side, word in ((1, "Left"), (-1, "Right")):
         out.append(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sample people, read and assembled once for all tests.
+"""Returns sample people, which are read and assembled once for all tests.
 
 Tests must not change the returned objects, because later tests use them too.
 """
@@ -17,7 +17,7 @@ def _data():
 
 
 def data():
-    """The sample's CC0 data; without the data the test is skipped and reports NOT RUN."""
+    """The CC0 data of the sample people; without the data, the test is skipped as NOT RUN."""
     try:
         return _data()
     except source.SourceError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Skinning in float64, written from the format's description, and a small face to test it."""
+"""Computes skinning in float64 from the format's description, and makes a small face to test it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SIDE = 14  # vertices along a side of the face's patch
 
 
 def skinned(dna, pose, mesh=0):
-    """Vertices of a posed mesh in the file's units, float64[V, 3]; rotations in order xyz."""
+    """Vertices of a posed mesh in the file's units, float64[V, 3]; rotation order x, y, z."""
     geometry = dna.meshes[mesh]
     points = geometry.positions.astype(np.float64)
     for target in geometry.blend_shape_targets:
@@ -45,8 +45,8 @@ def small_face():
     """A bent patch of 14 x 14 vertices, 13 cm wide and symmetric, with 6 joints.
 
     Raw controls: jawOpen rotates a joint by 20 degrees; smileLeft and smileRight move two joints
-    aside and up by 1 cm; puff is a blend shape; jawOpenTwin equals jawOpen; idle does nothing;
-    widen scales a joint. A corrective of jawOpen and smileLeft is another blend shape.
+    sideways by 1 cm and up by 0.7 cm; puff is a blend shape; jawOpenTwin equals jawOpen; idle does
+    nothing; widen scales a joint. A corrective of jawOpen and smileLeft is another blend shape.
     """
     across, up = np.meshgrid(np.arange(SIDE) - (SIDE - 1) / 2, np.arange(SIDE), indexing="ij")
     places = np.stack([across, up, 4 - 0.08 * across**2], axis=-1).reshape(-1, 3)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times, keys, layers and tracks without Blender."""
+"""Computes times, keyframes, animation layers and NLA tracks; the code does not import bpy."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits Bezier curves with few keys to samples, within a tolerance of every sample."""
+"""Fits Bezier curves with few keyframes to samples, within a tolerance of every sample."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
-TOLERANCE = 0.005  # of the range 0 to 1 of a control
+TOLERANCE = 0.005  # largest error of a control, whose range is 0 to 1
 _LONGEST = 1000  # most samples between two keys
 _BETWEEN = 4.0  # factor of the tolerance that is allowed at midpoints between samples
 _HALVES = 0.1  # weight of a midpoint in the fit; a sample weighs 1
@@ -20,12 +20,13 @@ _ASIDE = np.array([1.0, 0.0])  # offset (frames, value) of the unused handles of
 
 @dataclass
 class Bezier:
-    """Keys of a Bezier curve.
+    """Keyframes of a Bezier curve, called keys here.
 
     Attributes:
-        co: float64[keys, 2], frames and values.
-        left, right: float64[keys, 2], the ends of the handles. Each lies a third of the way to the
-            next key: a curve's frame grows evenly along it, and its value is a cubic of the frame.
+        co: float64[keys, 2], frame and value of each key.
+        left, right: float64[keys, 2], frame and value of each handle's end. Its frame lies a third
+            of the way to the neighbouring key, so that the value is a cubic polynomial of the
+            frame.
     """
 
     co: Float
@@ -34,7 +35,7 @@ class Bezier:
 
 
 def straight(frames: Float, values: Float) -> Bezier:
-    """A key for each sample, with handles on the straight lines between them.
+    """A curve with a key for each sample, and handles on the straight lines between the keys.
 
     Args:
         frames: float64[n], ascending, n at least 1.
@@ -48,9 +49,9 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """Values of the Bernstein polynomials that all curves of the same frames share.
+    """Values of the cubic Bernstein polynomials for the fit of one cubic.
 
-    float64[m]: at the inner samples first, then at the midpoints between samples.
+    Each is float64[m]: values at the inner samples, then at the midpoints between samples.
     """
 
     near: Float
@@ -62,7 +63,10 @@ class _Basis(NamedTuple):
 
 
 class Fitter:
-    """Fits many curves; the matrix for n equally spaced samples is computed once."""
+    """Fits Bezier curves to samples.
+
+    Cubics through the same number of equally spaced samples share one matrix of least squares.
+    """
 
     def __init__(self, tolerance: float) -> None:
         """Args: tolerance  largest distance of a curve from a sample, above 0."""
@@ -73,16 +77,17 @@ class Fitter:
     def keys(self, frames: Float, values: Float) -> Bezier:
         """Fits keys and handles to samples.
 
-        From each key a cubic extends while it stays within the tolerance of all samples, and within
-        four times the tolerance of straight lines at midpoints.
+        From each key, a cubic covers as many later samples as it can. It may differ from a sample
+        by at most the tolerance. Midway between two samples, it may differ from their mean by at
+        most four times the tolerance.
 
         Args:
             frames: float64[n], ascending, n at least 1.
             values: float64[n], finite.
 
         Returns:
-            Bezier; each key has the value of its sample. Samples that stay within the tolerance of
-            the first have one key.
+            Bezier; each key has the value of its sample. If all samples are within the tolerance
+            of the first sample, the curve has one key.
         """
         known = frames.tobytes(), values.tobytes()  # left and right sides are mostly the same
         if known not in self._done:
@@ -96,7 +101,7 @@ class Fitter:
         return self.between(frames, values)
 
     def between(self, frames: Float, values: Float) -> Bezier:
-        """As `keys`, with a key at the first and the last sample, also if the values are constant.
+        """Like `keys`, but the first and the last sample have keys also if all values are equal.
 
         Args:
             frames: float64[n], ascending, n at least 2.
@@ -120,7 +125,11 @@ class Fitter:
     def _reach(
         self, frames: Float, values: Float, first: int, even: bool
     ) -> tuple[int, tuple[float, float]]:
-        """The last sample that one cubic from `first` reaches, and the values of its handles."""
+        """Find how many samples one cubic covers.
+
+        Returns: index of the last sample that a cubic from sample `first` covers, and the values
+        of the two handles of this cubic.
+        """
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)
         for last in range(first + 2, min(first + _LONGEST, len(frames) - 1) + 1):

@@ -51,7 +51,7 @@ class Timing:
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
-        """Keys at their own times, or moved to whole frames if `whole` is True.
+        """Frames and values of keys: unchanged, or on whole frames if `whole` is True.
 
         Args:
             frames: float[keys], frames of the scene.
@@ -64,8 +64,8 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
     """Convert samples at any time to keys on whole frames.
 
     Each sample gives a key on the whole frame before it and one on the frame after it. So there are
-    at most twice as many keys as samples, also with long pauses, and lines between keys equal lines
-    between samples at every whole frame.
+    at most twice as many keys as samples, even if pauses between samples are long. At every whole
+    frame, straight lines between keys have the values of straight lines between samples.
 
     Args:
         frames: float64[n], ascending; frames within a ten thousandth of a whole frame are rounded
@@ -73,7 +73,8 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
         values: float64[n] or float64[n, width].
 
     Returns:
-        Whole frames float64[m] and the values there; the first and the last value are held.
+        Whole frames float64[m] and the values there. Frames before the first sample or after the
+        last one get the value of that sample.
     """
     near = np.rint(frames)
     frames = np.where(np.abs(frames - near) < 1e-4, near, frames)
@@ -84,7 +85,7 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
 
 @dataclass
 class Curve:
-    """Keys of one F-curve: frames float64[n] and values float64[n]; one key where constant."""
+    """Keys of one F-curve: frames and values, float64[n] each; one key if all values are equal."""
 
     name: str
     frames: Float
@@ -93,13 +94,13 @@ class Curve:
 
 @dataclass
 class Keys:
-    """The keys of the action that a clip becomes.
+    """The keys of the action that is made from a clip.
 
     Attributes:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
             the control armature.
-        unknown: names of the clip without a control of this face.
+        unknown: names of curves in the clip for which this face has no control.
         dropped: number of samples that were not finite.
     """
 
@@ -110,13 +111,14 @@ class Keys:
 
 
 def property_names(dna_names: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
-    """Curve name -> slider, for names of the DNA file and Blender's shortened names.
+    """Map the name of a clip's curve to the property name of the slider that it drives.
 
-    If the DNA file has a name twice, it means the first control.
+    A curve may be named like a control in the DNA file or like the control's label in Blender. If
+    the DNA file contains a name twice, the curve drives the first control of that name.
 
     Args:
         dna_names: names of the controls in the DNA file.
-        labels: Blender's names of the same controls.
+        labels: Blender's names of the same controls, which are shortened and unique.
     """
     found = dict(zip(reversed(dna_names), reversed(labels), strict=True))
     found.update(zip(labels, labels, strict=True))

@@ -98,8 +98,8 @@ def dragged(pixels: float, per_unit: float, fine: bool) -> float:
     """The change of strength for a drag of the mouse.
 
     Args:
-        pixels: distance to the right since the last event, in pixels.
-        per_unit: pixels that a strength of 1 takes.
-        fine: True: the change is a tenth, as with Blender's sliders.
+        pixels: distance of the pointer to the right since the last event, in pixels.
+        per_unit: pixels for a change of the strength by 1.
+        fine: True: the change is a tenth of the normal change, as with Blender's sliders.
     """
     return pixels / per_unit * (0.1 if fine else 1.0)

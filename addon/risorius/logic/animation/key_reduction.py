@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Removes keys of baked curves that straight lines between the other keys replace."""
+"""Removes a baked curve's keyframes if straight lines between the other keyframes replace them."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def continuous(quaternions: Floats) -> Floats:
 def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
     """Find the keys that each curve has to keep.
 
-    All curves are processed together. Each curve keeps the range of slopes for which a line from
-    its last key passes all later values within the error. If a value lies outside this range, the
-    value before it becomes a key.
+    All curves are processed together. For each curve, a range of slopes is known for which a line
+    from its last key passes all later values within the error. If a value is outside of this
+    range, the value before it becomes a key.
 
     Args:
         frames: float[N], ascending.
@@ -67,7 +67,7 @@ def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kep
     still = np.abs(values - values[:1]).max(axis=0, initial=0.0) <= error
     if error > 0.0 and len(times) > 2:
         keep = _cones(times, values.astype(np.float64), error)
-        # All keys stay if rounding of the lines in float32 exceeds the error.
+        # Rounding to float32 can move a line beyond the error; then the curve keeps all keys.
         keep[:, np.abs(rebuilt(times, values, keep) - values).max(axis=0) > error] = True
     keep[1:, still] = False
     return keep
@@ -94,7 +94,7 @@ def _cones(frames: Times, values: Times, error: float) -> Kept:
 
 
 def rebuilt(frames: Times, values: Floats, keep: Kept) -> Floats:
-    """Values at every frame of straight lines between the kept keys.
+    """The values at every frame if straight lines join the kept keys.
 
     Args:
         frames: float[N].

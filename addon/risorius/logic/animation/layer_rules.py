@@ -18,7 +18,7 @@ Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
 _LIMIT = 100_000  # most samples of one source
-_NEAR = 1e-7  # frames
+_NEAR = 1e-7  # times that differ by fewer frames are merged
 
 
 def masked(
@@ -30,9 +30,9 @@ def masked(
         controls: full names of controls.
         regions: regions of the face.
         chosen: regions that the layer moves; empty for all regions.
-        words: names or patterns such as `jawOpen mouth*`, separated by spaces or commas, in any
-            case and with or without the controls' prefix. A word with `-` in front excludes
-            controls. If all words begin with `-`, the other controls are kept.
+        words: names or patterns such as `jawOpen mouth*`, separated by spaces or commas, in upper
+            or lower case, with or without the controls' prefix. A word with `-` in front excludes
+            controls. If all words begin with `-`, all controls except the excluded ones are kept.
     """
     wanted = set(chosen)
     patterns = [w.lower() for w in re.split(r"[\s,;]+", words) if w.strip("-")]
@@ -58,10 +58,10 @@ class Span:
         start: frame of the scene that shows the source's frame `first`, or `last` if reversed.
         first, last: first and last played frame of the source.
         scale: factor of the duration; 2 plays at half speed.
-        repeat: number of repeats.
+        repeat: number of times that the source plays, such as 1.5.
         reverse: True: plays from `last` to `first`.
-        warp: frames of the scene and frames of the source, float64[n] each, which replace the other
-            settings; or None.
+        warp: frames of the scene and the frames of the source that play at them, float64[n] each;
+            replaces all other settings. None: no warp.
     """
 
     start: float
@@ -74,7 +74,7 @@ class Span:
 
     @property
     def period(self) -> float:
-        """Frames of the scene that one repeat lasts."""
+        """The duration of playing the source once, in frames of the scene."""
         return (self.last - self.first) * self.scale
 
     def scene_range(self) -> tuple[float, float]:
@@ -94,10 +94,10 @@ class Span:
 
 
 def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
-    """The frames of a source to sample, so that straight lines between them reproduce it.
+    """The source's frames to sample, so that straight lines between samples replace its curves.
 
-    Samples on whole frames of the scene are exact. Sources with curves that are not straight
-    between keys get four samples per frame, for subframes.
+    On whole frames of the scene, the lines equal the source. If a curve is not straight between
+    keyframes, four samples per frame of the scene keep the error between whole frames small.
 
     Args:
         span: time of the layer.

@@ -166,7 +166,9 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 
 
 def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
-    """Remove sounds. The sound before takes their time; at the start of the list, the next one.
+    """Remove sounds. The sound before the removed ones is extended to fill their time.
+
+    If the first sounds of the list are removed, the sound after them begins earlier instead.
 
     Args:
         sounds: the list.
@@ -192,7 +194,7 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
 def respelled(
     sounds: Sequence[Sound], place: int, said: Sequence[tuple[str, Sequence[str]]], end: float
 ) -> list[Sound]:
-    """Replace a word by the sounds of one or more words, spread evenly over its time.
+    """Replace a word by the sounds of one or more words; the sounds share its time equally.
 
     Args:
         sounds: the list.
@@ -245,7 +247,7 @@ class Board:
 
     Attributes:
         placed: markers as the add-on created them, one for each sound.
-        own: the user's own markers when `placed` was created.
+        own: the user's own markers at the time when the add-on created the `placed` markers.
         there: all markers of the current scene.
     """
 
@@ -256,12 +258,13 @@ class Board:
     def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
         """Find the current marker of each sound by frame and name, which is all that markers store.
 
-        An unchanged marker belongs to its sound. Next come a marker with another name at its frame
-        (renamed), a marker with its name at another frame (moved), and a marker named like a sound
-        between its neighbours.
+        An unchanged marker belongs to its sound. If the marker of a sound is gone, the sound gets
+        the first of these: a marker with another name at the sound's frame (renamed), a marker with
+        the sound's name at another frame (moved), or a marker between the neighbouring sounds that
+        is named like a mouth shape.
 
         Args:
-            named: converts a mouth shape's name to a phoneme, or None.
+            named: converts a mouth shape's name to a phoneme; returns None for an unknown name.
 
         Returns:
             Index in `placed` -> current marker, and a list of markers for added sounds. All other
@@ -316,14 +319,15 @@ def from_marks(
         placing: the conversion from the list's frames to frames of the scene.
         end: frame at which the list ends.
         label: converts a phoneme to the name of its mouth shape.
-        named: converts a name of a mouth shape or phoneme to a phoneme, or None.
+        named: converts the name of a mouth shape or phoneme to a phoneme; returns None for an
+            unknown name.
 
     Returns:
         The new list; indices in `sounds` of moved sounds that were stopped by a neighbour.
 
     Raises:
-        SpokenError: no marker is left, or a marker's name contains no sound, or a sound has no
-            room.
+        SpokenError: no marker of the sounds is left, or a marker's name contains no mouth shape or
+            phoneme, or an added sound has no room.
     """
     found, more = board.paired(named)
     if not found or len(board.placed) != len(sounds):
@@ -349,7 +353,11 @@ def _renamed(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> Sound:
-    """The sound with the word and mouth shape of a marker's name; raises SpokenError if unknown."""
+    """The sound with the word and the mouth shape in a marker's name.
+
+    Raises:
+        SpokenError: the name contains no known mouth shape or phoneme.
+    """
     if mark.name == before.name:
         return sound
     word, colon, _ = mark.name.rpartition(":")

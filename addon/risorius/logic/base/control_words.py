@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypedDict
 
-PREFIX = "CTRL_expressions."  # of the raw controls of a standard DNA file
+PREFIX = "CTRL_expressions."  # prefix of raw controls in a standard DNA file
 
 
 class WrittenRow(TypedDict):
@@ -24,7 +24,7 @@ class Row:
     Attributes:
         does: a sentence: the effect of the control.
         words: words by which the control is found.
-        side: the sentence on its side, or nothing.
+        side: a sentence that names the side of the control; "" for a control without a side.
     """
 
     does: str
@@ -34,7 +34,7 @@ class Row:
 
 @dataclass(frozen=True)
 class ControlWords:
-    """The rows of the table, by the names of controls without their prefix."""
+    """The table's rows: name of a control without its prefix -> description and search words."""
 
     rows: Mapping[str, Row]
 

@@ -7,4 +7,4 @@ else: any other exception is a fault of the program, which Blender shows with a 
 
 
 class FaceError(ValueError):
-    """Something that a user can mend; the text is one sentence."""
+    """An error that the user can correct; its message is one sentence."""

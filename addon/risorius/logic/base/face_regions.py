@@ -13,7 +13,10 @@ def _itself(name: str) -> str:
 
 @dataclass(frozen=True)
 class FaceRegions:
-    """Regions and functions that come from the `risorius` package, which this room does not import.
+    """The regions of a face, and functions that find the region and the partner of a control.
+
+    The caller takes the functions from the package `risorius`, which modules in `logic` do not
+    import.
 
     Attributes:
         titles: region -> heading, in the order of display; empty without the native module.

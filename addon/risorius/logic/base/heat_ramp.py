@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# sRGB, 0 to 1, at equal steps from cool to hot.
+# Colours at equal steps from cool to hot, in sRGB, 0 to 1.
 ANCHORS = (
     (0.267, 0.005, 0.329),
     (0.283, 0.141, 0.458),
@@ -26,10 +26,10 @@ ANCHORS = (
 
 
 def colours(shares: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Colours in sRGB.
+    """The sRGB colours of values on the heat map.
 
     Args:
-        shares: float64[n], 0 at the cool end, 1 at the hot end; values outside are clamped.
+        shares: float64[n], values from 0 (cool) to 1 (hot); others are clamped to this range.
 
     Returns:
         float32[n, 4], opaque.

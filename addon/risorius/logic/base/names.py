@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names as labels: shortened to Blender's limit and numbered if they repeat."""
+"""Makes labels of names: shortens them to Blender's limit, and numbers repeated ones."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ def unique_labels(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
         taken: labels that already exist and must not be used again.
 
     Returns:
-        Labels in the same order. The first short name of several equal names stays unchanged.
+        Labels in the order of `names`. Of several equal names, the first stays unchanged if it is
+        short enough and not in `taken`.
     """
     used = set(taken)
     labels = []

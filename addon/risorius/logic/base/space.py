@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Conversion of coordinates and units between DNA files and Blender.
 
-Blender: z up, a face looks along -y, its left is +x, right-handed, metres / scene unit scale.
+Blender's axes are right-handed: z is up, a face looks along -y, the face's left is +x. A Blender
+unit is `unit_scale` metres.
+
 Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
 also if `axes` mirrors.
 """
@@ -46,7 +48,7 @@ class Space:
         radians: radians per file angle unit.
         sequence: axis numbers in the order in which rotations are applied.
         signs: float64[3], +1 or -1 per Euler angle.
-        flip_faces: whether corner order must be reversed.
+        flip_faces: True: the order of the corners of each face must be reversed.
     """
 
     axes: Float
@@ -80,8 +82,8 @@ class Space:
 
         Args:
             matrices: rotations in Blender's axes.
-            near: float64[n, 3], angles in the file's unit; of all equivalent angles, those nearest
-                to `near` are returned.
+            near: float64[n, 3], angles in the file's unit. Of all equivalent angles, the angles
+                nearest to `near` are returned.
         """
         turned = self.axes.T @ matrices @ self.axes
         units = self.radians * self.signs
@@ -194,7 +196,7 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
     Args:
         matrices: float64[n, 3, 3] rotations for column vectors.
         sequence: three axis numbers; sequence[0] is applied first.
-        near: float64[n, 3] radians; of all equivalent angles, those nearest to `near` are returned.
+        near: float64[n, 3] radians; of all equivalent angles, the nearest to these are returned.
 
     Returns:
         float64[n, 3] radians about x, y and z.

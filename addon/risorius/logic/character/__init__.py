@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans of a character: its armature, meshes, sliders and face boards, and the user's edits."""
+"""Plans the armature, meshes, sliders and face boards of a character; finds the user's edits."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fits GUI controls to wanted raw controls.
 
-Several settings may give the same raw controls. The fit minimises squared differences within the
-controls' ranges: it sets one GUI control after another to its best value, which a formula gives for
-each linear piece. So no step makes the fit worse.
+Several settings of the GUI controls may give the same raw controls. The fit minimises squared
+differences within the controls' ranges: it sets one GUI control after another to its best value,
+which a formula gives for each linear piece. So no step makes the fit worse.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class Loss:
     """The accuracy of a conversion: the raw controls that differ most.
 
     Attributes:
-        largest: largest difference of a converted raw control at any frame.
-        worst: names with their largest difference, the largest first; invisible differences are
-            left out.
+        largest: largest difference of a converted raw control from its wanted value, at any frame.
+        worst: names of raw controls with their largest difference, the largest first; differences
+            that are too small to see are left out.
     """
 
     largest: float = 0.0
@@ -61,7 +61,7 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
 
 
 def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
-    """Set each control in turn to its best value until none moves. Args: gui  is changed."""
+    """Set each GUI control in turn to its best value until none moves. Args: gui  is changed."""
     totals = table.sums(gui)
     movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
     for _sweep in range(_SWEEPS):
@@ -82,9 +82,10 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
 
 
 def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
-    """Retry two GUI controls with a common output; one may hold a value that the other needs.
+    """Refit two GUI controls that drive the same raw control, if that improves a pose.
 
-    Both are set to 0, and each of them is fitted first once. Args: gui changed in place if better.
+    One of them can drive the raw control so far that the other has no effect. So both are set to 0
+    and fitted in both orders. Args: gui  is changed in the poses that improve.
     """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):
@@ -106,7 +107,7 @@ def _cost(table: BoardTable, wanted: Doubles, gui: Doubles) -> Doubles:
 
 
 def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:
-    """float64[N]: the best value of one GUI control if the others stay."""
+    """float64[N]: the best value of one GUI control if all other GUI controls stay unchanged."""
     breaks = table.breaks_of(index)
     tried = [np.full(len(wanted), end) for end in breaks]
     for low, high in pairwise(breaks):
@@ -134,7 +135,7 @@ def loss(
 
     Args:
         labels: names of the raw controls.
-        wanted, given: float[N, R], raw controls before and after the conversion.
+        wanted, given: float[N, R], raw controls of N poses before and after the conversion.
         which: bool[R], the controls that were converted.
         seen: smallest visible difference; smaller ones are not listed.
     """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lays out the handles of a face board and the lines around them.
 
-Lengths are in board units: moving a handle by 1 changes its GUI control by 1. The board is seen
-from the front, x to the viewer's right, y up; the character's left is on the right. Handles with
+Lengths are in board units: moving a handle by 1 changes its GUI control by `Axis.unit`, usually 1.
+The viewer sees x to the right and y up, and the character's left on the right. Handles with
 known names are arranged like a face; all others are placed in rows by region.
 """
 
@@ -23,7 +23,7 @@ Line = list[Point]
 RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
 Direction = tuple[int, int]
 
-_TEXT, _TITLE = 0.29, 0.46  # heights of letters
+_TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board units
 _TRACK = 0.34  # width of a slider's frame
 _GAP = 0.3  # between sliders
 _MARGIN = 0.6  # around the board
@@ -34,12 +34,13 @@ _NARROWEST = 31.0  # smallest width of the board
 
 @dataclass(frozen=True)
 class Axis:
-    """One direction in which a handle moves.
+    """One axis along which a handle moves.
 
     Attributes:
         gui: index of the GUI control.
         low, high: range of the handle in board units; 0 is rest.
-        unit: value of the GUI control for one board unit: 1 unless its range is far from 1.
+        unit: change of the GUI control for one board unit: 1 if the control's largest absolute
+            value is from 0.5 to 1.5, otherwise this largest value.
         way: direction on the board in which the value grows.
     """
 
@@ -104,8 +105,9 @@ class Board:
     height: float
 
 
-# Title, columns for each side, middle columns. Side columns are ordered from the outer side of the
-# face inwards, and the handles of a column from the top down.
+# _FACE has a row for each block of the board: title, columns of handles for each side of the
+# face, columns in the middle. A column lists handles from the top down. The columns of a side are
+# ordered from the outer edge of the face inwards.
 _Columns = tuple[tuple[str, ...], ...]
 _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
     (
@@ -171,7 +173,7 @@ _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
         ),
     ),
 )
-# Labels for names that are long or unclear without their region.
+# Name of a handle -> label; for names that are too long, or unclear without their region.
 _LABELS = {
     "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
     "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
@@ -195,7 +197,7 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Handles above a common label, each with the offset of its rest place from the corner."""
+    """Handles above a common label, each with the offset from the cell's upper left corner."""
 
     width: float
     height: float
@@ -205,7 +207,7 @@ class _Cell:
 
 @dataclass
 class _Block:
-    """A titled block of cells, each with the offset from the block's upper left corner."""
+    """A titled block of cells; each cell has its offset from the block's upper left corner."""
 
     title: str
     width: float = 0.0
@@ -237,12 +239,13 @@ def ways_of(
 ) -> list[Direction]:
     """The direction in which the handle of each GUI control moves when its value grows.
 
-    It follows the motion of the face.
+    The handle moves in the direction in which the face moves.
 
     Args:
         table: the GUI controls.
         raw_names: names of all raw controls; words in them give most directions.
-        sideways: GUI control -> measured motion of the face to its own left, -1 to 1.
+        sideways: index of a GUI control -> motion of the face to its own left, as a share of the
+            whole motion, -1 to 1.
 
     Returns:
         RIGHT, LEFT, UP or DOWN for each GUI control, as seen by the viewer.
@@ -272,7 +275,7 @@ def handles_of(
     region_of: Callable[[str], str],
     taken: Iterable[str] = (),
 ) -> list[Handle]:
-    """Make the handles of a table; tx and ty of one name share a handle.
+    """Make the handles of a table; GUI controls that differ only in .tx and .ty share a handle.
 
     Args:
         table: the GUI controls.
@@ -281,7 +284,8 @@ def handles_of(
         taken: bone names that are in use.
 
     Returns:
-        Handles without places. GUI controls without outputs or range get no handle.
+        Handles that are not placed yet. A GUI control that drives no raw control or has an empty
+        range gets no handle.
     """
     found: dict[str, Handle] = {}
     for gui, name in enumerate(table.names):
@@ -303,7 +307,7 @@ def handles_of(
 
 
 def _upright(handle: Handle) -> Handle:
-    """The handle with y upwards if both axes would be horizontal."""
+    """The same handle; if both of its axes are horizontal, its y axis is made vertical."""
     if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
         return handle
     return replace(handle, y=replace(handle.y, way=UP))
@@ -337,7 +341,7 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
     """Place handles on a board and draw the lines around them.
 
     Args:
-        handles: handles without places.
+        handles: handles that are not placed yet.
         titles: region -> title, in the order of the blocks.
         is_own: True: the table was made from raw controls, so all handles are placed in rows by
             region.
@@ -468,7 +472,10 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 
 
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
-    """Cells for handles with one stem, and for upper and lower lip together; tall cells last."""
+    """Make a cell for each stem of handles; tall cells are last.
+
+    Short handles of the upper and the lower lip with otherwise equal stems share a cell.
+    """
     groups: dict[str, list[Handle]] = {}
     stems = {h.stem for h in handles}
     for handle in handles:
@@ -554,7 +561,7 @@ def _moved(line: Sequence[Point], by: Point) -> Line:
 
 
 def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
-    """float64[H, 2] each: lowest and highest place of every handle along its own two axes."""
+    """Lowest and highest location of each handle's bone along its x and y, float64[H, 2] each."""
     ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
     both = np.array(ends, np.float64).reshape(-1, 2, 2)
     return both[:, :, 0], both[:, :, 1]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 Point = tuple[float, float]
 
-# For each letter its lines, separated by commas; for each corner of a line two digits, x and y.
+# Letter -> its strokes, separated by commas. A stroke lists its points; two digits are x and y.
 _STROKES = {
     "A": "00 05 16 36 45 40,03 43", "B": "00 06 36 45 44 33 03,33 42 41 30 00",
     "C": "45 36 16 05 01 10 30 41", "D": "00 06 26 44 42 20 00", "E": "46 06 00 40,03 33",
@@ -45,7 +45,7 @@ def lines(text: str, x: float, y: float, height: float) -> Iterator[list[Point]]
     Args:
         text: one line; unknown letters leave a gap.
         x, y: lower left corner of the text.
-        height: height of the letters.
+        height: height of the letters, in the unit of x and y.
     """
     unit = height / 6.0
     for place, letter in enumerate(text.upper()):

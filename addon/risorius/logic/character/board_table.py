@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The table of GUI controls: which raw controls each drives, and its range.
 
-The table comes from the file. For a file without GUI controls it is made from the names of raw
-controls: one GUI control for each, or one for two opposites (Up and Down, Wide and Narrow), and a
-shared handle for all four directions.
+A DNA file with GUI controls contains the table. For other files it is made from the names of raw
+controls. Each raw control has a GUI control; two opposites (Up and Down, Wide and Narrow) share
+one. GUI controls for Up, Down, Left and Right of one name share a handle.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class BoardTable:
         rows: in the file's order; of several rows with the same control and output, the first whose
             range contains the value is used.
         raw_count: R, number of raw controls of the face.
-        is_own: True: the table was made from names of raw controls; its lines pass through 0.
+        is_own: True: the table was made from names of raw controls, so `cut` is 0 in all rows.
     """
 
     names: tuple[str, ...]
@@ -93,7 +93,7 @@ class BoardTable:
 
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
-        """bool[R]: the raw controls that a GUI control drives; the others have only sliders."""
+        """bool[R]: True for raw controls that a GUI control drives; others have only sliders."""
         out = np.zeros(self.raw_count, bool)
         out[[row.raw for row in self.rows]] = True
         return out
@@ -110,7 +110,7 @@ class BoardTable:
         return [raw for raw, _rows in self._pieces[gui]]
 
     def breaks_of(self, gui: int) -> list[float]:
-        """Values at which a GUI control's lines begin or end, and 0.
+        """Values of a GUI control at which the range of one of its rows begins or ends, and 0.
 
         Args: gui  index of the control.
         """
@@ -127,7 +127,7 @@ class BoardTable:
             values: float[N], values of the GUI control.
 
         Returns:
-            float64[N, driven raw controls].
+            float64[N, n], a column for each of the n raw controls in `outputs_of(gui)`.
         """
         v = np.asarray(values, np.float64)
         out = np.zeros((len(v), len(self._pieces[gui])))
@@ -152,7 +152,7 @@ class BoardTable:
 
     @cached_property
     def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
-        """Arrays of rows for own_raw: GUI and raw indices, lowest and highest values, slopes."""
+        """The fields gui, raw, low, high and slope of all rows as arrays, for own_raw."""
         rows = self.rows
         numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
         low, high, slopes = numbers.reshape(-1, 3).T
@@ -200,8 +200,8 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
     Args:
         labels: names of the raw controls.
-        lowest: lowest value of each raw control; controls below 0 are components of a rotation and
-            are left out.
+        lowest: lowest value of each raw control. A raw control with a lowest value below 0 is a
+            component of a rotation and is left out.
 
     Returns:
         BoardTable of GUI controls with names such as `CTRL_jawOpen.ty`, `CTRL_eyeLookL.tx`.
@@ -225,9 +225,9 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """The raw controls that raise and lower a GUI control, and its name with the axis.
+    """The raw controls above and below 0 of a GUI control, and the GUI control's name.
 
-    The second is "" if no raw control lowers it.
+    The second name is "" if no raw control is driven below 0.
     """
     for pair in _OPPOSITES:
         for one, other in (pair, pair[::-1]):

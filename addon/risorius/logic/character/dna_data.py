@@ -25,9 +25,10 @@ class TargetData(Protocol):
 
 
 class MeshData(Protocol):
-    """One mesh: V positions, L layouts, and offsets into flat lists.
+    """One mesh with V positions and L layouts.
 
-    A layout joins the indices of a position, a UV coordinate and a normal.
+    A layout joins the indices of a position, a UV coordinate and a normal. The layouts of all
+    faces and the weights of all vertices are flat lists; offsets tell where each begins.
     """
 
     @property

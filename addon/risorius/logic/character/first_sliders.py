@@ -10,8 +10,8 @@ from . import slider_words
 from .slider_rows import Row
 
 # Most used controls of each region, in the order of the panel, at most ten rows; * stands for the
-# sides L and R. Left and right share a row. The choice follows the use of controls in the
-# expressions of Risorius, then in captures.
+# sides L and R. Left and right share a row. The controls were chosen by how often expressions
+# of Risorius use them, and then by how often captures do.
 _FIRST = {
     "brow": (
         "browRaiseIn*",
@@ -90,7 +90,7 @@ _FIRST = {
 
 
 class Parted(NamedTuple):
-    """The rows of a region: shown first, and under More."""
+    """The rows of a region: `first` are always visible, `more` are under the heading More."""
 
     first: list[Row]
     more: list[Row]
@@ -118,7 +118,7 @@ def part(rows: Sequence[Row], region: str) -> Parted:
         region: name of the region.
 
     Returns:
-        All rows, each once. If none is among the most used, all are shown first.
+        All rows, each once. If the region has no most used row, all rows are in `first`.
     """
     ranks = {name: rank for rank, name in enumerate(table().get(region, ()))}
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-SLACK = 0.1  # share of a distance: the viewport switches levels this much beyond it
+SLACK = 0.1  # the viewport changes the level 10 % beyond a threshold distance
 
 
 def default_distances(count: int, size: float) -> list[float]:
-    """The distances at which a level changes to the next.
+    """The distances from the camera at which a level of detail (LOD) changes to the next coarser.
 
-    The first is six sizes of the face, and each of the others is twice its predecessor.
+    The first distance is six times the size of the face; each other is twice its predecessor.
 
     Args:
-        count: number of levels.
+        count: number of LODs.
         size: largest extent of the face, in Blender units.
 
     Returns:
@@ -38,7 +38,8 @@ def level_at(
         current: the level that is shown, for hysteresis; None for no hysteresis.
 
     Returns:
-        One of `built`: the wanted level, or the next coarser one, or the coarsest.
+        The level for this distance if it is in `built`. Otherwise the next coarser level in
+        `built`, or the coarsest one if none is coarser.
     """
     rising = sorted(distances)
     wanted = sum(distance >= d for d in rising)

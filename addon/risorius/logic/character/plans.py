@@ -79,7 +79,7 @@ class MeshPlan:
         normals: float32[N, 3] per corner, or None.
         skin_offsets, skin_joints, skin_weights: skin_offsets[v] to skin_offsets[v + 1] are the
             influences of vertex v.
-        channels: blend shape channel index of each of the mesh's targets.
+        channels: for each blend shape target of the mesh, the index of its blend shape channel.
     """
 
     index: int
@@ -111,7 +111,7 @@ class ControlPlan:
 
 @dataclass(frozen=True)
 class Anchors:
-    """The joints that bones of the control armature rotate; empty or None if missing."""
+    """Indices of the joints that bones of the control armature rotate; empty or None if missing."""
 
     neck: tuple[int, ...]
     head: int | None
@@ -146,13 +146,13 @@ def kind_of(mesh_name: str) -> str:
 
 
 def layer_warnings(layers: Sequence[str]) -> list[str]:
-    """Warnings about the file's layers that the evaluator leaves out."""
+    """Warnings about parts of a DNA file (layers) that the evaluator ignores."""
     words = [_LAYER_WORDS.get(layer) or told("layer '{name}'", name=layer) for layer in layers]
     return [told("Not evaluated yet: {what}", what=word) for word in dict.fromkeys(words)]
 
 
 def space_of(dna: DnaData, unit_scale: float) -> Space:
-    """The Space of a face in a scene.
+    """The conversion from a face's coordinates and units to the scene's.
 
     Args:
         dna: the face.
@@ -170,7 +170,7 @@ def space_of(dna: DnaData, unit_scale: float) -> Space:
 
 
 def find_anchors(joint_names: Sequence[str]) -> Anchors:
-    """Find the neck, head and eye joints by their usual names, in any case."""
+    """Find the neck, head and eye joints by their usual names, in upper or lower case."""
     where: dict[str, int] = {}
     for index, name in enumerate(joint_names):
         where.setdefault(name.lower().replace(".", "_"), index)
@@ -207,8 +207,8 @@ def plan_character(
         The plan; it keeps no reference to `dna`.
 
     Raises:
-        PlanError: the file has no geometry, joints, meshes at these LODs or vertices, or its data
-            are invalid.
+        PlanError: the file has no geometry, no joints, no meshes at these LODs or no vertices, or
+            its data are invalid.
         SpaceError: unknown axes or units.
     """
     if not dna.meshes or not dna.mesh_names:
@@ -309,7 +309,7 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # A very short bone loses the direction of its axis in float32.
+    # In float32, a very short bone loses its direction, so bones get at least 3 % of `reach`.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:
@@ -431,7 +431,7 @@ def _faces(
 def _corner_values(
     values: NDArray[np.float32], layout: NDArray[np.uint32], corners: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Values of the face corners, or None if the file has none or the layout leaves its array."""
+    """Values of the face corners; None if the file has none or an index is out of range."""
     if not len(values) or not len(corners) or int(corners.max()) >= len(layout):
         return None
     indices = np.asarray(layout, np.int64)[corners]

@@ -20,7 +20,7 @@ _GAP, _DISC = 0.12, 0.32  # from a frame to its label; radius of a handle at res
 _UNIT, _AWAY = 0.122, 0.07  # over the height of the head
 _MARGIN = 0.1  # around the board
 _SMOOTH = 6  # segments between two corners of an outline
-# Right half of the face's outline, from the forehead down to the chin, in board units.
+# Half of the face's outline, with x >= 0, from the forehead down to the chin, in board units.
 _FACE = (
     (0.0, 6.52), (1.6, 6.5), (3.35, 6.28), (4.45, 5.5), (4.82, 4.0), (4.8, 1.6), (4.72, -1.0),
     (4.55, -3.4), (4.15, -5.0), (3.3, -6.3), (2.2, -6.95), (0.0, -7.0),
@@ -68,7 +68,7 @@ def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], 
 
 
 def _words(text: str, side: str) -> str:
-    """A label with both ends named: in reverse order on the right side."""
+    """A label; if it names both ends of an axis, their order is reversed on the right side."""
     ends = text.split(" | ")
     return "   ".join(reversed(ends) if side == "R" else ends)
 

@@ -28,13 +28,15 @@ class Part:
 
     Attributes:
         stem: name of the handle without its side.
-        label: words on the board, in short lines; `inwards | outwards` names both ends.
+        label: words on the board, in short lines; `inwards | outwards` names both ends of the
+            handle's horizontal axis.
         region: region of the face.
         place: rest place on the board; for a pair, the place of the handle on the character's left.
         paired: True: one handle for each side; False: one handle for both sides.
         up, down, out, inward: raw controls of each half of the axes; for a single handle, `out` is
             the character's left.
-        label_at: side of the frame on which the label is placed; for a pair, of the left handle.
+        label_at: side of the handle's frame on which the label is placed; for a pair, the side for
+            the handle on the character's left.
     """
 
     stem: str
@@ -105,7 +107,10 @@ PARTS = (
 
 @dataclass(frozen=True)
 class _Way:
-    """An axis of a handle: name of its GUI control, raw control -> weight of its two halves."""
+    """An axis of a handle: its GUI control, and weights of raw controls.
+
+    `rises` is for values above 0, `falls` for values below 0: index of a raw control -> weight.
+    """
 
     name: str
     rises: dict[int, float]
@@ -115,8 +120,8 @@ class _Way:
 def bone_of(part: Part, side: str) -> str:
     """The name of a handle's bone. Args: part the handle; side "L" or "R", "" for none.
 
-    The side is in the middle of the name, where Blender does not recognise it, because Blender
-    would mirror about the centre of the armature and not of the board.
+    The side is in the middle of the name, where Blender does not recognise it. Otherwise Blender
+    would mirror handles about the armature's centre instead of the board's centre.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
@@ -166,7 +171,8 @@ def handles_of(
 
     Args:
         table: from table_of.
-        sideways: GUI control -> measured motion of the face to its own left, -1 to 1.
+        sideways: index of a GUI control -> motion of the face to its own left, as a share of the
+            whole motion, -1 to 1.
         taken: bone names that are in use.
     """
     index = {name: gui for gui, name in enumerate(table.names)}

@@ -38,9 +38,9 @@ def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bo
     Args:
         names: names of the region's controls, in their order.
         region: name of the region.
-        regions: regions of the face, which know partners.
-        as_seen: True: left is the viewer's left; False: the character's left. Titles and order of
-            the sliders follow it.
+        regions: regions of the face; they find the partner of a control.
+        as_seen: True: "left" in titles and in the order of sliders is the viewer's left; False: the
+            character's left.
 
     Returns:
         Each control once: the two sides of a control, or its left and right direction, share a row.

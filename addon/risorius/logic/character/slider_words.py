@@ -10,7 +10,7 @@ from ..base.face_regions import FaceRegions
 
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
-# Meanings of endings of names: upper and lower, centre, inner and outer, phase, forward.
+# Abbreviation at the end of a control's name -> word in the title of its slider.
 _WORDS = {
     **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
     **{"Ph": "Phase ", "Fwd": "Forward"},
@@ -21,12 +21,12 @@ _SHORT = re.compile(
 
 
 def short_name(control: str) -> str:
-    """The part after the last prefix: `CTRL_expressions.jawOpen` gives `jawOpen`."""
+    """A control's name without its prefixes: `CTRL_expressions.jawOpen` gives `jawOpen`."""
     return re.split(r"[.:|]", control)[-1] or control
 
 
 def title(control: str) -> str:
-    """Words for a slider: `CTRL_expressions.mouthCornerPullL` gives `Mouth Corner Pull L`."""
+    """The title of a slider: `CTRL_expressions.mouthCornerPullL` gives `Mouth Corner Pull L`."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|_", " ", short_name(control)).split()
     return " ".join(w[:1].upper() + w[1:] for w in words) or control
 
@@ -38,7 +38,7 @@ def title_in_region(control: str, region: str, sided: bool = True, swapped: bool
         control: name of the control.
         region: name of the region.
         sided: True: keep a final L or R; False: both sides share the label.
-        swapped: swap left and right, as seen by the viewer.
+        swapped: True: swap left and right, so that the title names the viewer's side.
     """
     text, side = _without_side(title(control))
     if swapped:
@@ -99,8 +99,8 @@ def matches(control: str, search: str, known: str = "") -> bool:
     Args:
         control: name of the control; a search word may occur anywhere in the name or its title.
         search: the typed search.
-        known: further search words of the control; the typed word must be the beginning of one, so
-            that "ear" does not find "fear".
+        known: further search words of the control. A typed word matches one of these only if it is
+            the beginning of it, so that "ear" does not find "fear".
     """
     text, more = f"{control} {title(control)}".casefold(), known.casefold().split()
     return all(

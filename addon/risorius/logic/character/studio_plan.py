@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Places camera, lights and backdrop of a portrait around a head.
 
-All places are in the head's axes: the face looks along -y, z is up, the origin is between the eyes.
-The numbers are in metres for an adult head, and scale with the distance between the eyes.
+All places are in the head's axes: the face looks along -y, z is up, and the origin is the midpoint
+between the eyes. Lengths in this file are metres for an adult head; they are scaled by the distance
+between the eyes.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ class Lamp:
 
     Attributes:
         name: key, fill or rim light.
-        place: centre of the softbox in Blender units; it points at the origin.
+        place: centre of the softbox in Blender units; the softbox points at the origin.
         size: width and height in Blender units.
         watts: radiant power.
         colour: linear RGB, 0 to 1.
@@ -75,7 +76,7 @@ class Studio:
 
 _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
 # Name, degrees to the viewer's right, degrees up, distance in metres, width and height in metres,
-# light at the face as a share of the key light, colour. The fill is two stops below the key.
+# light at the face as a share of the key light, colour. The fill light is two stops darker.
 _LAMPS: tuple[_Row, ...] = (
     ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
@@ -135,8 +136,8 @@ def has_neck(apart: float, low: float) -> bool:
     """Whether the mesh of a face includes a neck.
 
     Args:
-        apart: distance between the eyes.
-        low: height of the lowest point relative to the eyes.
+        apart: distance between the eyes, in Blender units.
+        low: z of the lowest vertex minus z of the eyes, in Blender units.
     """
     return -low > _NECK * apart / GROWN
 
@@ -149,6 +150,7 @@ def _lamp(row: _Row, unit: float) -> Lamp:
         -far * math.cos(lift) * math.cos(turn),
         far * math.sin(lift),
     )
-    # A softbox of W watts emits W / pi along its axis, and W / (pi far^2) arrive at the face.
+    # A softbox of W watts emits W / pi per steradian along its axis. At the distance `far`, the
+    # face gets W / (pi far^2) per unit area.
     watts = share * _EXPOSURE * math.pi * far * far
     return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

@@ -2,7 +2,7 @@
 """Finds the user's edits of positions and shape keys, and prepares their transfer.
 
 A number counts as edited if it differs bit for bit from the import of the original file. If Blender
-moved a shape key together with the basis, rounding of two float32 additions is allowed.
+moved a shape key together with the basis, the rounding of four float32 additions is allowed.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def key_edits(
     differs = points != wanted
     if not differs.any():
         return np.zeros(len(points), np.bool_), np.zeros(points.shape)
-    # Blender moves a key by the same offset as the basis, in float32. Four sums are rounded, here
-    # and in Blender, each by at most half a unit in the last place: two units of the largest
-    # number.
+    # Blender moves a shape key by the same offset as the basis, in float32. Four sums are rounded,
+    # here and in Blender, each by at most half a unit in the last place. So results may differ by
+    # two units in the last place of the largest number.
     before = imported_basis + (wanted - basis)
     largest = np.max(np.abs([basis, imported_basis, points, wanted, before]), axis=0)
     rounding = 2.0 * np.spacing(largest)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The place of a 3D view that shows something whole."""
+"""Computes the pivot and distance from which a 3D view shows all given points."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top
 
-_HALF = 36.0  # mm, half of what the viewport's camera sees: twice that of a render's camera
+_HALF = 36.0  # mm, half the sensor width of the viewport's camera: twice that of a render's camera
 _MARGIN = 1.25
-_FILLED = 0.98  # of the free part of a region
+_FILLED = 0.98  # share of the free part of a region that the points fill
 _HALVINGS, _SHIFTS = 30, 3
-_NEAR_ENOUGH = 1.8  # a view that is so many times nearer or farther than wanted is left alone
+_NEAR_ENOUGH = 1.8  # times too near or too far: a view within this factor does not move
 
 
 def distance(radius: float, lens: float, size: Sequence[float], perspective: bool) -> float:
-    """The distance of a view from the centre of a ball that shows it whole.
+    """The distance from the centre of a ball at which a view shows the whole ball.
 
     Args:
-        radius: of the ball, in Blender units.
-        lens: of the view, in mm.
-        size: width and height of its region, in pixels.
-        perspective: whether it is a perspective view.
+        radius: radius of the ball, in Blender units.
+        lens: focal length of the view, in mm.
+        size: width and height of the view's region, in pixels.
+        perspective: True: perspective view; False: orthographic view.
     """
     longer, shorter = max(*size, 1.0), max(min(size), 1.0)
     slope = _HALF / lens * shorter / longer  # half of what the shorter side shows
@@ -36,17 +36,18 @@ def distance(radius: float, lens: float, size: Sequence[float], perspective: boo
 def on_screen(
     points: ArrayLike, far: float, lens: float, size: Sequence[float], perspective: bool
 ) -> NDArray[np.float64]:
-    """Places of points in pixels from the centre of a view.
+    """Project points to a view's region.
 
     Args:
-        points: float[N, 3] relative to the view's pivot: right, up, towards the view.
-        far: the view's distance from that point.
-        lens: of the view, in mm.
-        size: width and height of its region, in pixels.
-        perspective: whether it is a perspective view.
+        points: float[N, 3] relative to the view's pivot: right, up, towards the viewer.
+        far: distance of the viewer from the pivot, in Blender units.
+        lens: focal length of the view, in mm.
+        size: width and height of the view's region, in pixels.
+        perspective: True: perspective view; False: orthographic view.
 
     Returns:
-        float64[N, 2]; NaN for points behind the view.
+        float64[N, 2], pixels right of and above the region's centre; NaN for points behind the
+        viewer.
     """
     places = np.asarray(points, np.float64)
     away = far - places[:, 2] if perspective else np.full(len(places), far)
@@ -57,17 +58,17 @@ def on_screen(
 def fit(
     points: ArrayLike, lens: float, size: Sequence[float], free: Box, perspective: bool
 ) -> tuple[float, float, float]:
-    """The place of a view that shows points as large as possible in the free part of its region.
+    """Fit a view so that points appear as large as possible in the free part of its region.
 
     Args:
-        points: float[N, 3] in the view's axes: to its right, up, towards it.
-        lens: of the view, in mm.
-        size: width and height of its region, in pixels.
+        points: float[N, 3] in the view's axes: right, up, towards the viewer.
+        lens: focal length of the view, in mm.
+        size: width and height of the view's region, in pixels.
         free: the uncovered part of the region, in pixels from its lower left corner.
-        perspective: whether it is a perspective view.
+        perspective: True: perspective view; False: orthographic view.
 
     Returns:
-        Pivot to the right and up, and the distance from it.
+        Pivot along the view's right and up axes, and the viewer's distance from the pivot.
     """
     places = np.asarray(points, np.float64)
     room = np.array([free[2] - free[0], free[3] - free[1]]) * _FILLED
@@ -77,11 +78,11 @@ def fit(
     near, far = 0.0, distance(span, lens, size, perspective) * max(size) / max(room.min(), 1.0)
     for _halving in range(_HALVINGS):
         tried = (near + far) / 2
-        for _time in range(_SHIFTS):  # what is nearer goes further: not exact at once
+        for _time in range(_SHIFTS):  # near points shift more, so one step is not exact
             off = _middle(places - (*middle, 0.0), tried, lens, size, perspective) - aside
             middle = middle + np.nan_to_num(off) * tried / (lens / _HALF * max(size) / 2)
         seen = on_screen(places - (*middle, 0.0), tried, lens, size, perspective)
-        fits = bool((np.ptp(seen, axis=0) <= room).all())  # not where some lie behind the view
+        fits = bool((np.ptp(seen, axis=0) <= room).all())  # False if a point is behind the viewer
         near, far = (near, tried) if fits else (tried, far)
     return float(middle[0]), float(middle[1]), far
 
@@ -89,7 +90,7 @@ def fit(
 def _middle(
     points: NDArray[np.float64], far: float, lens: float, size: Sequence[float], perspective: bool
 ) -> NDArray[np.float64]:
-    """float64[2]: the centre of the result of on_screen."""
+    """float64[2]: the centre of the points' bounding rectangle in the region, in pixels."""
     seen = on_screen(points, far, lens, size, perspective)
     return (seen.min(axis=0) + seen.max(axis=0)) / 2
 
@@ -97,13 +98,13 @@ def _middle(
 def is_well_in_view(
     middle: Sequence[float], radius: float, wanted: float, held: Sequence[float], far: float
 ) -> bool:
-    """Whether a view already shows a ball well.
+    """Whether a view already shows a ball well, so that it need not move.
 
     Args:
-        middle, radius: of the ball.
-        wanted: distance that shows it whole.
-        held: pivot of the view.
-        far: its distance from that point.
+        middle, radius: centre and radius of the ball, in Blender units.
+        wanted: distance at which the view shows the whole ball, from `distance`.
+        held: current pivot of the view.
+        far: current distance of the viewer from the pivot.
     """
     near = wanted / _NEAR_ENOUGH < far < wanted * _NEAR_ENOUGH
     return near and math.dist(middle, held) < radius / 2.0

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures and animated maps of materials, found by names and by the form of the face."""
+"""Finds textures by name, reads animated maps, and computes masks from the form of a face."""

@@ -7,7 +7,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# The first match decides: cheekRaiseInner belongs to the smile, cheekRaiseUpper to the eye.
+# Area of the face -> words in names of animated maps. The first match decides: cheekRaiseInner
+# belongs to the area "smile", cheekRaiseUpper to the area "eye".
 _AREA_WORDS = (
     ("forehead", ("browsraise", "browraise", "forehead")),
     ("glabella", ("brow", "frown", "glabella")),
@@ -45,7 +46,7 @@ class MapUse:
 
     Attributes:
         index: index of the map in the file.
-        label: its name.
+        label: name of the map.
         color, normal: whether the map changes the colour and the normals.
         number: 1 to 3 for a wrinkle set, 0 for none.
         region: name of its mask such as `head_wm1_blink_l`, lower case; "" if the map's name has

@@ -17,7 +17,7 @@ def size_of(read: Read) -> tuple[int, int, int] | None:
     """Width and height in pixels, and the bytes that Blender needs per pixel.
 
     Args:
-        read: returns up to a given number of bytes of the file from an offset.
+        read: `read(offset, count)` returns up to `count` bytes of the file.
 
     Returns:
         None if the file is no PNG, JPEG, BMP, WebP, TIFF, OpenEXR or Targa, or its header is
@@ -75,7 +75,8 @@ def _webp(_read: Read, head: bytes) -> tuple[int, int, int] | None:
 def _tiff(read: Read, head: bytes) -> tuple[int, int, int] | None:
     order = "<" if head[:2] == b"II" else ">"
     (kind,) = struct.unpack_from(f"{order}H", head, 2)
-    # Formats of the first directory's offset and of its tag count, and the bytes per tag.
+    # Values for BigTIFF, then for TIFF: number format of the first directory's offset, and the byte
+    # at which this offset is stored; number format of the tag count; bytes per tag.
     at_form, at, count_form, step = ("Q", 8, "Q", 20) if kind == 43 else ("I", 4, "H", 12)
     (start,) = struct.unpack_from(order + at_form, head, at)
     count_size = struct.calcsize(count_form)

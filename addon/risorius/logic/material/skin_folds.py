@@ -15,8 +15,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Points = Float | Float32
 
-# Area -> ellipses (x, z, half width, half height), mirrored in x. The origin is between the eyes;
-# the unit is the distance between the eyes, or below the eyes in z the distance to the mouth.
+# Area -> ellipses (x, z, half width, half height) in face_coordinates, each also mirrored in x.
 _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
     "forehead": ((0.0, 0.82, 0.75, 0.42),),
     "glabella": ((0.0, 0.36, 0.26, 0.32),),
@@ -34,10 +33,12 @@ _NEVER_BEHIND = {"neck"}  # areas that continue behind the eyes
 
 @dataclass(frozen=True)
 class FaceFrame:
-    """The place and size of a face in Blender units: it looks along -y, z is up, its left is +x.
+    """The place and size of a face in Blender units.
+
+    The face looks along -y, z is up, and the face's left is +x.
 
     Attributes:
-        origin: float64[3], the point between the centres of the eyes.
+        origin: float64[3], the midpoint between the centres of the eyes.
         unit: distance between the centres of the eyes.
         drop: distance from the eyes down to the mouth.
     """
@@ -73,7 +74,10 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
 
 
 def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
-    """float64[V, 3]: x, depth and height of points relative to the point between the eyes.
+    """float64[V, 3]: x, depth and height of points relative to the midpoint between the eyes.
+
+    The unit is the distance between the eyes. Below the eyes, the unit of the height is the
+    distance from the eyes down to the mouth.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -112,7 +116,9 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth.
+    """float32[V, 3]: for each point x and height of face_coordinates, distance from the mouth.
+
+    The distance is in the units of face_coordinates, with heights times 0.8.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -126,7 +132,7 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils are not counted as borders, because light may pass there.
+    Rims of lids, lips and nostrils do not count, so that they keep their subsurface scattering.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -158,6 +164,6 @@ def left_share(points: Points, frame: FaceFrame) -> Float32:
 
 
 def _smooth(values: Float) -> Float:
-    """Smoothstep: 0 below 0, 1 above 1, with horizontal ends."""
+    """Smoothstep: 0 for values below 0, 1 for values above 1, with slope 0 at both ends."""
     t = np.clip(values, 0.0, 1.0)
     return t * t * (3 - 2 * t)

@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: a file and its channel, 0 to 3."""
+    """A region's mask: an image file, and the colour channel, 0 (red) to 3 (alpha)."""
 
     path: Path
     channel: int
@@ -182,7 +182,7 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
 
 
 def read_mask(stem: str) -> dict[str, int]:
-    """Mask regions in a texture file -> channel; regions in lower case, often none."""
+    """Region in lower case -> channel of a mask file; empty if the file is no mask."""
     word = stem.lower()
     packed = _PACKED.match(word)
     if packed:
@@ -197,7 +197,7 @@ def read_mask(stem: str) -> dict[str, int]:
 
 
 def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
-    """The part and side of a mesh, in the words of `read_name`.
+    """The part and side of a mesh, named as in the result of `read_name`.
 
     Args:
         base: mesh name without its LOD.
@@ -252,7 +252,7 @@ def find(
     meshes: Iterable[tuple[str, str]],
     folders: Sequence[Path],
 ) -> TexturePlan:
-    """Find textures: first those that the DNA file names, then files with known names.
+    """Find textures: first the files that the DNA file names, then files with known names.
 
     Args:
         wanted: (mesh base, role) -> file name, from from_metadata.
@@ -260,7 +260,7 @@ def find(
         folders: folders to search; a match in an earlier folder wins.
 
     Returns:
-        The plan. A name in the DNA file that contains a folder is never followed.
+        The plan. A name in the DNA file that contains a folder matches no file.
     """
     plan = TexturePlan()
     known = dict(meshes)

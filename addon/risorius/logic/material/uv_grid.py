@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UV layouts for baking a mesh: its UV map stretched over the square, or a cell per polygon."""
+"""UV layouts for baking a mesh: its UV map stretched over the unit square, or a cell per face."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ _RIM = 0.08  # of a cell, empty on each side, so that no face shows its neighbou
 
 
 def spread(points: Float32) -> Float32 | None:
-    """Stretch a UV layout over the unit square if it uses little of it or leaves it.
+    """Stretch a UV layout over the unit square, unless it already fits.
+
+    A layout fits if it is inside the square and its bounding rectangle covers half of the square.
 
     Args:
         points: float[N, 2], UV coordinates of all face corners of one texture.
@@ -31,7 +33,9 @@ def spread(points: Float32) -> Float32 | None:
 
 
 def overlaps(points: Float32, totals: Totals) -> bool:
-    """Whether polygons must overlap, because their summed area exceeds their bounding rectangle.
+    """Whether faces must overlap in UV space.
+
+    They must if the sum of their areas is more than 1.02 times their bounding rectangle's area.
 
     Args:
         points: float[N, 2], UV coordinates of the corners, face by face.

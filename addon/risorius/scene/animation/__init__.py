@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions, clips, layers and expressions on a character's controls."""
+"""Animates the controls of a character with keyframes, clips, animation layers and tweaks."""

@@ -33,9 +33,9 @@ class Track:
     Attributes:
         path: data path of the property.
         group: name of the group of its F-curves.
-        values: float32[frames, width].
-        now: the current value of the original property, [width]. A property with this value at all
-            frames needs no curve. None: always make a curve.
+        values: float32[frames, width], the components of the property at each frame.
+        now: float[width], current value of the property in the scene. A property that has this
+            value at all frames needs no curve. None: always make a curve.
         first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
@@ -50,7 +50,8 @@ class Track:
 
 @dataclass
 class Counts:
-    """Totals of written F-curves: keys, keys before the reduction, largest error, curves."""
+    """Totals over the written F-curves: number of keyframes, number of keyframes before the
+    reduction, largest error of the reduction, and number of F-curves."""
 
     keys: int = 0
     all_keys: int = 0
@@ -73,10 +74,10 @@ def write(
     error: float,
     counts: Counts,
 ) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
-    """Make an action with one curve for each value that moves.
+    """Make an action from baked tracks. A track that stays at its current value gets no F-curve.
 
     Args:
-        name: of the action.
+        name: name of the action.
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
@@ -126,7 +127,8 @@ def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:
 def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
-    """Yields each track with its values and a mask of the kept keys, both [frames, width]."""
+    """Yields each track, its values [frames, width], and a mask of the keys that remain after the
+    reduction, bool[frames, width]."""
     most = max(_AT_ONCE // len(frames), 16)  # columns
     waiting, width = [], 0
     for number, track in enumerate(tracks):
@@ -163,14 +165,18 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
     points = curve.keyframe_points
     points.add(len(times))
     places = np.stack([times, values], axis=1).ravel()
-    # Straight lines need no handles; computing them would cost most of the time.
+    # Linear keyframes ignore their handles. The handles are placed at the keyframe, because
+    # Blender would otherwise compute them, which is slow.
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether the keys of an action changed since `stamp`; True if it has no stamp."""
+    """Whether the keys of an action changed since the last call of `stamp`.
+
+    True if `stamp` was never called for the action.
+    """
     return action.get(_DIGEST) != _digest(action)
 
 
@@ -197,12 +203,14 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action alone, and keep its earlier animation.
+    """Let a datablock play a baked action and no other animation.
+
+    The earlier animation of the datablock is stored for `restore`.
 
     Args:
-        owner: object or Key, see `restore`.
+        owner: object or shape keys that play the action.
         action, slot: the results of `write`.
-        muted: data paths whose drivers are muted, since they are baked.
+        muted: data paths of baked properties, whose drivers are muted.
         strip: put the action on a new NLA track instead of making it the active one.
     """
     keep(owner)
@@ -296,10 +304,10 @@ def _set(owner: Animated, path: str, number: float) -> None:
 
 
 def restore(owner: Animated) -> None:
-    """Restore the animation of a datablock before `play`.
+    """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, or the user protected or edited
-    them. An action that the user assigned since `play` stays in the file.
+    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
+    or the user edited them. An action that the user assigned since `play` stays in the file.
     """
     if BEFORE not in owner:
         return
@@ -350,7 +358,7 @@ def _play_again(
 def _is_used(action: bpy.types.Action) -> bool:
     """Whether a datablock or a fake user uses an action.
 
-    `users` alone is not enough: Blender 4.3 counts one too many after an object is duplicated.
+    `users` alone is not enough: Blender 4.3 counts one user too many if an object was duplicated.
     """
     return bool(
         action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
@@ -358,12 +366,12 @@ def _is_used(action: bpy.types.Action) -> bool:
 
 
 def _noted(track: bpy.types.NlaTrack, mute: bool | int, solo: bool | int) -> str:
-    """The stored line of a track: its flags, its name and its strips."""
+    """JSON text that stores an NLA track for `restore`: mute, solo, name, names of its strips."""
     return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
 
 
 def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
-    """Read a line of `_noted`; None if the line has another form."""
+    """Mute, solo, name and strip names from a text of `_noted`; None if the text is damaged."""
     try:
         mute, solo, name, strips = json.loads(line)
         return bool(mute), bool(solo), str(name), [str(strip) for strip in strips]
@@ -372,10 +380,12 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Rewrite NLA tracks that an old file stored by their order so that they have names.
+    """Convert stored states of NLA tracks from the format of old .blend files to texts of `_noted`.
+
+    The old format stores no track names, only the states in the order of the tracks.
 
     Returns:
-        Whether any stored track was rewritten.
+        Whether the stored states had the old format and were converted.
     """
     state = saved.table(owner, BEFORE) or {}
     lines = saved.texts(state, "tracks")
@@ -425,13 +435,16 @@ def _remove_track(
 def _baked_strips(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """The tracks and strips with the baked action, also if the user renamed or moved them."""
+    """The NLA strips that play the baked action, each with its track.
+
+    Strips and tracks that the user renamed or moved are found too.
+    """
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")
     own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]
     if own:
         return own
-    # A copy of the object may play a copy of the action.
+    # A copied object may play a copy of the baked action; copies have the mark BAKED_ACTION too.
     marked = [(t, s) for t, s in strips if s.action is not None and s.action.get(BAKED_ACTION)]
     return [(t, s) for t, s in marked if t.name == saved.text(state, "track")]
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts the current pose and the keys of an action between sliders and the face board."""
+"""Converts the current pose and the keys of an action between sliders and the face board.
+
+Either the sliders or the board lead, that is, move the face; the others have no effect.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ class Converted:
     """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: largest difference of raw controls by the conversion, over the pose and all frames.
+        loss: largest change of a raw control by the conversion, over the pose and all frames.
         kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
         idle: names of other actions of the face whose keys have no effect after the switch.
@@ -42,10 +45,10 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about the loss of a conversion; None if it is at most board.SEEN.
+    """A sentence about raw controls that a conversion changed by more than board.SEEN, or None.
 
     Args:
-        loss: differences of raw controls after a fit.
+        loss: differences of raw controls before and after the conversion.
     """
     if loss.largest <= board.SEEN:
         return None
@@ -66,7 +69,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
         with_keys: also convert the keys of the active action, in a copy of the action.
 
     Returns:
-        The loss, the earlier action and the number of new F-curves.
+        The result of the conversion.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     done = Converted()
@@ -95,15 +98,16 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
 
 
 def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
-    """Replace the face board by the other kind. Pose and keys are converted as by `switch`.
+    """Replace the face board by a board of another kind, and convert the pose and the keys.
 
     Args:
         context: with a view layer.
         rig: a character with a face board; its control armature must not be linked.
-        kind: of the new board, runtime.PRIMARY or runtime.COMPLETE.
+        kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        The result of the conversion to the new board; empty if the sliders lead.
+        The result of the conversion to the new board. If the sliders lead, nothing is converted
+        and all attributes have their defaults.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)
@@ -140,7 +144,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
 
 def animates_sliders(rig: ArmatureObject) -> bool:
-    """Whether a played action of a face has keys of sliders that the board reaches.
+    """Whether a played action of a face has keys of sliders that the face board can move.
 
     Args:
         rig: the character.
@@ -154,7 +158,10 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 
 
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
-    """Convert the current pose to the board or to the sliders. Returns: the loss."""
+    """Convert the current pose to the board or to the sliders.
+
+    Returns: the changes of raw controls by the conversion.
+    """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
     assert face is not None
@@ -171,7 +178,7 @@ def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
 def _leading_curves(
     action: bpy.types.Action, controls: ArmatureObject, live: runtime.Runtime, of_board: bool
 ) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of an action that move the board's handles, or the sliders that it reaches."""
+    """The F-curves of the board's handles (of_board), or of the sliders that the board moves."""
     if of_board:
         paths = {board.path_of(handle.bone) for handle in live.handles}
     else:
@@ -194,7 +201,8 @@ def convert(
         by_board: True: from sliders to handles; False: from handles to sliders.
 
     Returns:
-        The loss of raw controls at whole frames and at the keys, and the number of new curves.
+        The largest changes of raw controls at whole frames and at keys, and the number of new
+        curves.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))
@@ -220,7 +228,7 @@ def convert(
 
 
 def _frames(curves: Iterable[bpy.types.FCurve]) -> NDArray[np.float64]:
-    """The frames of all keys of F-curves, and all whole frames between them."""
+    """The frames of all keys of F-curves, and all whole frames from the first to the last key."""
     keys = np.concatenate([clip_actions.key_points(curve)[0] for curve in curves])
     whole = np.arange(np.floor(keys.min()), np.ceil(keys.max()) + 1.0)
     inside = whole[(whole >= keys.min()) & (whole <= keys.max())]

@@ -77,7 +77,7 @@ def timing_of(
     Args:
         clip: the clip to place.
         scene: gives the frames per second.
-        start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
+        start: the frame of the clip's first sample; with keep_clock, the frame of second 0.
         keep_clock: count from second 0 of the clip, to keep several clips of one take in step.
         whole: True: keys on whole frames only.
     """
@@ -102,9 +102,9 @@ def make_action(
 
     Args:
         rig: the character's deforming armature.
-        clip: risorius.Clip; curves such as "head.yaw" turn the bones of head, neck and eyes.
-        timing: place of the clip in the scene, from timing_of.
-        name: of the action.
+        clip: risorius.Clip; curves such as "head.yaw" rotate the bones of head, neck and eyes.
+        timing: frames of the scene at which the clip plays, from timing_of.
+        name: name of the action.
         with_eyes: animate the eye bones too if the clip has eye rotations.
         tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a
             tenth of this value for rotations of bones. 0: a linear key for each sample.
@@ -176,8 +176,8 @@ def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
     Args:
         scene: its range is changed.
         report: result of the import, with the first and last frame.
-        mode: "EXTEND" moves the end of the scene to the end of the animation if that is later;
-            "FIT" begins and ends it with the animation; "KEEP" leaves it.
+        mode: "EXTEND": the last frame of the range becomes the last frame of the animation if this
+            is later; "FIT": the range becomes the range of the animation; "KEEP": the range stays.
     """
     first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
     if mode == "FIT":
@@ -208,7 +208,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
     """Add keys to a curve and keep its existing keys.
 
     Args:
-        curve: of an action.
+        curve: F-curve of an action.
         keys: new keys, at frames where the curve has no key.
         bent: True: Bezier interpolation; False: linear.
     """
@@ -228,7 +228,7 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set a property of all keys from index `first` to the end."""
+    """Set the keyframe property `name` of all keyframes from index `first` to the end."""
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)
@@ -308,7 +308,7 @@ def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> 
     Args:
         rig: deforming armature of the character.
         action: any action.
-        name: of the track and the strip; "": the name of the action.
+        name: name of the track and the strip; "": the name of the action.
 
     Returns:
         The strip.
@@ -374,7 +374,7 @@ def clip_of_action(
 
 
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
-    """Replace Blender's shortened slider names by DNA names, so that other characters know them.
+    """Replace Blender's shortened slider names by DNA names, which other characters know too.
 
     A slider keeps Blender's name if its DNA name occurs twice. Names that belong to no slider stay.
 
@@ -432,7 +432,7 @@ class Turning:
     """The rotation of a control bone in an action.
 
     Attributes:
-        mode: its PoseBone.rotation_mode.
+        mode: rotation mode of the curves; it may differ from the mode of the bone.
         path: data path of the rotation property of this mode.
         curves: one F-curve for each component; None for a component without a curve.
         rest: components of the rest rotation.
@@ -444,7 +444,7 @@ class Turning:
     rest: tuple[float, ...]
 
     def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64[frames, 3 or 4]: the rotation at frames; at rest for missing curves."""
+        """float64[frames, 3 or 4]: the rotation; components without a curve have rest values."""
         return np.stack(_rows(self.curves, self.rest, frames), axis=1)
 
 
@@ -454,10 +454,11 @@ def turning(
     """The curves that rotate a control bone; None if there are none.
 
     Args:
-        bone: of the control armature; None gives None.
-        curves: of an action, by data path and index.
+        bone: pose bone of the control armature; None gives None.
+        curves: F-curves of an action, by data path and index.
     """
-    # The bone's own mode comes first, because an action of another face may have another mode.
+    # Curves of the bone's current rotation mode are preferred. The other modes are tried because
+    # the action may come from a face whose bones use another mode.
     if bone is None:
         return None
     for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
@@ -473,9 +474,9 @@ def turning_in(
     """The curves that rotate a control bone in one rotation mode.
 
     Args:
-        bone: of the control armature.
+        bone: pose bone of the control armature.
         mode: a value of PoseBone.rotation_mode.
-        curves: of an action, by data path and index.
+        curves: F-curves of an action, by data path and index.
     """
     name = bpy.utils.escape_identifier(bone.name)
     path = f'pose.bones["{name}"].{_ROTATIONS.get(mode, "rotation_euler")}'
@@ -487,7 +488,10 @@ def turning_in(
 def _rows(
     curves: Sequence[bpy.types.FCurve | None], rest: Sequence[float], frames: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """float64[frames] for each channel of a property; a channel without a curve is at rest."""
+    """float64[frames] for each component of a property, sampled from its F-curve.
+
+    A component without an F-curve has its value from `rest` at all frames.
+    """
     return [
         np.full(len(frames), still) if curve is None else sampled(curve, frames)
         for curve, still in zip(curves, rest, strict=True)
@@ -540,9 +544,9 @@ def add_sound(
 
     Args:
         scene: the scene.
-        path: of the sound file.
+        path: path of the sound file.
         frame: frame of the first sample, rounded to a whole frame.
-        name: of the strip; "": the name of the file.
+        name: name of the strip; "": the name of the file.
 
     Returns:
         The strip.

@@ -35,14 +35,14 @@ def colour_of(region: str, step: int = 0) -> Colour:
 
     Args:
         region: name of the region; an unknown name gives the colour of "other".
-        step: number of a curve in its region, from 0; neighbours get different saturation.
+        step: number of a curve in its region, from 0; successive numbers get different saturation.
     """
     share = (step * 2 % _STEPS) / (_STEPS - 1)
     return colorsys.hsv_to_rgb(_HUES.get(region, _HUES["other"]), 0.75 - 0.3 * share, 0.95)
 
 
 def label_of(path: str) -> str:
-    """The slider that an F-curve moves, or "". Args: path  data path of the F-curve."""
+    """The slider that an F-curve moves, "" for other curves. Args: path  the curve's data path."""
     start, _, end = parts.property_path("@").partition("@")
     if not path.startswith(start) or not path.endswith(end):
         return ""
@@ -53,7 +53,7 @@ def colour_group(group: bpy.types.ActionGroup, region: str) -> None:
     """Give a group of F-curves the colour of a region.
 
     Args:
-        group: of an action of the face.
+        group: group of F-curves in an action of the face.
         region: name of the region.
     """
     group.color_set = "CUSTOM"
@@ -67,7 +67,7 @@ def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -
     """Give a new F-curve and its group the colour of a slider's region.
 
     Args:
-        curve: of a slider, in its group.
+        curve: F-curve of a slider, in its group.
         label: name of the slider.
         step: number of the shade, see colour_of; None: from the number of curves in the group.
     """

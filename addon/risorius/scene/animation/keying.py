@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inserts keys by Blender's settings: auto-key, keying set, only needed, key type, group.
 
-Code that moves sliders or control bones for the animator passes the move to `by_hand`, or calls
-`changed` after the move.
+Code that moves sliders or control bones for the animator does so in a function that it passes to
+`by_hand`, or calls `changed` after the move.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Rules:
         available: key only properties with an F-curve.
         needed: key only if the value differs from the curve.
         kind: type of the key, such as KEYFRAME or EXTREME.
-        interpolation, handles: for the first keys of a curve; a later key copies the key before it.
+        interpolation, handles: interpolation and handle types of the first keys of a curve; a later
+            key copies the key before it.
         keying_set: key only the paths of this set; None: no limit.
     """
 
@@ -58,7 +59,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Pose:
-    """The values of the controls of a face that an animator sets.
+    """A pose of a face: the values of the controls that an animator can set.
 
     Attributes:
         sliders: values by name.
@@ -75,7 +76,8 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
     Args:
         context: has the scene and the preferences.
         auto: True: rules of auto-key; False: rules of an explicit insert.
-        exact: ignore "only needed", because the keys of a pose belong together.
+        exact: True: ignore the setting "Only Insert Needed", so that all controls of a pose get
+            keys.
     """
     tools, edit = context.scene.tool_settings, context.preferences.edit
     needed = getattr(edit, "use_keyframe_insert_needed", False)
@@ -95,9 +97,10 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 
 
 def pose_of(controls: ArmatureObject) -> Pose:
-    """The current values of the controls, before drivers and layers.
+    """The current values of the controls, without the effect of animation layers.
 
-    If the face board leads, the pose has its handles instead of the sliders that they reach.
+    If the face board leads, the pose has the handles of the board instead of the sliders that
+    these handles move.
     """
     rig = parts.rig_of(controls)
     assert rig is not None
@@ -116,7 +119,10 @@ def pose_of(controls: ArmatureObject) -> Pose:
 
 
 def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
-    """The sliders that the face board leads (none if the sliders lead), and the handles' bones."""
+    """The sliders that the face board moves, and the bones of all its handles.
+
+    If the sliders lead, the board moves no slider.
+    """
     handles = {handle.bone for handle in live.handles}
     if not board.leads(controls, live):
         return set(), handles
@@ -125,7 +131,7 @@ def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set
 
 
 def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
-    """The data paths of a control bone that an animator moves; locked channels are not keyed."""
+    """Data paths of a bone's rotation and location, each left out if all its axes are locked."""
     names = [] if all(bone.lock_rotation) else [clip_actions.rotation_path(bone)]
     names += [] if all(bone.lock_location) else ["location"]
     return [f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name}' for name in names]
@@ -148,7 +154,7 @@ def by_hand(
     at_selected: bool = False,
     at: Callable[[float], object] | None = None,
 ) -> int:
-    """Move controls like an edit of the user, and key them by the user's settings.
+    """Move controls and key them by the user's settings, as if the user had moved them.
 
     Args:
         context: has the settings and the current frame.
@@ -251,7 +257,7 @@ def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
 
 
 def selected_frames(controls: ArmatureObject) -> list[float]:
-    """The frames with selected keys of a face, ascending."""
+    """The frames at which F-curves of a face have selected keyframes, ascending."""
     found = {
         round(key.co.x, 3)
         for path, curves in curves_by_path(controls).items()
@@ -268,7 +274,7 @@ def pose_at(controls: ArmatureObject, frame: float, now: Pose) -> Pose:
 
     Args:
         controls: the control armature.
-        frame: of the action; need not be whole.
+        frame: frame of the action; need not be whole.
         now: the current pose.
     """
     keyed = curves_by_path(controls)
@@ -308,15 +314,15 @@ def _at_selected(
     move: Callable[[], Collection[str] | None],
     at: Callable[[float], object] | None,
 ) -> int:
-    """The part of `by_hand` that moves at the frames of selected keys."""
+    """Do the work of `by_hand` with at_selected: move and key at each frame with a selected key."""
     if tweaks.of(controls) is not None:
         raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))
     now, rules, made = pose_of(controls), rules_of(context, auto=False), []
-    # Read all poses before the first key, because the first key of a curve changes it at all
-    # frames.
+    # Compute the poses of all frames before any key is inserted, because the first key of a new
+    # curve sets its value at all frames.
     for frame in frames:
         before = pose_at(controls, frame, now)
         show(controls, before)
@@ -347,7 +353,7 @@ def insert(
         controls: the control armature.
         labels: sliders to key; sliders with drivers are left out.
         bones: data paths of bones to key.
-        frame: of the scene; need not be whole.
+        frame: frame of the scene; need not be whole.
         rules: settings for new keys.
 
     Returns:
@@ -382,7 +388,8 @@ def _wanted(
 ) -> list[tuple[str, str, list[int]]]:
     """Data path, curve group and array indices (-1: all) of each property to key.
 
-    Sliders that the face board leads are replaced by its handles, with the axes of each handle.
+    Instead of a slider that the face board moves, the handle that moves it is keyed, on the axes
+    on which the handle can move.
     """
     rig = parts.rig_of(controls)
     assert rig is not None
@@ -411,7 +418,7 @@ def _driven(controls: ArmatureObject) -> set[str]:
 
 
 def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
-    """The new curves of a property; curves of a slider get the colour of its region."""
+    """The F-curves of a property that was just keyed. F-curves of sliders get a region colour."""
     curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
     label = curve_colours.label_of(path)
     if label:
@@ -421,7 +428,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the first two keys of a curve by the rules."""
+    """Set interpolation and handle types of a curve's newest key if it has at most two keys."""
     if len(curve.keyframe_points) > 2:
         return  # Blender copied them from the previous key
     for key in (
@@ -467,8 +474,8 @@ def in_set(controls: ArmatureObject, keying_set: bpy.types.KeyingSet, path: str)
 
     Args:
         controls: the control armature.
-        keying_set: a keying set of the scene with paths, or a built-in one, whose bl_idname gives
-            the channels of bones that it keys.
+        keying_set: a keying set of the scene with paths, or a built-in keying set, whose bl_idname
+            tells which properties the set keys.
         path: data path of the property.
     """
     if keying_set.is_path_absolute:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiles the layers of a character to native curves, and mixes them over sliders and bones.
+"""Compiles the animation layers of a character, and mixes them over sliders and bones.
 
-Compiled layers are cached for each character and compared with their settings. A frame costs one
-comparison and one native call, and nothing without layers. The cache holds no Blender object.
+Compiled layers are cached for each character together with the settings they were made from. A
+frame of a character with layers costs one comparison of settings and one native call. The cache
+holds no Blender object. Fired reactions (short animations that start at a frame) are mixed too.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ class Bones:
     Attributes:
         turns: rotations of "head", "neck", "eye_L", "eye_R" in the axes of the armature; bones at
             rest are left out.
-        target: location of the gaze target relative to rest, in its own axes; None at rest.
+        target: location of the gaze target relative to rest, in the axes of the target's bone;
+            None at rest.
     """
 
     turns: dict[str, Quaternion] = field(default_factory=dict)
@@ -66,7 +68,10 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Cache of compiled sources and masks; the keys are the settings they were made from."""
+    """Cache of compiled layer sources (clips or poses) and of compiled masks.
+
+    The settings of a layer, see `_key`, identify its source and its mask.
+    """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
@@ -78,12 +83,13 @@ class Stack:
 
     Attributes:
         made_of: the settings that the layers were compiled from.
-        mixer: its channels are the character's slider labels, then `clip_units.BONES`.
+        mixer: mixes the values of the sliders and of the bone components `clip_units.BONES`, in
+            this order.
         layers: risorius.Layer, bottom to top, at weight 1.
-        places: place of each compiled layer in the collection of settings.
-        weights: weights by place that the mixer uses at present.
-        problems: place -> sentence about a layer that cannot be played.
-        kept: compiled sources and masks.
+        places: index of each compiled layer in the collection of settings.
+        weights: the weights in the mixer, by the index of the layer in that collection.
+        problems: index of a layer, or name of a reaction -> reason why it cannot be played.
+        kept: compiled sources and masks, which the next Stack can reuse.
     """
 
     made_of: tuple[object, ...]
@@ -147,7 +153,8 @@ def mix(
         return raw, bones  # the action of baked controls contains the layers
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    # The counts differ if a layer was added after the last evaluation.
+    # The evaluated armature lacks a layer that was added after the last evaluation. Its weights
+    # then come from the original armature.
     there = len(layers.places(seen)) == len(layers.places(controls))
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
     if stack.weights != weights:
@@ -158,7 +165,7 @@ def mix(
 
 
 def _numbers(bones: Bones) -> NDArray[np.float32]:
-    """float32[len(clip_units.BONES)]: angles in radians, then the location of the gaze target."""
+    """float32[len(clip_units.BONES)]: angles of bones in radians, then the gaze target."""
     found: list[float] = []
     for name, group in clip_logic.TURNS.items():
         turn = bones.turns.get(name)
@@ -214,7 +221,7 @@ def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
 
 
 def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
-    """Cache keys of a layer: the settings that its curves depend on, and those of its mask."""
+    """Cache keys of a layer: the settings that define its curves, the settings of its mask."""
     action = layer.action
     uid = action.session_uid if action is not None else 0
     warp = tuple((point.frame, point.source) for point in layer.warp)
@@ -260,7 +267,7 @@ def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> n
 
 
 def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
-    """Fire the reactions of all frames, so that a frame does not depend on the frames before it."""
+    """Fire all reactions of the character, so that frames can be evaluated in any order."""
     stack.mixer.clear_fired()
     for reaction in layers.reactions_of(controls):
         try:
@@ -275,7 +282,7 @@ def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
 
 
 def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
-    """Give the layers new weights by place; curves are not compiled again."""
+    """Set the weights of the layers, one for each layer in the collection; curves stay compiled."""
     stack.mixer.layers = tuple(
         replace(layer, weight=min(max(weights[place], 0.0), 1.0))
         for layer, place in zip(stack.layers, stack.places, strict=True)
@@ -302,8 +309,8 @@ def native_layer(
         kept: receives the source and the mask of this layer.
 
     Raises:
-        ValueError: the layer has nothing to play, or its source does not fit; the text gives the
-            reason.
+        ValueError: the layer has nothing to play, or its source cannot be used on this face; the
+            text gives the reason.
     """
     old, kept = old or Kept(), kept or Kept()
     source_key, mask_key = _key(layer, rate)
@@ -337,7 +344,9 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """Names that a layer may move: sliders, and components of control bones (`clip_units.BONES`).
+    """The names of sliders and of control bone components that a layer may move.
+
+    The components have names from `clip_units.BONES`.
 
     Args:
         live: Runtime of the character, for the names of its sliders.
@@ -349,8 +358,8 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """Times in seconds at which a constant pose plays: always, from its start on, or for its
-    length."""
+    """Times in seconds at which a layer plays a constant pose: always, from the start of the layer
+    on, or for its length."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
@@ -364,7 +373,7 @@ def _expression_source(
 
 
 def _for_face(live: runtime.Runtime, pose: Mapping[str, float]) -> dict[str, float]:
-    """A pose by slider labels of this face; controls that the face lacks are left out."""
+    """Convert a pose from control names to slider labels, without controls that the face lacks."""
     sliders = clip_actions.sliders_of(live)
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 
@@ -402,7 +411,10 @@ def _span_times(span: logic.Span, rate: float) -> Times:
 def _idle_source(
     _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
 ) -> Source:
-    """Idle life with the length of the layer, or an endless loop if the layer has no length."""
+    """A generated clip of idle motion, such as blinks, with the length of the layer.
+
+    If the layer has no length, the clip is an endless loop.
+    """
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
     clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)

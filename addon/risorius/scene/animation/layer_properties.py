@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layers of a character as properties of its control armature: saved, copied and overridden."""
+"""Defines the layers of a character as properties, which Blender saves, copies and overrides.
+
+Reactions are properties too: short animations that start (are fired) at a frame.
+"""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
@@ -45,12 +48,15 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property without animation. Args: kind  function of bpy.props, given  its arguments."""
+    """A property that cannot have keys or drivers, because it lacks the option ANIMATABLE.
+
+    Args: kind  function of bpy.props that makes the property, given  arguments of this function.
+    """
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 
 class RISORIUS_PG_warp(bpy.types.PropertyGroup):
-    """A frame of the scene and the frame of the source that is shown there."""
+    """A warp point: a scene frame, and the frame of the layer's animation that plays at it."""
 
     frame: _still(
         bpy.props.FloatProperty,
@@ -75,7 +81,7 @@ class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_layer(bpy.types.PropertyGroup):
-    """A layer of animation above the keys of the sliders."""
+    """An animation layer, which is mixed over the keyframe animation of the controls."""
 
     name: bpy.props.StringProperty(name="Name", override=_OVERRIDE)
     kind: _still(bpy.props.EnumProperty, name="Source", items=KINDS)
@@ -86,7 +92,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Edition of Risorius' built-in expressions; older files do not store it and mean edition 1.
+    # Edition of the built-in expressions that the layer plays. The default is 1, because .blend
+    # files from the time of edition 1 do not store it.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0
@@ -185,7 +192,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")

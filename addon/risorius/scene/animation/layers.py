@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads, orders and changes the animation layers of a character."""
+"""Reads, orders and changes the animation layers and the reactions of a character.
+
+A reaction is a short animation from Risorius' files that starts (is fired) at a frame.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +73,10 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 
 
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
-    """The times and frames at which a layer plays its action, or the given action instead."""
+    """The timing of an action in a layer: start, played frames, speed and warp points.
+
+    Without `action`, the action of the layer is used.
+    """
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
@@ -105,9 +111,9 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point to a layer that pins the source frame shown at a scene frame to this frame.
+    """Add a warp point at a scene frame, with the frame of the animation that the layer shows then.
 
-    The first warp point also adds one at each end, so that all frames keep their timing.
+    The first warp point also adds one at each end of the layer, so that the timing does not change.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -165,7 +171,7 @@ def add_action(
 
     Args:
         controls: control armature of the character.
-        action: action to play; the layer starts at its first frame.
+        action: action to play; the layer starts at the first frame of the action.
         settings: other properties of the layer by name.
 
     Returns:
@@ -193,7 +199,7 @@ def remove(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
     """
     layer = places(controls)[place]
     below = of(controls).index(layer) - 1
@@ -224,7 +230,7 @@ def move(controls: ArmatureObject, place: int, up: bool) -> bool:
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
         up: True: up; False: down.
 
     Returns:
@@ -248,11 +254,11 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 
 
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
-    """Add a copy of a layer, with the keys of its weight, above it.
+    """Add a copy of a layer directly above this layer, and copy the keys of its weight.
 
     Args:
         controls: control armature of the character.
-        place: of the layer, from place_of.
+        place: index of the layer, from place_of.
 
     Returns:
         The copy.
@@ -275,7 +281,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """Yields the F-curve collections that move no other datablock, and the list of drivers."""
+    """Yields the F-curve collections of actions that only this armature plays, then its drivers."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:
@@ -342,8 +348,8 @@ def fire(
 
     Args:
         controls: control armature of the character.
-        name: of the reaction, see known_reactions.
-        frame: of the scene; need not be whole.
+        name: name of the reaction, see known_reactions.
+        frame: frame of the scene; need not be whole.
         strength: 0 to 1, factor on the reaction's values.
 
     Returns:
@@ -361,7 +367,7 @@ def unfire(controls: ArmatureObject, place: int) -> None:
 
     Args:
         controls: control armature of the character.
-        place: in the list of fired reactions, from 0.
+        place: index of the reaction in `reactions_of`.
     """
     reactions_of(controls).remove(place)
     controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Convert layers to tracks of Blender's NLA."""
+"""Converts layers to tracks of Blender's NLA."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
 def obstacle(
     controls: ArmatureObject, layer: RISORIUS_PG_layer, curve: bpy.types.FCurve | None = None
 ) -> str:
-    """The reason why no strip can represent a layer; empty if one can.
+    """The reason why no strip can represent a layer; "" if a strip can.
 
     Args:
         controls: control armature.
@@ -155,7 +155,7 @@ def _place_strip(strip: bpy.types.NlaStrip, span: logic.Span) -> None:
 def _set_influence(
     strip: bpy.types.NlaStrip, value: float, fade_in: float = 0.0, fade_out: float = 0.0
 ) -> None:
-    """Key the influence of a strip: a constant value with fades of some frames at the ends.
+    """Key the influence of a strip: a constant value, with a fade at each end, in frames.
 
     A strip with animated influence ignores blend_in and blend_out.
     """
@@ -179,8 +179,10 @@ def _set_influence(
 def _action_of(
     scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
 ) -> tuple[bpy.types.Action, bool]:
-    """An action with the curves that the layer's mask allows; the layer's action if all are.
-    Returns: the action, and whether it is a constant pose."""
+    """An action with the curves that a layer's mask allows, and whether it is a constant pose.
+
+    The layer's action itself is returned if the mask allows all its curves.
+    """
     controls = parts.controls_there(rig)
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range

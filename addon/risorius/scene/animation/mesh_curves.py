@@ -27,7 +27,9 @@ Floats = NDArray[np.float32]
 
 
 def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
-    """Mesh objects of the scene with the vertex count of a face mesh that are no part of the face.
+    """Mesh objects that may be animated copies of a face mesh.
+
+    They have as many vertices as one mesh of the face, but do not belong to the face.
 
     Args:
         context: has the scene.
@@ -41,7 +43,9 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The mesh to read: a selected object of `sources`, else its only object, else None.
+    """The mesh to read: a selected object from `sources`, or the only one that `sources` finds.
+
+    None if there is neither.
 
     Args:
         context: has the scene.
@@ -56,7 +60,7 @@ def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
 
 
 def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
-    """The LOD and the index of the face mesh with the vertex count of a source.
+    """The face mesh that has as many vertices as a source object: (its LOD, its index).
 
     Args:
         rig: the face.
@@ -79,7 +83,7 @@ def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
 def recorded(
     context: Context, item: MeshObject, first: int, last: int, progress: Callable[[float], None]
 ) -> Floats:
-    """float32[F, V, 3]: an object's evaluated vertices in its own space, frame by frame.
+    """float32[F, V, 3]: an object's evaluated vertices in object space, frame by frame.
 
     Args:
         context: scene and view layer.
@@ -118,11 +122,11 @@ def recorded(
 
 
 class MeshCurvesTask(Task["native.SolvedClip"]):
-    """Solves the curves of a recorded mesh in a thread.
+    """Solves control curves that reproduce a recorded mesh, in a background thread.
 
     Attributes:
         mesh: index of the mesh in the DNA file.
-        mm: length of the file's unit in millimetres.
+        mm: length of the DNA file's unit in millimetres.
     """
 
     def __init__(
@@ -136,18 +140,19 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
         sparse: float,
         smooth: float,
     ) -> None:
-        """Read Blender's data in the calling thread.
+        """Read the meshes from Blender in the calling thread; the solve runs in the background.
 
         Args:
             rig: the face.
             item: the recorded mesh.
             frames: float32[F, V, 3], from `recorded`.
             rate: frames per second.
-            relative: True: fit the motion relative to the mesh's neutral; False: fit the shape.
+            relative: True: fit the motion of the recorded mesh away from its own neutral shape;
+                False: fit its shape at each frame.
             sparse, smooth: see risorius.solve_clip.
 
         Raises:
-            ClipError: no mesh of the face has the vertex count of the mesh.
+            ClipError: no mesh of the face has as many vertices as the recorded mesh.
             DnaError: the face cannot be solved.
         """
         live = runtime.there(rig)
@@ -176,15 +181,15 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
 
 
 def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
-    """Paint the residual onto a mesh of a face, as a colour attribute.
+    """Paint the error of a solve onto a mesh of a face, as a colour attribute.
 
     Args:
         rig: the face.
         mesh: index of the mesh in the DNA file.
-        residual: float32[V], distance of each vertex in mm.
+        residual: float32[V], distance in mm between each solved vertex and the recorded vertex.
 
     Returns:
-        The residual of the hottest colour in mm; 0 if the face lacks this mesh.
+        The distance in mm that the hottest colour shows; 0 if the face lacks this mesh.
     """
     hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
     colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture range of a face as properties of its control armature: saved, copied, overridden."""
+"""Defines the capture ranges of a face as properties, which Blender saves and overrides.
+
+The capture range of a control has two captured values, which are converted to 0 and 1.
+"""
 
 # Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
@@ -19,7 +22,7 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Number of changes of any range.
+# Counts the changes of ranges of all faces, so that caches notice them (see `changes`).
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -28,7 +31,10 @@ def _touch(_self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
 
 
 def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
-    """Keep the extreme at 0.1 to 1.9 above the neutral, and count the change."""
+    """Clamp the extreme value to at least neutral + 0.1 and at most neutral + 1.9.
+
+    The call also counts as a change of the ranges.
+    """
     wanted = min(max(self.extreme, self.neutral + _LEAST), self.neutral + _MOST)
     if abs(wanted - self.extreme) > 1e-6:
         self.extreme = wanted
@@ -36,7 +42,7 @@ def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_range(bpy.types.PropertyGroup):
-    """The range of one control; its name is the raw control's."""
+    """The capture range of one control; the entry has the name of the raw control."""
 
     used: bpy.props.BoolProperty(
         name="Use",
@@ -72,7 +78,7 @@ def touch() -> None:
 
 
 def changes() -> int:
-    """Number of calls of `touch`. A cache of ranges compares it to notice changes."""
+    """Number of calls of `touch`. A cache of ranges compares this number to notice changes."""
     return _changes.now
 
 
@@ -82,10 +88,10 @@ def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, also if the face does not use them.
+    """The ranges of a face, even if the use of ranges is switched off.
 
     Args:
-        controls: the control armature. A row without a valid range counts as off.
+        controls: the control armature. A control with an invalid range counts as switched off.
 
     Returns:
         risorius.ranges.Ranges.
@@ -93,7 +99,7 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
     module = native.part("ranges")
     found = {}
     for row in rows_of(controls):
-        # Blender stores float32, so 0.67 is rounded to 0.67 again.
+        # Blender stores 0.67 as the float32 number 0.670000017; rounding restores 0.67.
         range_ = module.Range(round(row.neutral, 5), round(row.extreme, 5))
         reason = "" if row.used and range_.trouble() is None else row.reason or "off"
         found[row.name] = module.Learned(range_, reason)
@@ -101,7 +107,9 @@ def all_of(controls: ArmatureObject) -> "native.Ranges":
 
 
 def of(controls: ArmatureObject) -> "native.Ranges | None":
-    """The ranges that stretch captures of a face; None if they are switched off or missing.
+    """The ranges of a face from which captured values are stretched to the range 0 to 1.
+
+    None if the ranges are switched off or missing.
 
     Args:
         controls: the control armature.
@@ -170,6 +178,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)

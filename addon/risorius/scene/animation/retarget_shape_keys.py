@@ -18,14 +18,17 @@ from . import clip_actions
 
 
 def sources(context: Context) -> list[MeshObject]:
-    """Mesh objects of the scene with animated shape keys that belong to no face."""
+    """Mesh objects of the scene that have animated shape keys and belong to no face."""
     items = [item for item in context.scene.objects if item.type == "MESH"]
     meshes = cast(list[MeshObject], items)
     return [item for item in meshes if parts.rig_of(item) is None and _moves(item)]
 
 
 def source_of(context: Context) -> MeshObject | None:
-    """The mesh to read: a selected object of `sources`, else its only object, else None."""
+    """The mesh to read: a selected object from `sources`, or the only one that `sources` finds.
+
+    None if there is neither.
+    """
     there = sources(context)
     selected = cast(list[MeshObject], context.selected_objects)
     chosen = [item for item in selected if item in there]
@@ -55,7 +58,8 @@ def clip_of(
     Args:
         context: scene and view layer.
         item: a mesh object.
-        first, last: frames; None: from the range of its action, or of the scene.
+        first, last: first and last frame to read; None: the first or last frame of the object's
+            action, or of the scene if there are NLA strips or drivers.
 
     Returns:
         A clip with one curve for each shape key that moves or is not 0; frame 0 is second 0.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes speech clips from sound files in a separate process, and installs the recogniser."""
+"""Makes animation clips from recorded speech, and installs the speech recogniser."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _looked: dict[str, float] = session.keep(
 
 
 class SpeechTask(Task["native.Clip"]):
-    """Makes a clip of speech in a separate process."""
+    """Makes the animation clip of a speech recording in a separate process."""
 
     def __init__(self, path: str, transcript: str | None, **options: object) -> None:
         """Start the task. Args: path, transcript, options  see risorius.speech.speak."""
@@ -54,7 +54,7 @@ def has_recogniser() -> bool:
 
 
 def lacks_recogniser() -> bool:
-    """Whether the recogniser is missing; cached for _LOOK_EVERY seconds, for panels."""
+    """Whether the recogniser is missing. The answer is cached, because panels redraw often."""
     now = time.monotonic()
     if now > _looked["until"]:
         _looked.update(lacks=not has_recogniser(), until=now + _LOOK_EVERY)
@@ -71,7 +71,7 @@ class InstallError(FaceError, RuntimeError):
 
 
 def install_recogniser() -> None:
-    """Install the recogniser with pip into the extension's own user folder.
+    """Install the speech recogniser with pip into `packages_folder`.
 
     Raises:
         InstallError: pip failed; the text gives the reason.

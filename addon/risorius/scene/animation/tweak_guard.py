@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Moves edits by Blender's own buttons into the active tweak.
 
-Blender inserts its keys into the action of the face. While a tweak is on, the file keeps a copy of
-that action, so that undo and redo restore it. New keys of the action are removed again, and their
-values are stored in the tweak. Moves of sliders, bones and handles without a key are stored in the
-tweak when the frame changes. Other edits of the action stay: moved or deleted keys, and keys of
-properties that a tweak cannot store, such as the location of the whole face.
+Blender inserts its keys into the action of the face. While a tweak is on, the .blend file has a
+copy of that action, so that undo and redo restore the copy too. New keys of the action are removed
+again, and their values are stored in the tweak. If the user moves a slider, bone or handle without
+a key, its value is stored in the tweak when the frame changes. Other edits of the action stay:
+moved or deleted keys, and keys of properties that a tweak cannot store, such as the location of
+the whole face.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class _Hand:
     Attributes:
         frame: frame of the scene.
         stand: the moved controls and their values.
-        held: True: the user inserted a key, so the tweak gets a key even without a difference.
+        held: True: the user inserted a key, so the tweak gets a key even if no value changed.
     """
 
     frame: float
@@ -61,11 +62,11 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """The evaluated controls below a tweak on a face with NLA strips.
+    """Cached pose of the controls without the tweak, for a face with NLA strips.
 
     Attributes:
         frame: frame of the scene.
-        strips: the strips at that time.
+        strips: settings of the NLA strips when `stand` was evaluated, from `_strips`.
         stand: the values of the controls.
     """
 
@@ -76,15 +77,18 @@ class _Below:
 
 # Session uid of a control armature -> controls that the user moved without a key.
 _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
-# Session uid of a control armature checked since load or undo -> cached pose below its tweak, or
-# None.
+# Session uid of a control armature whose action was checked since load or undo -> its cached pose
+# without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of a control armature -> reason why the tweak refused its last key.
+# Session uid of a control armature -> reason why the tweak could not store the last key.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """The reason why the tweak refused the last key, or "". Args: controls  a control armature."""
+    """The reason why the tweak could not store the last key; "" if it could.
+
+    Args: controls  a control armature.
+    """
     return _troubles.get(controls.session_uid, "")
 
 
@@ -104,7 +108,10 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
 
 def end(controls: ArmatureObject) -> None:
-    """Store moves without a key in the tweak, and turn the tweak off. Its layer stays."""
+    """Store in the tweak the controls that were moved without a key, and end the tweak.
+
+    The layer of the tweak stays.
+    """
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -133,12 +140,12 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Move new keys of the action below the tweak into the tweak, and note moves without a key.
+    """Move new keys of the active action into the tweak, and note controls moved without a key.
 
     Args:
         controls: an edited control armature.
         frame: current frame of the scene.
-        edited: whether its action was edited too.
+        edited: whether the active action was edited too.
     """
     tweak, uid = tweaks.of(controls), controls.session_uid
     if tweak is None:
@@ -158,8 +165,10 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """The pose of the controls below the tweak. On a face with NLA strips it is cached, because
-    Blender has to evaluate the strips."""
+    """The pose of the controls without the tweak.
+
+    On a face with NLA strips the pose is cached, because Blender has to evaluate the strips.
+    """
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
     uid, strips = controls.session_uid, _strips(controls)
@@ -172,7 +181,10 @@ def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweak
 
 
 def _strips(controls: ArmatureObject) -> tuple[object, ...]:
-    """Settings of the NLA strips of a face and of the active action, to notice changes."""
+    """The blending settings of the active action and the settings of all NLA strips of a face.
+
+    `_below` compares them to notice changes.
+    """
     data = controls.animation_data
     assert data is not None
     own = (data.use_nla, data.action_influence, data.action_blend_type)
@@ -186,10 +198,12 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 
 
 def settle(controls: ArmatureObject) -> None:
-    """Store moves without a key in the tweak; moves outside its frame range are dropped.
+    """Store in the tweak the controls that were moved without a key.
+
+    Nothing is stored if they were moved at a frame outside the tweak.
 
     Args:
-        controls: a control armature; the scene may be at another frame than the move.
+        controls: a control armature. The scene may have changed its frame since the move.
     """
     hand = _hands.pop(controls.session_uid, None)
     if hand is not None and tweaks.of(controls) is not None:
@@ -297,10 +311,10 @@ def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve)
 def _take_all(
     controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
 ) -> None:
-    """Store the controls of several frames in the tweak, then reset the controls of other frames to
-    the current frame.
+    """Store the moved controls of several frames in the tweak. Then set controls that were keyed at
+    other frames to their pose without the tweak at the current frame.
 
-    hands: one for each frame, the current frame last.
+    hands: the moved controls, one _Hand for each frame; the last is of the current frame.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
@@ -314,8 +328,8 @@ def _take_all(
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
     """The curves of sliders, handles and control bones in an action, by data path and index.
 
-    All channels of the bones are included, because Blender also keys channels that the face does
-    not use.
+    F-curves of location, rotation and scale of these bones are included, because Blender also keys
+    properties that the face does not use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}
@@ -335,7 +349,10 @@ def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
 ) -> list[float] | None:
-    """The frames of keys that `before` lacks; None if the curve has any other edit."""
+    """The frames of keys of `curve` that its earlier copy `before` lacks or has with other values.
+
+    None if the keys differ in another way, for example because keys were deleted.
+    """
     frames, values = clip_actions.key_points(curve)
     if before is None:
         return frames.tolist()
@@ -382,7 +399,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the pose below the tweak; None if none does."""
+    """The controls that differ from the pose without the tweak; None if none does."""
     rig = parts.rig_of(controls)
     if rig is None:
         return None

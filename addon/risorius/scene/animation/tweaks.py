@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tweaks a range of frames: edits are stored in an additive layer, and the keys below stay.
+"""Tweaks a range of frames: edits go into an additive layer, and the keys below it stay.
 
 While a tweak is on, the layer stores the difference between an edited slider and the keys below,
 and the slider returns to the value of these keys. The same applies to the bones of head, neck and
@@ -165,7 +165,7 @@ def take(
         frame: of the scene.
         bones: data paths of `paths_of`; others are ignored.
         held: True: controls without a difference get a key too if the tweak moves them already.
-        old: earlier curves of the tweak, from `curves_so_far`; None: the current curves.
+        old: curves to which the changes are added, from `curves_so_far`; None: the current curves.
 
     Returns:
         The number of tweaked sliders and bones.
@@ -223,7 +223,9 @@ def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -
 
 @contextmanager
 def curves_so_far(controls: ArmatureObject) -> Iterator[Curves]:
-    """Yields a copy of the curves of the tweak's layer, for keys of several frames at once.
+    """Context manager: a copy of the curves of the tweak's layer.
+
+    Keys that are inserted later do not change the copy.
 
     Args:
         controls: the control armature; without a tweak or layer the result is empty.
@@ -264,7 +266,7 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Data path -> values of the layer at a frame that reproduce the current bones."""
+    """Data path -> key values with which the tweak's layer reproduces the current bone poses."""
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -323,7 +325,7 @@ def _insert(
 
 
 def is_mixed(controls: ArmatureObject) -> bool:
-    """Whether NLA strips or the blending of the action affect the pose, not the action alone."""
+    """Whether the pose depends on NLA strips or on the blending of the active action."""
     data = controls.animation_data
     if data is None:
         return False
@@ -365,7 +367,7 @@ def changed(stand: Stand, other: Stand) -> Stand:
 
 
 def put(controls: ArmatureObject, stand: Stand) -> None:
-    """Set the controls to a pose; controls outside the pose stay.
+    """Set the controls to a pose; controls that the pose lacks keep their values.
 
     Args:
         controls: the control armature.
@@ -437,8 +439,8 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by the moved handles of a leading board; the handles return to
-    the pose below the tweak."""
+    """Slider -> change of its value by moved handles, if the face board leads. The handles return
+    to the pose without the tweak."""
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}

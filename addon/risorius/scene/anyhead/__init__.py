@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks of a head without expressions, and the tasks that make a face from it."""
+"""Finds landmarks of a head without expressions, and makes a face from the head."""

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Passes heads to the package, which finds landmarks, and brings landmarks back to Blender."""
+"""Finds landmarks of heads with the Python package risorius, and converts them for Blender.
+
+In this file, "the package" is risorius. Its coordinates are in cm, with x to the left of the head,
+y up and z to the front.
+"""
 
 from __future__ import annotations
 
@@ -33,12 +37,13 @@ class Finding(NamedTuple):
 
 
 class Head(NamedTuple):
-    """A head as the package reads it, without objects of Blender.
+    """A head as the package risorius reads it, without objects of Blender.
 
     Attributes:
-        parts: the meshes, the face first, in the space of shape_key_head.turn_of.
-        turn: float64[3, 3], from the coordinates of the head's object to that space.
-        fixed: landmarks that the user moved or placed, in that space.
+        parts: the meshes, the face first, in the coordinates of the package.
+        turn: float64[3, 3], rotation matrix from the coordinates of the head's object to the
+            coordinates of the package.
+        fixed: landmarks that the user moved or placed, in the coordinates of the package.
         named: name of the object that is the face; "": the package chooses one of the meshes.
     """
 
@@ -64,7 +69,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
 
 
 def words() -> Mapping[str, str]:
-    """The words for each landmark, by its name, in the order of the package."""
+    """Name of each landmark -> its description for the user, in the order of the package's list."""
     found: Mapping[str, str] = native.part("anyhead.landmarks.names").landmark_words()
     return found
 
@@ -84,7 +89,7 @@ def _search(head: Head, progress: Callable[[float], bool]) -> native.Landmarks:
 
 
 def on_object(head: Head, found: native.Landmarks) -> Finding:
-    """Landmarks of the package in the coordinates of the head's object.
+    """Convert landmarks of the package to the coordinates of the head's object.
 
     Args:
         head: the result of `read`.

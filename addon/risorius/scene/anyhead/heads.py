@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the head and the face of the selection."""
+"""Finds the head and the face that the user has selected."""
 
 from __future__ import annotations
 

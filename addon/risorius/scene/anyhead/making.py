@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Background tasks on a head without expressions: making its rig, or conforming a face to it."""
+"""Runs background tasks on a head without expressions: make a rig, or conform a face to it."""
 
 from __future__ import annotations
 
@@ -18,19 +18,23 @@ Cancelled = Callable[[], bool]
 
 FIT, JOINTS = "FIT", "JOINTS"  # stages of a task
 _FITTED = 0.6  # share of the total time after which the head has its expressions
+_CARRIED = 0.9  # of that, at the end of the transfer of expressions
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task of two stages; `stage` is FIT or JOINTS."""
+    """A task that first fits a template face to the head, then makes the joints.
+
+    The attribute `stage` is FIT or JOINTS.
+    """
 
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """The progress function of a stage, which counts from 0 to 1.
+        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
-            begin, end: shares of the task at which the stage begins and ends.
+            begin, end: progress of the task, 0 to 1, when the stage begins and ends.
         """
         self.stage = stage
 
@@ -65,7 +69,7 @@ class Template(NamedTuple):
 
 
 class Transfer(NamedTuple):
-    """Options of the transfer.
+    """Options for the transfer of expressions from a template face to a head.
 
     Attributes:
         strength: factor of all expressions, 0 to 1.5.
@@ -122,7 +126,10 @@ def rig_task(
 def _carry_over(
     head: finding.Head, template: Template, transfer: Transfer, progress: Callable[[float], bool]
 ) -> tuple[native.Onto, native.Read]:
-    """The head with the expressions of the template, and the face of blend shapes made of it."""
+    """The head with the expressions of the template, and a face whose rig has only blend shapes.
+
+    The face is made from the head with its expressions; it has no joints.
+    """
     dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
     options = onto.OntoOptions(
@@ -133,12 +140,16 @@ def _carry_over(
         wishes=parts.Wishes(mesh=head.named, scale=1.0),
     )
     name = head.parts[0].name
-    made: native.Onto = onto.onto(name, head.parts, "cm", dna, options, progress)
+    made: native.Onto = onto.onto(
+        name, head.parts, "cm", dna, options, lambda share: progress(_CARRIED * share)
+    )
     made.shapes.name = name
     if template.path:
         lend = native.part("anyhead.borrowing").lend_materials
         lend(made.shapes.parts, dna, Path(template.path), own)
-    return made, onto.shape_face(made, dna, name)
+    return made, onto.shape_face(
+        made, dna, name, lambda share: progress(_CARRIED + (1 - _CARRIED) * share)
+    )
 
 
 def _write(dna: native.Dna, read: native.Read, path: str) -> None:
@@ -151,7 +162,7 @@ def _write(dna: native.Dna, read: native.Read, path: str) -> None:
 
 
 def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:
-    """A task that gives a face the form of a head. A cancelled task writes no file.
+    """A task that gives a face the shape of a head. A cancelled task writes no file.
 
     Args:
         head: the result of finding.read; it may be a sculpt with the topology of the face.
@@ -175,7 +186,7 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The textures of a face's DNA file, by their paths for the new file.
+    """The texture files of a face as bytes, by the paths that belong to the new DNA file.
 
     Args:
         dna: the face.

@@ -18,8 +18,8 @@ Doubles = NDArray[np.float64]
 Place = Vector | Doubles
 
 FOUND, MOVED, PLACED = "FOUND", "MOVED", "PLACED"
-# Colours of the empties; visible in viewports with the wireframe colour "Object".
-_COLORS = {
+# Colours of the dots on the landmarks, and of the empties in viewports with wire colour "Object".
+COLORS: dict[str, tuple[float, float, float, float]] = {
     FOUND: (0.15, 0.75, 0.3, 1.0),
     MOVED: (1.0, 0.55, 0.05, 1.0),
     PLACED: (0.2, 0.5, 1.0, 1.0),
@@ -32,7 +32,7 @@ class Point(NamedTuple):
     """A landmark that is shown as an empty.
 
     Attributes:
-        name: the name of the landmark in the package.
+        name: the name of the landmark in the package risorius.
         place: float64[3], in the coordinates of the head's object.
         state: FOUND, MOVED (found, then moved), or PLACED (not found, placed by the user).
         item: the empty.
@@ -66,7 +66,7 @@ def of(head: bpy.types.Object) -> dict[str, Point]:
             stayed = np.linalg.norm(place - found) <= _STAYED * size
             state = FOUND if stayed else MOVED
         name = saved.text(item, parts.LANDMARK)
-        # Ignores copies of an empty, which come later in the order of names.
+        # Copies of an empty sort after the original by name, and setdefault ignores them.
         out.setdefault(name, Point(name, place, state, item))
     return out
 
@@ -81,7 +81,7 @@ def show(
     head: MeshObject,
     found: Mapping[str, Place],
 ) -> None:
-    """Show landmarks that were found. Landmarks that the user moved or placed keep their places.
+    """Show landmarks that were found. Landmarks that the user moved or placed stay unchanged.
 
     Args:
         context: has the scene.
@@ -97,7 +97,7 @@ def show(
         item = point.item if point is not None else _make(context, head, name, size)
         _put(head, item, place)
         item[parts.LANDMARK_FOUND] = [float(value) for value in place]
-        item.color = _COLORS[FOUND]
+        item.color = COLORS[FOUND]
     for name, point in there.items():
         if name not in found and point.state == FOUND:
             bpy.data.objects.remove(point.item)
@@ -122,7 +122,7 @@ def place(context: Context, head: MeshObject, name: str, where: Place) -> bpy.ty
     item = point.item if point is not None else _make(context, head, name, size)
     _put(head, item, where)
     state = MOVED if len(saved.numbers(item, parts.LANDMARK_FOUND)) == 3 else PLACED
-    item.color = _COLORS[state]
+    item.color = COLORS[state]
     context.view_layer.update()
     return item
 
@@ -161,7 +161,7 @@ def _make(context: Context, head: MeshObject, name: str, size: float) -> bpy.typ
     item[parts.LANDMARK] = name
     item.empty_display_type = "SPHERE"
     item.empty_display_size = _SIZE * size
-    item.show_name = item.show_in_front = True
+    item.show_in_front = True
     item.parent = head
     item.matrix_parent_inverse = Matrix()
     _collection(context, head).objects.link(item)

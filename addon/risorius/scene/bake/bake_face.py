@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes the animation of a face to actions, and restores the live face.
+"""Bakes the animation of a face to actions, and restores the unbaked face.
 
 Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
-file looks the same in a Blender without the add-on. Each part stores its earlier animation.
+face looks the same in a Blender without the add-on. Armatures and shape keys store their earlier
+animation, which is restored when the bake is removed.
 """
 
 from __future__ import annotations
@@ -38,10 +39,12 @@ class BakeOptions:
     """Options of a bake.
 
     Attributes:
-        kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
+        kind: RESULT: bake bones, shape keys and animated maps; CONTROLS: bake sliders and control
+            bones.
         start, end, step: range and step in frames; the step may be a fraction.
         lod: level of detail of a RESULT; -1: the level in the viewport.
-        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; others keep their state.
+        wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; the others get no
+            animation.
         error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
         strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """
@@ -65,7 +68,7 @@ def baked(rig: ArmatureObject) -> str:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about a baked character; "" if it is not baked."""
+    """The sentence with which the panel describes a baked character; "" if it is not baked."""
     kind = baked(rig)
     if not kind:
         return ""
@@ -82,7 +85,7 @@ def words(rig: ArmatureObject) -> str:
 
 
 def _kept(owner: ArmatureObject) -> Mapping[str, object]:
-    """The stored notes of a bake on an armature; empty if they have another form."""
+    """The frame range and settings that a bake stored on an armature; empty if they are damaged."""
     return saved.table(owner, parts.BAKED) or {}
 
 
@@ -309,7 +312,7 @@ def unbake(context: Context, rig: ArmatureObject) -> bool:
 
 
 def _take_back(rig: ArmatureObject, kind: str) -> None:
-    """Undo the complete or partial writes of a failed bake on a character."""
+    """Restore a character after a failed bake, even if only a part of its actions was written."""
     controls = parts.controls_there(rig)
     if kind == CONTROLS and parts.BAKED in controls:
         _restore_controls(controls)

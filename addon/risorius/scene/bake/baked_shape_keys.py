@@ -13,15 +13,19 @@ OPENED = "risorius_opened"  # on a Key: "channel name" of each shape key that wa
 
 
 def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
-    """The real shape keys of a mesh by channel; in LIVE mode, keys that the bake needs are added.
+    """The shape keys of a mesh that show blend shape channels.
+
+    A mesh in LIVE mode has one shape key with the sum of all channels, which a bake cannot animate.
+    Such a mesh gets a shape key for each used channel.
 
     Args:
         item: mesh object.
         live: Runtime of the mesh's character.
-        used: channels that differ from 0 in the bake.
+        used: indices of the channels that differ from 0 in the bake.
 
     Returns:
-        Channel -> key name; empty if the mesh's vertex count differs from its DNA file.
+        Index of a channel -> name of its shape key; empty if the mesh has another number of
+        vertices than in the DNA file.
     """
     dna_mesh = runtime.dna_mesh(live, item)
     key = item.data.shape_keys
@@ -44,7 +48,9 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
 
 
 def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
-    """Remove the shape keys of a bake. Keys that the user edited stay and get their drivers.
+    """Remove the shape keys that a bake added.
+
+    A shape key that the user edited stays and gets a driver that reads its channel.
 
     Args:
         item: mesh object; its baked action is removed already.

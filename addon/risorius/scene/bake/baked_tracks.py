@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Computes the baked values of all animated properties from the samples of a face."""
+"""Computes the baked values of all animated properties from the samples of a face.
+
+A track (actions.Track) has the values of one property at all baked frames.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +62,7 @@ def rig_tracks(
         target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:
-        Tracks of bones, maps, channels, and other animated properties.
+        Tracks of bones, animated maps, blend shape channels, and other animated properties.
     """
     target = target or rig
     found = {t.path: t for t in _others(samples.others.get(rig, {}), rig)}
@@ -83,7 +86,7 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """Tracks of other animated properties, from their samples."""
+    """Tracks of sampled properties that the user animates and the rig does not compute."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1
@@ -130,7 +133,11 @@ _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 
 
 def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
-    """Tracks of the rig's object transform if it follows the control armature and moves."""
+    """Tracks of the rig's object transform.
+
+    Empty if the rig does not follow the control armature, has a parent or constraints, or does not
+    move.
+    """
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
     matrices = samples.places
@@ -163,8 +170,10 @@ def _array(
     group: str,
     indices: Iterable[int] | None = None,
 ) -> list[Track]:
-    """Tracks of an array property, one for each index, all by default. The property gets the
-    values of the first frame."""
+    """Tracks of an array property, one for each of the given indices; None: all indices.
+
+    The property gets the values of the first frame.
+    """
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
     target[name][:] = values[0].tolist()
@@ -177,7 +186,7 @@ def _array(
 
 
 def _read_channels(rig: ArmatureObject) -> list[int]:
-    """The indices of the channels that the user's own drivers read."""
+    """The indices of the blend shape channels that the user's own drivers read."""
     ours = {m.data.shape_keys for m in parts.meshes_of(rig)}
     found = set()
     for owner, target in drivers.targets_at(rig):
@@ -193,16 +202,16 @@ def key_tracks(
     weights: NDArray[np.float32],
     others: Mapping[str, list[list[float]]] | None = None,
 ) -> list[Track]:
-    """Tracks of the shape keys of a mesh. The keys get the values of the first frame.
+    """Tracks of the shape keys of a mesh. The shape keys get the values of the first frame.
 
     Args:
         key: the Key datablock.
-        names: channel -> key name.
+        names: index of a blend shape channel -> name of its shape key.
         weights: float32[N, B], blend shape weights at N frames.
-        others: path -> values of keys that the user animates, see Samples.
+        others: data path -> values of shape keys that the user animates, see Samples.
 
     Returns:
-        One track for each of these keys, and for each key in `others`.
+        One track for each key in `names`, and for each path in `others`.
     """
     tracks = list(_others(others or {}, key))
     for channel, name in names.items():
@@ -228,7 +237,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider or bone that never leaves its value.
+        Tracks. `actions.write` makes no curve for a slider that always has its rest value, or for a
+        property of a bone that always has its current value.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}
@@ -248,7 +258,7 @@ def control_tracks(
 
 
 def _control_bone(bone: bpy.types.PoseBone, matrices: NDArray[np.float64]) -> Iterator[Track]:
-    """Tracks of a control bone in its own rotation mode."""
+    """Tracks of location, rotation and scale of a control bone, in the bone's rotation mode."""
     turn = _TURNS.get(bone.rotation_mode, "rotation_euler")
     rows = {"location": [], turn: [], "scale": []}
     last = None

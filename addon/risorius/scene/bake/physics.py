@@ -27,7 +27,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
 
     Raises:
         BakeError: the scene has no simulation with a cache, a cache begins below frame 0, or a face
-            cannot be evaluated before its frame; if this shows during the bake, bakes are freed.
+            would be posed only after the simulation of a frame. If a face is late during the bake,
+            all bakes are freed.
     """
     found = [cache for _key, cache in caches.of_scene(context.scene)]
     count = len(found)
@@ -35,7 +36,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         raise BakeError(told("There is no simulation with a cache in this scene."))
     begin = min(cache.frame_start for cache in found)
     if begin < 0:
-        # Blender reads cache frames as unsigned numbers, so a negative frame reads as the last.
+        # Blender reads cache frames as unsigned numbers, so it would show the last cached frame at
+        # negative frames.
         raise BakeError(
             told(
                 "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "

@@ -3,8 +3,9 @@
 
 Blender evaluates actions, NLA, drivers, constraints and bodies in a separate scene that has only
 the two armatures of the face and the objects they depend on. The result of every frame equals frame
-stepping in the user's scene, whose other objects are not evaluated and whose frame stays. A few
-features need the user's scene itself (`_needs_whole_scene`); its frame is restored afterwards.
+stepping in the user's scene. Other objects of that scene are not evaluated, and its current frame
+does not change. A few features need the user's scene itself (`_needs_whole_scene`); its frame is
+restored afterwards.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ class Samples:
             scene uses Time Stretching.
         raw: float32[N, R], the raw controls for the rig, with layers.
         sliders: float32[N, R], like raw, before the eye bones add to the look controls.
-        turns: for each frame "neck", "head" -> Quaternion, see inputs.read_inputs.
+        turns: for each frame, rotations as "neck", "head" -> Quaternion, see inputs.read_inputs.
         basis: control bone -> float64[N, 4, 4], relative to its rest, after constraints and layers.
         places: float64[N, 4, 4], world matrices of the control armature.
-        bones: channel such as "location" -> float32[N, bones, width], values of the deforming
-            armature's bones without the evaluator; None if nothing animates them.
+        bones: property such as "location" -> float32[N, bones, width], values of the deforming
+            armature's bones from the user's own animation; None if there is no such animation.
         others: datablock -> {data path: list of values} of other animated properties.
     """
 
@@ -100,8 +101,8 @@ def sample(
 
 
 def _times(scene: bpy.types.Scene, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[N]: the frames at which Blender reads actions under Time Stretching, in float32
-    precision."""
+    """float64[N]: the frames at which Blender reads actions under Time Stretching, rounded to
+    float32 as Blender rounds them."""
     length = np.float32(scene.render.frame_map_old / scene.render.frame_map_new)
     return (frames.astype(np.float32) * length).astype(np.float64)
 
@@ -149,8 +150,10 @@ def _is_there(scene: bpy.types.Scene) -> bool:
 
 
 def _needs_whole_scene(scene: bpy.types.Scene, rigs: Iterable[ArmatureObject]) -> bool:
-    """Whether the user's scene must be stepped, because it has rigid bodies, drivers with context
-    properties, or a hidden armature, which Blender evaluates only for visible objects.
+    """Whether the user's scene must be stepped, because a separate scene would lack something.
+
+    It would lack rigid bodies, context properties that drivers read, and the visible objects
+    because of which Blender evaluates a hidden armature.
     """
     if scene.rigidbody_world is not None:
         return True
@@ -192,7 +195,8 @@ class _Reader:
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
         hold = rig_placement.body_of(self.controls)
         if hold is not None:
-            # Add the body, because Blender skips bones that no visible object depends on.
+            # If the body's armature were not in the scene, Blender would not evaluate bones of the
+            # body on which no visible object depends.
             self.objects.append(hold.target)
         if drivers.moves(rig):
             size = len(rig.pose.bones)
@@ -241,7 +245,7 @@ class _Reader:
         the pose. The earlier pose is restored at the end.
 
         Args:
-            depsgraph: at the frame; it is evaluated once more.
+            depsgraph: dependency graph at this frame; it is evaluated again with the posed rig.
             raw, own: results of inputs.read_mixed.
         """
         if not joint_readings.of(self.rig, self.live).places:
@@ -269,7 +273,11 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the matrices of the control bones. Args: own  their transforms with layers."""
+        """Store the matrices of the control bones for one frame.
+
+        Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
+        gaze target after the layers are mixed.
+        """
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -308,7 +316,7 @@ def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
 
 
 def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:
-    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order.
+    """The data paths of a datablock that an action, an NLA strip or a driver animates.
 
     Args:
         owner: the object or the shape keys.

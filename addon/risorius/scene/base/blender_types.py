@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Members of this Context are never None, which pyright would report:
 # pyright: reportIncompatibleMethodOverride=false
-"""Types for annotations that are more exact than the stubs of Blender's API.
+"""Defines types for annotations that are more exact than the stubs of Blender's API.
 
 Objects have one type for each kind of data. A Context always has a scene and a window manager,
 because it has both while an operator runs or a panel is drawn. At run time all classes here are

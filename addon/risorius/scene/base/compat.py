@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions that work alike in Blender 4.2 to 5.2."""
+"""Hides differences of the API between Blender 4.2 and 5.2 behind common functions."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def uid_of(modifier: bpy.types.Modifier) -> int:
 
 
 def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
-    """The object that stores the selection of a bone: since 5.0 the pose bone."""
+    """The object that stores the selection of a bone: the Bone; since Blender 5.0 the PoseBone."""
     return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
 
 
@@ -153,7 +153,9 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 
 
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action for a datablock; only of one slot if the action has slots.
+    """The F-curves of an action that move a datablock.
+
+    If the action has slots, these are the curves of one slot, see `slot_for`.
 
     Args:
         action: any action.
@@ -195,7 +197,7 @@ def assign_action(
     Args:
         target: the animation data or the strip.
         action: any action.
-        slot: of the action; None lets Blender choose. Must be None before Blender 4.4.
+        slot: slot of the action; None lets Blender choose. Must be None before Blender 4.4.
     """
     target.action = action
     if slot is not None:

@@ -37,7 +37,10 @@ def quiet() -> Iterator[None]:
 
 
 def _turn_away() -> int | None:
-    """Redirect file descriptor 1 to null. Returns: a copy of the earlier one; None if closed."""
+    """Redirect standard output to the null device.
+
+    Returns: a copy of the earlier file descriptor; None if standard output is closed.
+    """
     with suppress(OSError):  # standard output may be closed, for example in a service
         kept = os.dup(1)
         nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes drivers that read a character's properties, and finds the existing ones in the file."""
+"""Makes drivers that read a character's properties, and finds the drivers of a .blend file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .blender_types import ArmatureObject
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
-# Datablocks with a node tree inside; scenes have one up to Blender 4.5.
+# Types of datablocks that contain a node tree; scenes have one up to Blender 4.5.
 _WITH_NODES = (
     bpy.types.Material,
     bpy.types.World,
@@ -51,7 +51,9 @@ def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.Dri
 
 
 class Entries:
-    """Updates drivers that read single channels or maps after the order of these changed.
+    """Redirects drivers that read a blend shape channel or an animated map by its index.
+
+    This is needed if another DNA file gives the channels and maps other indices.
 
     Args:
         rig: deforming armature.
@@ -91,7 +93,10 @@ class Entries:
         return None
 
     def _stand_in(self, target: bpy.types.DriverTarget, array: str, label: str) -> str:
-        """Path of a property with value 0 for a removed label, so that its drivers stay valid."""
+        """Data path of a property with value 0 that replaces a removed channel or map.
+
+        Drivers that read the removed channel or map stay valid with this path.
+        """
         key = _gone_key(array, label)
         assert target.id is not None
         target.id[key] = 0.0
@@ -100,7 +105,7 @@ class Entries:
         return f'["{bpy.utils.escape_identifier(key)}"]'
 
     def move(self) -> None:
-        """Write the new data paths; the new properties must have been evaluated before."""
+        """Write the new data paths to drivers; Blender must have evaluated the new properties."""
         for target, path in self._moves:
             target.data_path = path
 
@@ -110,7 +115,10 @@ def _gone_key(array: str, label: str) -> str:
 
 
 def moves(owner: bpy.types.Object) -> bool:
-    """Whether an object has an action, an NLA track, or a driver other than the add-on's PULL."""
+    """Whether an object has an action, an NLA track, or a driver of the user.
+
+    The add-on's driver of the property PULL does not count.
+    """
     data = owner.animation_data
     return data is not None and bool(
         data.action
@@ -148,7 +156,7 @@ def plain_driver(
         curve: F-curve of a new driver without variables.
         owner: the object with the property.
         data_path: path from the object to one number.
-        name: of the driver's variable.
+        name: name of the driver's variable.
     """
     driver = curve.driver
     assert driver is not None

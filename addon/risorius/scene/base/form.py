@@ -14,12 +14,12 @@ WORDS = (
 
 
 def be_born(controls: ArmatureObject) -> None:
-    """Mark a new character with the present version. Args: controls  its control armature."""
+    """Store the current version number on a new character. Args: controls  its control armature."""
     controls[VERSION] = PRESENT
     controls[NEEDS] = WORDS
 
 
 def version_of(controls: ArmatureObject) -> int:
-    """The version of a character's saved data; 0 if the file is older than version numbers."""
+    """The version of a character's saved data; 0 if an add-on without version numbers saved it."""
     found = controls.get(VERSION)
     return found if isinstance(found, int) and found > 0 else 0

@@ -12,16 +12,17 @@ from . import session
 
 # Deforming armature -> inputs of the last evaluation of its face.
 inputs: dict[int, object] = session.table("last_written.inputs", ("rewrite", "undo", "load"))
-# Deforming armature -> bytes of the matrix that was last written.
+# Deforming armature -> bytes of the object matrix that was last written to it.
 places: dict[int, object] = session.table("last_written.places", ("rewrite", "undo", "load"))
-# Shape keys -> bytes of the channel weights whose sum the live key holds.
+# Shape keys -> bytes of the channel weights from which the live shape key (the sum of all channels)
+# was last computed.
 weights: dict[int, object] = session.table("last_written.weights", ("rewrite", "undo", "load"))
 # Deforming armature -> the Writer of skinning/bone_writer.py.
 bone_writers: dict[int, object] = session.table(
     "last_written.bone_writers", ("rewrite", "undo", "load")
 )
-# Deforming armature -> the Reading of frame/joint_readings.py. Undo keeps it, because it remembers
-# which messages were printed.
+# Deforming armature -> the Reading of frame/joint_readings.py. Undo keeps the table, because a
+# Reading stores which messages were printed.
 readings: dict[int, object] = session.table("last_written.readings", ("load",))
 # Shape keys whose points were last written without notifying Blender.
 unheard: set[int] = session.keep("last_written.unheard", set, ("rewrite", "undo", "load"))
@@ -44,7 +45,7 @@ def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
 
 
 def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender accepted a write to an object; Blender reports no refusal.
+    """Note whether Blender accepted a write to an object, because Blender reports no refusal.
 
     Args:
         item: the object.

@@ -37,7 +37,8 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: value that was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
-# On a mesh object in Direct mode (see direct.py): the persistent uid of the modifier.
+# On a mesh object in Direct mode (see direct.py): persistent uid of its Armature modifier, which
+# is switched off.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
 JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an older file showed its joints
@@ -87,9 +88,12 @@ def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
 
 
 def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
-    """Set a custom property that points to another part, also on overrides of linked characters.
+    """Set a custom property that points to another part of the character.
 
-    It is marked as overridable, because Blender otherwise resets it to the library's at load.
+    This works also on overrides of linked characters.
+
+    The property is marked as overridable, because Blender would otherwise reset it to the value in
+    the library when the file is opened.
 
     Args:
         owner: the object that gets the property.
@@ -125,8 +129,8 @@ def keys_there(item: MeshObject) -> bpy.types.Key:
 def carrier_of(rig: ArmatureObject) -> bpy.types.Object:
     """The object with the array MAPS that drivers of a character's materials read.
 
-    It is a mesh, because each update of the deforming armature would copy all its bones. In older
-    files it is the deforming armature.
+    This object is a mesh, because a change of the array on the deforming armature would make
+    Blender copy all bones of the armature. In older .blend files it is the deforming armature.
 
     Args:
         rig: deforming armature.
@@ -161,7 +165,7 @@ def maximum_of(controls: ArmatureObject) -> float:
 
 
 def members_of(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """The existing objects of a character, which may be incomplete: rig, controls, meshes."""
+    """The rig, the control armature and the meshes of a character, without deleted objects."""
     held = (rig, saved.item(rig, CONTROLS), *meshes_of(rig))
     return [item for item in held if item is not None]
 

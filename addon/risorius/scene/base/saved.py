@@ -18,7 +18,7 @@ from idprop.types import IDPropertyArray, IDPropertyGroup
 _MOST = 2**31 - 1  # largest integer of a custom property
 
 
-# A datablock, a bone, or a table (a group of custom properties) in one of these.
+# The owner of a custom property: a datablock, a bone, or a table (a group of custom properties).
 Owner = bpy.types.bpy_struct | Mapping[str, object]
 
 
@@ -81,7 +81,7 @@ def texts(owner: Owner, key: str) -> list[str]:
 
 
 def table(owner: Owner, key: str) -> Mapping[str, object] | None:
-    """A copy of a group of custom properties, or None. Args: owner, key  see `whole`."""
+    """A copy of a group of custom properties; None if missing. Args: owner, key  see `whole`."""
     found = owner.get(key)
     return (
         cast("dict[str, object]", found.to_dict()) if isinstance(found, IDPropertyGroup) else None

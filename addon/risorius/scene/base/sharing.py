@@ -2,7 +2,8 @@
 """Shares equal data between characters of a .blend: Texts of DNA files, packed images.
 
 An image is shared until any tool edits it. Then the other characters get a copy of the unedited
-image. Meshes and shape keys are never shared, because the values of keys belong to one face.
+image. A marked image is an image on which `mark` stored the digest of its packed bytes. Meshes and
+shape keys are never shared, because the values of shape keys belong to one face.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from .blender_types import ArmatureObject, Node, NodeTree, current_context
 DIGEST = "risorius_sha256"  # on an image: hash of the packed file
 STATE = "risorius_state"  # on an image: colour space, alpha mode and size of the packed file
 
-# Digest -> packed bytes of an image that several characters show.
+# SHA-256 digest -> packed bytes of an image that the materials of several characters use.
 _kept: dict[str, bytes] = session.table("sharing.kept", ("unregister",))
 
 
@@ -78,7 +79,7 @@ def separate(exact: bool = False, spaces: bool = True) -> list[str]:
     The edited image stays with the active character.
 
     Args:
-        exact: compare packed bytes too, as before a save.
+        exact: compare packed bytes too, which is slow; used before a save.
         spaces: compare colour spaces too, which takes 9 us per image; all other checks take 2 us.
 
     Returns:
@@ -198,7 +199,10 @@ def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
 
 
 def _noted(image: bpy.types.Image) -> tuple[str, str]:
-    """Digest and state of a marked image; converted to text, because users may change them."""
+    """The digest and the state that `mark` stored on an image, converted to text.
+
+    The conversion is needed because users can change the types of these custom properties.
+    """
     return str(image.get(DIGEST)), str(image.get(STATE))
 
 
@@ -223,7 +227,7 @@ def _packed(image: bpy.types.Image) -> bytes | None:
 
 
 def _is_whole(image: bpy.types.Image, digest: str | None = None) -> bool:
-    """Whether the packed bytes of an image have the marked hash."""
+    """Whether an image's packed bytes have the given digest; None: the digest stored by `mark`."""
     content = _packed(image)
     wanted = _noted(image)[0] if digest is None else digest
     return content is not None and storage.hash_of(content) == wanted

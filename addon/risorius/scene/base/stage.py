@@ -20,8 +20,8 @@ import bpy
 from . import parts
 from .blender_types import ArmatureObject, Depsgraph
 
-# Newest version known to count one reference too few to temporary data, which would be freed twice.
-# In newer versions Stage checks the count.
+# Newest Blender version known to count one Python reference too few to temporary data, which it
+# would then free twice. In newer versions Stage checks the count.
 MISCOUNTED_UNTIL = (5, 2)
 _FAR = 1_000_000  # frame of the first marker, beyond any animation
 _HANDLERS = (
@@ -44,7 +44,7 @@ class Stage:
         data = bpy.data.temp_data()  # a context manager, contrary to the stubs
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # Three references are expected: ours, the creator's, and the argument of this call.
+        # getrefcount must give 3: self._file, Blender's own reference, and the call's argument.
         if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
@@ -54,7 +54,7 @@ class Stage:
         self.roots = identity(roots)
 
     def evaluate(self, user: bpy.types.Scene) -> Depsgraph:
-        """The evaluated graph at the current frame and time settings of the user's scene."""
+        """The dependency graph at the current frame and time settings of the user's scene."""
         render = self._scene.render
         for name in _TIME:
             value = getattr(user.render, name)
@@ -63,7 +63,7 @@ class Stage:
         return self.evaluate_frame(user.frame_current, user.frame_subframe)
 
     def evaluate_frame(self, frame: int, part: float = 0.0) -> Depsgraph:
-        """The evaluated graph. Args: frame  whole frame; part  subframe, 0 to 1."""
+        """The dependency graph at a frame. Args: frame  whole frame; part  subframe, 0 to 1."""
         own, layer = self._scene, self._scene.view_layers[0]
         own.frame_current = frame
         if own.frame_subframe != part:
@@ -84,8 +84,8 @@ class Stage:
 def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
     """Context manager: the controls do not point to their faces while a graph is built.
 
-    A graph includes all objects that custom properties point to: the meshes and their keys would be
-    copied at each frame.
+    A graph includes all objects that custom properties point to. The meshes of the face and their
+    shape keys would therefore be copied at each frame.
 
     Args:
         armatures: control armatures.
@@ -122,14 +122,16 @@ def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
 
 @contextmanager
 def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]:
-    """Context manager: the control armature evaluated at a frame with keys, strips and drivers.
+    """Context manager: the control armature, evaluated at a frame.
+
+    The evaluation includes its action, NLA strips and drivers.
 
     A property without animation keeps its present value. Blender also writes the animated values to
     the original; the caller must restore the user's edits.
 
     Args:
         controls: the control armature.
-        frame: of the scene; need not be whole.
+        frame: frame of the scene; need not be whole.
     """
     whole = math.floor(frame)
     made = Stage([controls])

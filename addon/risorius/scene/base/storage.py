@@ -19,8 +19,9 @@ from .blender_types import ArmatureObject
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
 _LENGTH = "risorius_length"  # length of the unpacked file in bytes; missing in older Texts
-# Unpacking stops at 32 times the packed bytes plus 64 KB, even if the .blend states more. DNA files
-# pack to a half or a fifth; a file that packs to less than this limit is stored uncompressed.
+# Unpacking stops at 32 times the packed size plus 64 KB, even if the .blend states a larger size.
+# DNA files pack to between a half and a fifth of their size. A file that would unpack to more than
+# this limit is stored uncompressed.
 _MOST_TIMES = 32
 _ALWAYS = 1 << 16  # bytes
 _PIECE = 1 << 20  # bytes that are unpacked at once
@@ -28,7 +29,7 @@ _SIGNATURE = b"DNA"  # first bytes of every DNA file
 
 
 class ContentError(FaceError):
-    """A Text has no intact DNA file. The error text is meant to follow a colon."""
+    """A Text has no intact DNA file. The error text is the end of a sentence, after a colon."""
 
 
 def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text:
@@ -40,7 +41,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
         made: a new Text is appended to this list.
 
     Returns:
-        The Text. It must not be changed, because characters with equal files share it.
+        The Text. The Text must not be changed, because characters with equal files share it.
     """
     digest = hash_of(content)
     there = _holding(content, digest)
@@ -60,7 +61,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend with these unpacked bytes, or None."""
+    """A Text of this .blend whose DNA file has these bytes, or None."""
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -87,7 +88,7 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
 
 
 def _packed(content: bytes) -> bytes:
-    """The bytes as a zlib stream, uncompressed if it would exceed the limit for unpacking."""
+    """A zlib stream of bytes; not compressed if unpacking would then exceed the limit."""
     # Level 2 takes a sixth of the time of level 6 for 9 % more bytes.
     packed = zlib.compress(content, 2)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
@@ -118,7 +119,7 @@ def content(text: object) -> bytes:
     """The bytes of the DNA file in a Text.
 
     Raises:
-        ContentError: the bytes were changed or damaged, or this is no Text.
+        ContentError: the bytes were changed or damaged, or `text` is not a Text.
     """
     packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
     if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):

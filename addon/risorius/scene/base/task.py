@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs work in a thread, with progress and cancel. The work must not use Blender data."""
+"""Runs a function in a background thread, with progress and cancel.
+
+The function must not use Blender data.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ Work = Callable[[Callable[[float], None], Callable[[], bool]], Result]
 def telling(
     progress: Callable[[float], None], cancelled: Callable[[], bool]
 ) -> Callable[[float], bool]:
-    """Combine progress and cancel to one function that returns False to cancel the work.
+    """Combine two functions into one that reports progress and returns False after a cancel.
 
     Args:
         progress: function that receives the progress, 0 to 1.
@@ -29,7 +32,7 @@ def telling(
 
 
 class Task(Generic[Result]):
-    """Work in a thread.
+    """A function that runs in a background thread, with its progress and result.
 
     Attributes:
         share: progress, 0 to 1.
@@ -38,7 +41,11 @@ class Task(Generic[Result]):
     """
 
     def __init__(self, work: Work[Result]) -> None:
-        """Args: work  function that calls progress(0 to 1), and ends early if cancelled()."""
+        """Prepare the thread without starting it.
+
+        Args: work  function with two arguments: `progress`, which it calls with its progress (0 to
+        1), and `cancelled`, which returns True if the work must end early.
+        """
         self.share = 0.0
         self.result: Result | None = None
         self.error: Exception | None = None

@@ -73,7 +73,7 @@ def edit_armature(
 
 @contextmanager
 def kept_selection(context: Context) -> Iterator[None]:
-    """Context manager: restore the active object, its mode and the selection."""
+    """Context manager: at the end, restore the active object, its mode and the selection."""
     layer = context.view_layer
     active = layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
@@ -138,7 +138,7 @@ def build_rig(
         context: a Blender context with a view layer.
         plan: names, joints and meshes of the character.
         made: receives every new datablock.
-        workshop: a linked collection for editing bones.
+        workshop: a collection in the scene, in which bones are edited.
 
     Returns:
         The armature object; each bone stores its joint index.
@@ -166,8 +166,8 @@ def build_rig(
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False
-    # It follows the control armature (rig_placement.py); moved together with it by the user, it
-    # would move twice as far.
+    # The rig is locked because it follows the control armature (rig_placement.py). If the user
+    # moved both together, the rig would move twice as far.
     lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
@@ -178,11 +178,11 @@ def build_rig(
 
 
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Make Blender evaluate the controls with the rig, also if they are hidden.
+    """Add drivers to the rig so that Blender evaluates the controls even if they are hidden.
 
-    Without a dependency Blender skips hidden objects in viewport and render, and the face would not
-    move. The drivers read the bones, because Blender evaluates only those components of a hidden
-    object that something visible depends on.
+    Blender skips hidden objects that no visible object depends on, and the face would not move. The
+    drivers read each control bone, because Blender evaluates only the bones of a hidden armature
+    that something visible depends on.
 
     Args:
         rig: the deforming armature.
@@ -218,7 +218,7 @@ def _pulling(rig: ArmatureObject) -> bpy.types.Driver | None:
 
 
 def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Make Blender also evaluate new bones of the controls, see `pull_controls`.
+    """Extend the driver of `pull_controls` to new bones of the control armature.
 
     Args:
         rig: the deforming armature.
@@ -233,7 +233,7 @@ def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
 
 
 def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
-    """Remove dependencies on control bones before these are deleted.
+    """Remove control bones from the driver of `pull_controls` before the bones are deleted.
 
     Args:
         rig: the deforming armature.
@@ -251,7 +251,7 @@ def joints_are_shown(rig: ArmatureObject) -> bool:
 
 
 def hide_joints(rig: ArmatureObject) -> None:
-    """Hide the bones of a deforming armature; their names and selection stay."""
+    """Hide the bones of a deforming armature by hiding its bone collections."""
     for shelf in rig.data.collections_all:
         shelf.is_visible = False
     rig.pop(parts.JOINTS_SHOWN, None)
@@ -275,7 +275,7 @@ def build_controls(
         context: a Blender context with a view layer.
         plan: names, joints, meshes and controls of the character.
         made: receives every new datablock.
-        workshop: a linked collection in which bones are edited.
+        workshop: a collection in the scene, in which bones are edited.
 
     Returns:
         The armature object.
@@ -315,7 +315,7 @@ def build_controls(
 
 
 def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
-    """Places of the control bones: name -> (position, axis, length, name of the parent)."""
+    """Control bone -> (position, direction, length in Blender units, name of the parent bone)."""
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -346,7 +346,7 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The extent of the face, for placing the outlines. Args: plan  meshes and joints of a face."""
+    """The extent of a face, to place outlines of bones. Args: plan  its meshes and joints."""
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)
@@ -354,7 +354,10 @@ def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
 
 
 def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[float, float]:
-    """x of the centre and half the width of a head at eye height, which excludes the shoulders."""
+    """The x coordinate of a head's centre, and half the width of the head.
+
+    Only vertices near the height of the eyes count, so that the shoulders are excluded.
+    """
     near = np.abs(points[:, 2] - height) < 0.1 * size
     # A face without skin near its eyes uses the width of the whole face.
     across = points[near if near.any() else slice(None), 0]
@@ -367,7 +370,7 @@ def add_properties(
     """Add the float property of each slider to a pose bone, with limits, default and tooltip.
 
     Args:
-        bone: the bone of the face.
+        bone: the pose bone that stores the sliders.
         controls: label, rest and lowest value of each slider.
         maximum: largest value of all sliders.
     """
@@ -380,7 +383,7 @@ def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maxi
     """Set limits, default and tooltip of one slider.
 
     Args:
-        bone: the bone of the face, which has the property already.
+        bone: the pose bone that stores the sliders; it has the property already.
         control: label, rest, lowest value and description of the slider.
         maximum: largest value of the slider.
     """

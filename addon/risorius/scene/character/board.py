@@ -2,8 +2,9 @@
 """Reads and sets the handles of a face board, and decides whether board or sliders lead the face.
 
 The location of a handle in its own axes gives the value of its GUI control, independent of the
-places of board, armature and face. Raw controls without a GUI control keep their sliders. Either
-the board or the sliders lead; all code that reads or sets the pose of a face uses this module.
+positions of board, armature and face. Raw controls without a GUI control keep their sliders. Either
+the board or the sliders lead, that is, move the face; the others have no effect. All code that
+reads or sets the pose of a face uses this module.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ class _Places:
     """Indices of handle values among the bone locations of an armature.
 
     Attributes:
-        names: names of all pose bones of the armature, in order; other names need new indices.
+        names: names of all pose bones of the armature; if they change, the indices are renewed.
         live: Runtime of the handles.
         at: int[n], indices into the flat float[bones, 3] of locations.
         gui: int[n], index of the GUI control of each location.
         low, high: float32[n], range of each location.
         unit: float32[n], value of the GUI control for a location of 1.
-        moved: bone and (row, axis) pairs of each handle with constraints by the user; None: to be
-            searched.
+        moved: (bone, [(index into `at`, axis)]) of each handle with constraints by the user; None:
+            not searched yet.
     """
 
     names: tuple[str, ...]
@@ -197,7 +198,7 @@ def _read_moved(
     axes: Iterable[tuple[int, int]],
     gui: Floats,
 ) -> None:
-    """Read a handle that constraints by the user move. Args: axes  (row in places, axis)."""
+    """Read a handle that the user's constraints move. Args: axes  (index into places.at, axis)."""
     local: Matrix = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )
@@ -225,13 +226,14 @@ def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats
 
 
 def raw_now(rig: ArmatureObject) -> dict[str, float]:
-    """The pose of a face by slider names, from board or sliders.
+    """The pose of a face as slider name -> value.
 
     Args:
         rig: the character.
 
     Returns:
-        Value of each existing slider; if the board leads, it gives the values of its sliders.
+        Values of all existing sliders. If the board leads, sliders that its handles can move have
+        the values that the board gives them.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -242,7 +244,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Slider name -> value from the board, for the sliders that the board reaches.
+    """Slider name -> value from the board, for the sliders that its handles can move.
 
     Args:
         rig: the character.
@@ -253,14 +255,14 @@ def given(rig: ArmatureObject) -> dict[str, float]:
 
 
 def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
-    """Move the board as near to raw controls as possible, starting from its current pose.
+    """Move the handles so that the face comes as near as possible to wanted raw controls.
 
     Args:
         rig: a character with a face board.
         values: values by slider names; controls without a handle are set on their sliders.
 
     Returns:
-        The differences of raw controls that the board cannot show.
+        The remaining differences of raw controls, which the board cannot reproduce.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -285,8 +287,8 @@ def fit(
     Args:
         live: the character's Runtime.
         raw: float[N, R], wanted values of raw controls at N frames.
-        start: float[N, G], start of the search; None: from the inverted table of the file, or 0
-            if the file has no table.
+        start: float[N, G], start of the search; None: the raw values converted by the rig's
+            raw_to_gui, or 0 if the DNA file has no table from GUI controls to raw controls.
 
     Returns:
         float64[N, G], values of GUI controls.
@@ -387,7 +389,8 @@ def mark(rig: ArmatureObject, sign: float) -> None:
 
     Args:
         rig: the character.
-        sign: the mark, a value that no user sets; it is stored as z of each handle's location.
+        sign: the mark, a value that no user sets; the mark is stored as z of each handle's
+            location.
     """
     for handle in handles_in(rig):
         parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign
@@ -444,5 +447,5 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
 
 def path_of(bone: str) -> str:
-    """The data path of a handle's location, from the armature object. Args: bone  of the handle."""
+    """The data path of a handle's location, from the armature. Args: bone  name of its bone."""
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'

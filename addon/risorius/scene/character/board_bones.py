@@ -149,10 +149,11 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
 
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
-    """GUI control -> its joint motion to the face's left divided by its total motion, -1 to 1.
+    """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
 
-    Only for middle controls that go sideways. Names do not tell the direction, because "left" in
-    jawLeft may mean the viewer's left.
+    The motion is summed over all joints; +x is the left side of the face. Only controls that move
+    the middle of the face sideways are included. Their names do not define the direction, because
+    "left" in jawLeft may mean the viewer's left.
     """
     table = live.table
     chosen = [
@@ -179,7 +180,7 @@ def _sideways(live: runtime.Runtime) -> dict[int, float]:
 
 
 def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
-    """float64[J, 3]: joint positions in Blender units. Args: deltas  of a pose, float32[J, 9]."""
+    """float64[J, 3]: joint positions, Blender units. Args: deltas  float32[J, 9] of a Pose."""
     dna, space = live.dna, live.space
     angles = np.asarray(dna.neutral_joint_rotations, np.float64)
     if live.rig.rotation == "euler":
@@ -190,7 +191,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 
 
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a primary board: beside the head meshes."""
+    """The position and unit of a primary board, which is beside the head meshes."""
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
 
@@ -214,7 +215,10 @@ def _box(
 
 
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The place of a complete board: to the right (+x) of the head, _SHARE times its size."""
+    """The position and unit of a complete board.
+
+    The board is beside the head at +x, and _SHARE times as high as the head.
+    """
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height

@@ -23,7 +23,7 @@ class Room:
 
     Attributes:
         middle: x of the face's centre.
-        eyes: x between the eyes.
+        eyes: x of the midpoint between the eyes.
         wide: half the width of the face.
         top: z of the highest point of all meshes, hair included.
     """
@@ -71,7 +71,7 @@ def _collar() -> Line:
     return outer + [(0.93 * x, 0.93 * y) for x, y in reversed(outer)]
 
 
-# Outlines lie in the xy plane, with a radius of about 1.
+# Control bone -> lines of its outline in the xy plane, with a radius of about 1.
 _OUTLINES: dict[str, list[Line]] = {
     "head": [_ring(), _ring(0.94)],
     "neck": [_collar()],
@@ -120,7 +120,7 @@ def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
     """Make a wire mesh object of open lines, in no collection.
 
     Args:
-        name: of the new datablocks.
+        name: name of the new datablocks.
         lines: corners of each line in the xy plane.
     """
     corners: list[tuple[float, float, float]] = []
@@ -138,7 +138,8 @@ def disc(name: str) -> bpy.types.Object:
     """Make a filled disc of radius 1, which is easy to click. Args: name  of the datablocks."""
     mesh = bpy.data.meshes.new(name)
     ring = [(x, y, 0.0) for x, y in _ring()]
-    # Two opposite faces, because Blender does not draw back faces, and some handles show them.
+    # The disc has a second face for its back, because Blender draws only the front of a face and
+    # some handles are seen from behind.
     back = range(2 * _COUNT - 1, _COUNT - 1, -1)
     mesh.from_pydata([*ring, *ring], [], [range(_COUNT), back])
     return bpy.data.objects.new(name, mesh)

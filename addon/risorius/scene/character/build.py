@@ -33,7 +33,7 @@ class BuildOptions:
         texture_folder: folder to search first; "": none.
         simple_materials: make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None: the scene's unit.
-        nearest_lods: build the finest level of the file if it has none of the chosen levels.
+        nearest_lods: build the finest level of the file if the file has no level of `lods`.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -52,7 +52,7 @@ class _File:
     """A DNA file that was read and compiled.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         content: bytes of the file.
         dna: Dna parsed from these bytes.
         rig: risorius.Rig compiled from the Dna.
@@ -82,7 +82,7 @@ def import_file(
 
     Args:
         context: a Blender context with scene and view layer.
-        path: of the DNA file.
+        path: path of the DNA file.
         options: levels, shapes and materials to build.
         progress: function that is called with the progress, 0 to 1.
 
@@ -168,7 +168,7 @@ def _first(plan: plans.CharacterPlan) -> int:
 
 
 def settle(context: Context, *items: bpy.types.Object) -> None:
-    """Update the evaluated copies after adding custom properties.
+    """Make Blender evaluate objects again after custom properties were added to them.
 
     Args:
         context: its view layer is updated.
@@ -203,7 +203,10 @@ def _connect(
 
 
 def _source(path: Path) -> str:
-    """The path that Reload uses; relative to the .blend if it is saved on the same drive."""
+    """The path of a DNA file for the operator Reload.
+
+    The path is relative to the .blend file if both files are on the same drive.
+    """
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:  # another drive
@@ -240,7 +243,7 @@ def _kind_of_keys(mode: str) -> str:
 
 
 def choose_skinning(rig: ArmatureObject, mode: str) -> None:
-    """Store whether a face may use Direct mode; only LIVE forbids it.
+    """Store whether a face may use Direct mode (skinning/direct.py), which LIVE forbids.
 
     Args:
         rig: the deforming armature.
@@ -253,7 +256,7 @@ def choose_skinning(rig: ArmatureObject, mode: str) -> None:
 
 
 def channel_labels(dna: native.Dna) -> list[str]:
-    """Unique names for real shape keys, one for each blend shape channel."""
+    """Unique names for the shape keys of KEYS mode, one for each blend shape channel."""
     return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
 
 
@@ -264,7 +267,7 @@ def _into_place(
     rig: ArmatureObject,
     controls: ArmatureObject,
 ) -> None:
-    """Give the collection its final name, and select the controls alone."""
+    """Give the character's collection its final name, and select only the control armature."""
     workshop.name = plan.name
     compat.deselect_all(context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
@@ -272,12 +275,13 @@ def _into_place(
 
 
 def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
-    """Switch the meshes of a character to another kind of shapes.
+    """Switch the shape keys of a character's meshes to another mode.
 
     Args:
         rig: the deforming armature.
-        mode: "AUTO": each mesh has one key with final positions; "LIVE": one key with the sum of
-            the channels, before the armature deforms it; "KEYS": one key per channel.
+        mode: "AUTO": each mesh has one shape key with the final positions; "LIVE": one shape key
+            with the sum of the blend shape channels, which the armature then deforms; "KEYS": one
+            shape key for each blend shape channel.
 
     Returns:
         Sentences about meshes that could not be switched.
@@ -298,7 +302,10 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Remove a character and its data from the file; data with other users stay."""
+    """Remove a character and its datablocks from the .blend file.
+
+    Datablocks that have other users stay.
+    """
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds mesh objects with skin weights, and switches their shape keys between LIVE and KEYS."""
+"""Builds mesh objects with skin weights, and switches their shape keys between two modes.
+
+In KEYS mode a mesh has a shape key for each blend shape channel, called a real key here. In LIVE
+mode the mesh has one shape key, the live key, to which the evaluator writes the sum of all
+channels.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +32,16 @@ _LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
 
 
-# Session uids of mesh objects that were built and not edited since, so their skin weights equal the
-# file.
+# Session uids of mesh objects that were not edited since they were built, so that their skin
+# weights equal the weights in the DNA file.
 _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 
 
 def fresh_weights(item: MeshObject) -> bool:
-    """Whether a mesh was not edited since its import, so that its skin weights equal the file."""
+    """Whether a mesh was not edited since its import.
+
+    Its skin weights then equal the weights in the DNA file.
+    """
     return item.session_uid in _fresh
 
 
@@ -115,10 +123,11 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
-    """Shape key name -> channel, for the real keys that Risorius made.
+    """Name of a real key that Risorius made -> index of its blend shape channel.
 
-    They are identified by the variable name of their drivers, so a key that the user drives by a
-    channel does not count. If a driver was copied to another key, only the first key counts.
+    Real keys are identified by the variable name of their drivers, so a shape key that the user
+    drives by a channel does not count. If a driver was copied to another shape key, only the first
+    of both counts.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}
@@ -141,7 +150,7 @@ def live_block(item: MeshObject) -> bpy.types.ShapeKey | None:
     """The live key, also after renaming; None if the mesh has none.
 
     Its interpolation identifies the key, because this setting has no effect on relative keys and
-    survives renames, reordering, copies and files. The search by name is only a shortcut.
+    survives renaming, reordering, copying and saving. The search by name is only a shortcut.
     """
     key = item.data.shape_keys
     if key is None:
@@ -255,7 +264,7 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        Result of user_edits.key_edits.
+        bool[V], whether a vertex was edited, and float64[V, 3] offsets, see user_edits.key_edits.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
@@ -266,7 +275,7 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
 
     Args:
         item: the mesh object.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:
@@ -289,7 +298,7 @@ def add_channel_key(
         item: the mesh object.
         rig: deforming armature with the weights of channels.
         channel: index of the blend shape channel.
-        name: of the key.
+        name: name of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
 
     Returns:
@@ -356,13 +365,13 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add the live key, for the sum of channels or final positions. Args: item  the mesh object."""
+    """Add a live key to a mesh. Args: item  the mesh object."""
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
     block.value = 1.0
     block.interpolation = _LIVE_MARK
-    # Edits of this key are lost at the next change of a control, so edit mode must not open it.
+    # Edits of the live key are lost at the next change of a control, so the user must not edit it.
     block.lock_shape = True
     item.active_shape_key_index = 0
     item[parts.MODE] = "LIVE"

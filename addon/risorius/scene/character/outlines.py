@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hides and shows the outlines of control bones, and removes them from collections."""
+"""Hides and shows the outlines (custom shapes) of control bones, and places them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def show(controls: ArmatureObject) -> None:
 def stand_beside(rig: ArmatureObject) -> int:
     """Place the outlines as on a newly imported face.
 
-    In older files they cover the eyes. Sizes and positions that the user changed are lost.
+    On faces that older versions of the add-on imported, the outlines cover the eyes. Sizes and
+    positions that the user changed are lost.
 
     Args:
         rig: the character's deforming armature.
@@ -70,7 +71,7 @@ def stand_beside(rig: ArmatureObject) -> int:
 
 
 def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]:
-    """(name of the part, bone) of each control bone with an outline."""
+    """(role such as "head", bone) of each control bone with an outline."""
     for bone in controls.pose.bones:
         part = bone.bone.get(parts.PART)
         if isinstance(part, str) and bone.custom_shape is not None:

@@ -49,7 +49,7 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig has a matrix up to rounding. Args: wanted  float64, 16 numbers."""
+    """Whether a rig's object matrix equals a matrix, up to rounding. Args: wanted  float64[16]."""
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
@@ -77,7 +77,7 @@ def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
     """Move a new face beside its source mesh, along +x.
 
     Args:
-        rig: deforming armature of the face; its DNA file has the origin of the mesh object.
+        rig: deforming armature of the face, which has the same origin as the mesh object.
         item: the mesh object.
     """
     place = item.matrix_world.translation
@@ -154,8 +154,9 @@ def attach(
         body: an armature object, at any scale.
         base: the body's bone that carries the whole face.
         neck, head: the body's bones that rotate the face's own neck and head; "": none.
-        fit: "NONE": keep the place of the face; "MOVE": move its head bone (or neck bone) onto the
-            body's bone at rest; "SCALE": also scale the face so that the neck lengths are equal.
+        fit: "NONE": do not move the face; "MOVE": move the face so that its head bone is at
+            the rest position of the body's head bone (without head bones: neck bones); "SCALE":
+            also scale the face so that the neck lengths are equal.
     """
     detach(controls)
     if fit != "NONE":
@@ -163,7 +164,7 @@ def attach(
     hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
-    # Relative to the body's rest pose, so that the body's current pose moves the face.
+    # The face is attached relative to the body's rest pose, so that the current pose moves it.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
     hold.set_inverse_pending = False
@@ -173,7 +174,10 @@ def attach(
 
 
 def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[str]:
-    """The body's bones from the neck bone to the head's parent, because a neck may have several."""
+    """The neck bones of a body, from `neck` to the parent of `head`, without `base`.
+
+    A body may have more than one neck bone.
+    """
     if not neck:
         return []
     bone = body.data.bones.get(head)
@@ -193,7 +197,7 @@ def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
 
 
 def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
-    """Rotations of a body's neck and head for the face, relative to the base bone.
+    """Rotations of a body's neck and head bones, which the face adds to its own.
 
     Copy Rotation constraints are no alternative, because they assume equal object rotations, and
     bodies from other programs are rotated and scaled objects.
@@ -203,7 +207,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; missing without a rotation.
+        "neck" and "head" -> Quaternion in the control armature's axes; bones at rest are left out.
     """
     hold = body_of(controls)
     if hold is None:
@@ -242,7 +246,11 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move (and scale) the face so that its head and neck bones meet the body's at rest."""
+    """Move the face so that its head bone meets the body's head bone in rest position.
+
+    Without head bones, the neck bones are used. `scale`: also scale the face, so that its neck is
+    as long as the neck of the body.
+    """
     own = controls.data.bones
     pairs = [
         (
@@ -269,7 +277,7 @@ def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, s
 
 
 def detach(controls: ArmatureObject) -> None:
-    """Detach a face from its body; the face keeps its place."""
+    """Detach a face from its body; the face stays at its current position."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiles the DNA of characters, and caches the result by the hash of the DNA's content.
 
-The cache holds no Blender object, so it stays valid after load, undo and append.
+The cache holds no Blender object, so it stays valid after load, undo and append. In this file, look
+controls are the raw controls that rotate an eye, such as eyeLookUpL.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ...logic.character import board_layout, board_table, plans, primary_table
 from ..base import console, last_written, parts, saved, session, storage
 from ..base.blender_types import ArmatureObject, MeshObject
 
-# The bones of the control armature without the face board.
+# The bones of the control armature that do not belong to the face board.
 CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
 BOARD_BONES = ("board", "board_frames")  # the bone that moves the board; the bone with its lines
 COMPLETE, PRIMARY = "COMPLETE", "PRIMARY"  # the two kinds of board
@@ -103,14 +104,14 @@ class Runtime:
         return replace(self, board=PRIMARY)
 
     def with_board(self, kind: str) -> Runtime:
-        """This Runtime for a kind of face board. Args: kind  PRIMARY or COMPLETE."""
+        """This Runtime, or its copy for the primary board. Args: kind  PRIMARY or COMPLETE."""
         assert self.board == COMPLETE or kind == PRIMARY
         return self._with_primary if kind != self.board else self
 
     @cached_property
     def table(self) -> board_table.BoardTable:
-        """The table from GUI to raw controls: of the primary board, else of the file; made from the
-        raw controls if the file has none."""
+        """The table that converts GUI controls to raw controls: the table of the primary board, the
+        table of the file, or one GUI control per raw control if the file has no table."""
         if self.board == PRIMARY:
             return primary_table.table_of(self.labels)
         if not self.dna.gui_control_names:
@@ -122,7 +123,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board; handles of a complete board have no positions."""
+        """The handles of the face board. Their positions on a complete board are not set here."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -131,7 +132,7 @@ class Runtime:
         return board_layout.handles_of(self.table, ways, region_of, taken)
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
-        """The native converter from joint deltas to pose channels of the bones of these joints."""
+        """The native converter from deltas of these joints to transforms of their pose bones."""
         space = self.space
         return native.module().BoneSpace(
             self.dna.neutral_joint_rotations,
@@ -155,7 +156,7 @@ class Turning:
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
         armature_axes: converts the vector part of a quaternion from the armature's axes to the
             file's.
-        bone_axes: converts it from the axes of the joint's bone to the file's.
+        bone_axes: converts the vector part from the axes of the joint's bone to the file's.
     """
 
     joint: int
@@ -213,7 +214,7 @@ def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
         except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
-            # Print it once, not at every frame; the panel shows the loss too.
+            # Cache the failure, so that the error is printed once and not at every frame.
             words = names.printable(str(error)).rstrip(".")
             console.say(f"the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
@@ -381,8 +382,10 @@ def _measure_look(runtime: Runtime) -> dict[str, list[tuple[int, float, float]]]
 
 
 def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> float:
-    """The rotation of an eye by a look control at value 1, in radians; DEFAULT_EYE_ANGLE if it is
-    below 2 degrees."""
+    """The rotation of an eye by a look control at value 1, in radians.
+
+    DEFAULT_EYE_ANGLE is returned if the eye rotates by less than 2 degrees or has no joint.
+    """
     joint = runtime.anchors.eyes.get(side)
     if joint is None:
         return DEFAULT_EYE_ANGLE

@@ -22,8 +22,9 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
 
     The slider bone is selected if it is keyed; it is locked, so nobody moves it by accident.
     Outside pose mode the keyed bones of head and eyes are selected too, so that moving a column of
-    keys moves their keys. In pose mode they are selected only if no keyed bone is selected. Handles
-    of a face board follow the rule of pose mode in every mode.
+    keys moves their keys. In pose mode these bones are selected only if no keyed bone is selected
+    yet. In every mode, keyed handles of a face board are selected only if no keyed handle is
+    selected yet.
 
     Args:
         controls: control armature of the face.
@@ -57,7 +58,9 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Add the control armature to the selection; it enters pose mode if the active object is in it.
+    """Add the control armature to the selection.
+
+    If the active object is in pose mode, the control armature enters pose mode too.
 
     Args:
         context: a Blender context.
@@ -76,7 +79,7 @@ def show_object(context: Context, controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject) -> None:
-    """Make slider keys visible if Blender's operators inserted new ones.
+    """Make slider keys visible if Blender's operators inserted new slider keys.
 
     Args:
         controls: a control armature whose action was edited.

@@ -22,7 +22,9 @@ _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 
 
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
-    """Slider name -> value, for a face or a region; a leading board gives the values.
+    """Slider name -> value, for a face or a region.
+
+    If the face board leads, the values come from the positions of its handles.
 
     Args:
         rig: the character.
@@ -127,7 +129,7 @@ def mirror_bones(controls: ArmatureObject) -> None:
 
 
 def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
-    """Copy slider values from one side to the other; both eyes look in the same direction.
+    """Copy slider values from one side to the other. Both eyes then look in the same direction.
 
     Args:
         rig: the character.
@@ -148,7 +150,7 @@ def link(rig: ArmatureObject, from_left: bool) -> int:
 
     Args:
         rig: the character.
-        from_left: True: the character's left side leads.
+        from_left: True: the character's left side drives the right side; False: the reverse.
 
     Returns:
         The number of linked sliders.
@@ -174,7 +176,7 @@ def link(rig: ArmatureObject, from_left: bool) -> int:
 
 
 def unlink(rig: ArmatureObject) -> None:
-    """Remove the links between the sides; the sliders keep their current values."""
+    """Remove the drivers that link left and right sliders; the sliders keep their values."""
     controls, face = parts.controls_there(rig), parts.face_bone(rig)
     assert face is not None
     for follower, leader in followers(controls).items():

@@ -77,7 +77,7 @@ def edited_vertices(present: Weights, wanted: Weights) -> set[int]:
 
     Args:
         present: {group: {vertex: weight}} of the object.
-        wanted: {group: {vertex: weight}} of the file; only its groups are compared.
+        wanted: {group: {vertex: weight}} of the file; other groups of the object are ignored.
     """
     edited = set()
     for name, values in wanted.items():

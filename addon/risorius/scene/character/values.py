@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the arrays of channels and animated maps that drivers of a character read."""
+"""Writes the values of blend shape channels and animated maps, which drivers of a character read.
+
+Materials read the maps from one mesh of the character, the carrier.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ def write(
         rig: deforming armature; Blender is not notified of its change.
         maps: float32[M], values of the animated maps.
         channels: float32[C], values of the blend shape channels.
-        simulated: function that returns whether an edit of a mesh object resets a simulation.
+        simulated: function that returns whether tagging a mesh object would reset a simulation.
     """
     _fill(rig, parts.CHANNELS, channels)
     _fill(rig, parts.MAPS, maps)
@@ -44,7 +47,7 @@ def _fill_unheard(
 ) -> None:
     """Write maps to the evaluated copies of the carrier, and let Blender update the materials.
 
-    This does not tag the carrier, which would reset its simulation.
+    The carrier is not tagged for an update, because the update would reset its simulation.
     """
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     for graph in (layer.depsgraph for layer in layers):
@@ -85,7 +88,7 @@ def carry_on_largest(rig: ArmatureObject) -> None:
 
 
 def point_materials(rig: ArmatureObject, owner: bpy.types.Object) -> None:
-    """Point the drivers of a character's materials at the object with their values.
+    """Point the drivers of a character's materials at the object that stores the animated maps.
 
     Args:
         rig: deforming armature.

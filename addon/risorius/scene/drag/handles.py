@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chooses the drag handles of a face: the vertices that its controls move most."""
+"""Chooses the drag handles of a face: the vertices that its controls move most.
+
+These handles are vertices of the skin; the handles of a face board are bones.
+"""
 
 from __future__ import annotations
 
@@ -54,9 +57,10 @@ def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 
 
 def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
-    """The sliders that move a selected handle at least _SHARE as far as its strongest slider.
+    """The sliders that have a strong effect on a selected handle.
 
-    Sliders that drivers or layers lead are left out.
+    A slider counts if it moves the handle more than _SHARE times as far as the slider that moves
+    this handle most. Sliders that drivers or layers move are left out.
 
     Args:
         context: has the visible scene.

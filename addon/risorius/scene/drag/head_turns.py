@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms vertices of the drag solver (file space) to world space.
+"""Transforms vertices of the drag solver from file space to world space.
 
-The transforms include the rotations of neck and head bones, edits of joints that the evaluator does
-not write, the rig's object transform, and axes and unit of the file.
+File space has the axes and the unit of the DNA file. The transforms include the rotations of neck
+and head bones, edits of joints that the evaluator does not write, and the rig's object transform.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
 class HeadTurns:
     """Head and joint motions that the raw controls do not contain, at one moment.
 
-    It holds Blender objects, so it must not outlive the operator that creates it.
+    It refers to Blender objects, so it must not outlive the operator that creates it.
     """
 
     def __init__(

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stores points of a face on its control armature: pins, and selected and hidden handles.
 
-A pinned point keeps its position while other points are dragged.
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex). A pinned
+point keeps its position while other points are dragged.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        counts: number of vertices of each mesh of the DNA; points beyond them are left out.
+        counts: number of vertices of each DNA mesh; points with a larger index are left out.
     """
     controls = parts.controls_of(rig)
     numbers = saved.wholes(controls, kind) if controls is not None else []

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the face and the vertex under a ray through the scene."""
+"""Finds the face and the vertex under a ray through the scene.
+
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex). Handles are
+points that the user can drag.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +48,7 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex of the first face on a ray, or None if another object comes first.
+    """The vertex at which a ray meets a face; None if it first meets another object or nothing.
 
     Args:
         context: its evaluated scene is searched.

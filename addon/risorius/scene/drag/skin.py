@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the visible meshes of a face: vertices in world space, and mirrored vertices."""
+"""Reads vertices of a face's visible meshes in world space, and finds mirrored vertices.
+
+A point is a vertex of a face: (index of the mesh in the DNA file, index of the vertex).
+"""
 
 from __future__ import annotations
 
@@ -25,10 +28,11 @@ _BESIDE = 0.02  # of the face's size: largest distance of a vertex from the mirr
 class Skin:
     """A face's meshes in the scene.
 
-    It holds Blender objects, so it must not outlive the operator that creates it.
+    It refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
-        surface: the face in file space, at the visible level of detail.
+        surface: the face in file space (axes and unit of the DNA file), at the visible level of
+            detail.
         items: mesh index -> mesh object.
         size: largest extent of the face at rest, in Blender units.
         depsgraph: dependency graph of the view.
@@ -45,7 +49,7 @@ class Skin:
 
     @classmethod
     def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
-        """The skin of a character.
+        """Collect the visible meshes of a character.
 
         Args:
             context: has the visible scene.
@@ -91,7 +95,7 @@ class Skin:
         return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
 
     def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
-        """(vertex, position in world space) of a polygon's vertices; None as in `seen`.
+        """(vertex, position in world space) of a polygon's vertices; None if `seen` gives None.
 
         Args:
             mesh: index of the mesh in the DNA file.
@@ -116,7 +120,7 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex nearest to the mirrored position at rest; None if none is near.
+        """The vertex nearest to the mirror image of a vertex, both at rest; None if none is near.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts between sliders and the raw controls of the drag solver, including layers."""
+"""Converts between sliders and the raw controls of the drag solver.
+
+The raw controls include the animation layers; the sliders do not.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +30,13 @@ class Sliders:
 
     Attributes:
         before: property name -> value to restore.
-        start: float64[R], values of the sliders or of the leading board.
+        start: float64[R], values of the sliders; if the face board leads, the values that the
+            board gives them.
         seen: float32[R], the raw controls of the face, with layers and eye bones.
         gain: float64[R], change of a raw control divided by the change of its slider.
         free: bool[R], sliders that can move.
         low, high: float64[R], the limits of `seen`.
-        linked: (leader, follower) indices of linked sides.
+        linked: (index of a slider, index of the slider on the other side that follows it).
         places: bone -> location of each handle of a leading face board; empty if sliders lead.
     """
 
@@ -47,7 +51,7 @@ class Sliders:
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def values(self, raw: NDArray[np.float32]) -> Float:
-        """float64[R]: slider values that result in raw controls. Args: raw  float32[R]."""
+        """float64[R]: slider values that give wanted raw controls. Args: raw  float32[R]."""
         change = raw.astype(np.float64) - self.seen
         moved = self.free & (np.abs(change) > 1e-7)
         values = np.where(moved, self.start + change / self.gain, self.start)
@@ -159,7 +163,7 @@ def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: whether a control is in a region. Args: live  the Runtime; region  its name."""
+    """bool[R]: whether a raw control is in a region. Args: live  Runtime, region  name."""
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 

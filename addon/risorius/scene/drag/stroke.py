@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs one drag of a face from mouse press to release: solves sliders for a target position.
 
-Each target is solved from the pose at the press, so the result depends on the position of the
-pointer and not on its path.
+Each target is solved from the pose at the mouse press, so the result depends on the position of the
+pointer and not on its path. A point is a vertex of a face: (index of the mesh in the DNA file,
+index of the vertex). File space has the axes and the unit of the DNA file.
 """
 
 from __future__ import annotations
@@ -78,14 +79,14 @@ class _Anchors:
 class Stroke:
     """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    It holds Blender objects, so it must not outlive the operator that creates it.
+    It refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         rig, live: the character and its Runtime.
         point: dragged (mesh, vertex).
         options: options; they may change during the drag.
         skin: the meshes in the scene.
-        state: sliders at the press.
+        state: sliders at the mouse press.
         turns: transforms from file space to world space.
         reach: float32[3, R], motion of the point per control, in file units.
         raw: float32[R], current raw controls of the face.
@@ -136,7 +137,9 @@ class Stroke:
         return at
 
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
-        """Move the point to its target with the relevant controls, and insert keys.
+        """Move the point to its target, and insert keys.
+
+        Controls that changed very little during the drag get their values before the drag again.
 
         Args:
             context: has the settings for keys.
@@ -167,7 +170,7 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the sliders of the press. Args: context  with the visible view layer."""
+        """Restore the sliders of the mouse press. Args: context  with the visible view layer."""
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)
@@ -244,12 +247,17 @@ class Stroke:
         return native.module().ControlLimits(free, self.state.low, self.state.high)
 
     def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
-        """Targets float64[P, 3] and axes float64[P, 3, 3] of the solver, in file space."""
+        """Targets float64[P, 3] of the points in file space, and axes float64[P, 3, 3].
+
+        The solver measures the error of a point along its three axes; the length of an axis is the
+        weight of the error along this axis.
+        """
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
         along = np.eye(3)
         if view is not None:
-            # Two axes lie in the screen plane; the third has length 0, so that the depth is free.
+            # The solver measures errors along two axes in the screen plane. The third axis has
+            # length 0, so that the depth is free.
             rows = _across(view) @ anchors.maps[0]
             along[:2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
             along[2] = 0.0
@@ -315,8 +323,10 @@ class Stroke:
         return _Anchors(points, mirrored, rest.astype(np.float64), world, maps[:, :3, :3])
 
     def _seen(self, context: Context) -> Float:
-        """Evaluate the face. Returns: the world position of the point. Raises FaceError if Blender
-        refuses to write to the override."""
+        """Evaluate the face. Returns: the world position of the point.
+
+        Raises FaceError if the face is a library override that Blender does not allow to change.
+        """
         self.skin.show(context)
         if last_written.is_refused(self.rig):
             self.restore(context)

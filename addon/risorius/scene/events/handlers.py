@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handlers that update characters at frames, edits, load, undo, save and render."""
+"""Defines handlers that update characters at frames, edits, load, undo, save and render."""
 
 from __future__ import annotations
 
@@ -75,8 +75,10 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether the changing frame belongs to a render; during a render job, frames that the
-    interface changes in the main thread do not."""
+    """Whether a render changed the frame.
+
+    During a render job the interface may change the frame too, but only in the main thread.
+    """
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -104,12 +106,12 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. The writes tag rigs but not controls, so that updates do not repeat."""
+    """React to edits. Tag no control armature, because that would trigger this handler again."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
     board.note_edit()
-    # During a render job only the frames of the render may be written.
+    # During a render job only the handlers of its frames may write, not the handlers of edits.
     if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
         return
     if evaluate.is_paused():
@@ -118,7 +120,8 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         known = _objects.now
         _notice_copies(depsgraph.updates)
-        # Blender reports a change of an image's colour space as an update, a change of pixels not.
+        # Blender reports a change of an image's colour space as an update, but does not report a
+        # change of its pixels.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
@@ -155,7 +158,7 @@ def _note_mended(rig: ArmatureObject) -> None:
 
 
 def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
-    # Compare the objects and not their number: one step may remove as many as it adds.
+    # Compare the objects and not their number: one step may remove as many objects as it adds.
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
@@ -182,7 +185,10 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Remove outlines of newly appended faces from the scene; later links by the user stay."""
+    """Remove the bone outlines of newly appended faces from the collections of the scene.
+
+    This is done only once, because the user may link outlines to a collection later.
+    """
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
@@ -190,7 +196,10 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters whose controls, body or camera were updated."""
+    """The characters whose controls were updated, or their body, or the camera.
+
+    The body of a character is the armature to which its face is attached.
+    """
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     found = (u.id.original for u in depsgraph.updates if u.id is not None)
@@ -219,7 +228,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Let shown_keys and tweak_guard react to keys and moves by Blender's own operators."""
+    """Tell shown_keys and tweak_guard that Blender's operators may have set keys or moved bones."""
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None
@@ -252,7 +261,7 @@ def _concerned(
 
 @persistent
 def _loaded(*_arguments: object) -> None:
-    """After load: Blender calls no update handler when it evaluates a file for the first time."""
+    """After load: evaluate the faces, because Blender calls no update handler for a new file."""
     context = current_context()
     layer = context.view_layer
     session.end("load")
@@ -274,9 +283,9 @@ def _loaded(*_arguments: object) -> None:
 
 @persistent
 def _restored(*_arguments: object) -> None:
-    """After load, undo and redo: forget the last written values, because they do not apply.
+    """After load, undo and redo: forget the last written values, which may differ from the data.
 
-    Pose bones must not be read here: until the next update, those of restored objects point to
+    Pose bones must not be read here: until the next update, pose bones of restored objects point to
     freed bones, and Blender would crash.
     """
     session.end("undo")
@@ -324,7 +333,7 @@ def _before_save(*_arguments: object) -> None:
 
 @persistent
 def _saved(*_arguments: object) -> None:
-    """After a save: restore the state that files must not contain."""
+    """After a save: restore Direct mode, solo, mute and heat maps, which files do not contain."""
     if native.problem():
         return
     ordinary.take_off(parts.rigs())

@@ -39,7 +39,7 @@ class ShipOptions:
         start, end, step: range and step in frames.
         lod: level of detail; -1: the level in the viewport.
         wanted: animation to export, from "BONES", "SHAPES".
-        all_shapes: keep shape keys that the range does not use.
+        all_shapes: True: also export shape keys that are 0 at all exported frames.
         lod_groups: also export the coarser built levels, in LOD groups of FBX.
     """
 
@@ -181,7 +181,10 @@ def _copy(
 
 
 def _levels(rig: ArmatureObject, level: int, options: ShipOptions) -> list[int]:
-    """The exported levels: the given level, and with lod_groups the coarser built levels."""
+    """The exported levels of detail: the given level, and if lod_groups is set, coarser levels.
+
+    Only levels whose meshes were built are exported.
+    """
     coarser = [other for other in lods.built(rig) if other > level] if options.lod_groups else []
     return [level, *sorted(coarser)]
 
@@ -232,8 +235,10 @@ def _shapes(
     weights: NDArray[np.float32],
     options: ShipOptions,
 ) -> None:
-    """Give a copied mesh the real shape keys to export with their animation, and remove the others
-    of Risorius."""
+    """Give a copied mesh a shape key with baked animation for each exported blend shape channel.
+
+    Other shape keys that Risorius made are removed from the copy.
+    """
     key = made.data.shape_keys
     if key is None:
         return
@@ -274,7 +279,7 @@ def _forget(item: bpy.types.Object) -> None:
 
 
 def _everything() -> dict[str, set[bpy.types.ID]]:
-    """Collection in bpy.data -> its datablocks; shape keys are left out."""
+    """Name of a collection in bpy.data -> its datablocks, for all collections but shape_keys."""
     return {
         kind.identifier: set(getattr(bpy.data, kind.identifier))
         for kind in bpy.data.bl_rna.properties
@@ -283,7 +288,7 @@ def _everything() -> dict[str, set[bpy.types.ID]]:
 
 
 def _remove_all_but(before: Mapping[str, set[bpy.types.ID]]) -> None:
-    """Remove all datablocks that are not in `before`, also those of a failed exporter."""
+    """Remove all datablocks that are not in `before`, even if a failed exporter left them."""
     new = [
         item
         for kind, there in before.items()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renames datablocks during an export, so that copies have the user's names in the file."""
+"""Renames datablocks during an export, so that exported copies have the names of the originals."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Loans:
 def images_as_files() -> Iterator[None]:
     """Context manager: temporarily rename images whose names are not valid file names.
 
-    Blender's USD exporter uses the name of an image without a path as its file name, even if the
-    name contains `../`.
+    If an image has no path, Blender's USD exporter writes it to a file with the name of the image,
+    even if this name contains `../`.
 
     Raises:
         FaceError: a linked image has such a name and cannot be renamed here.

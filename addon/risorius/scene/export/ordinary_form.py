@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Switches faces out of Direct mode while one of Blender's own exporters works.
 
-Exporters read the stored bones and shape keys. In Direct mode bones rest and live keys have final
-positions, so that the exported face would be deformed twice or not at all.
+Exporters read the stored bones and shape keys. In Direct mode the bones stay at rest and the live
+keys have final positions, so the exported face would be deformed twice or not at all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from ..skinning import conditions
 _LOOK_AGAIN = 0.5  # seconds between two checks whether an export dialog is open
 
 DIALOG, GLTF = "dialog", "gltf"  # readers: an export dialog, the glTF exporter
-# Reader -> names of the deforming armatures that it holds out of Direct mode.
+# Reader of the face (DIALOG or GLTF) -> names of the deforming armatures that may not use Direct
+# mode while this reader works.
 _held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
 _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
 
@@ -38,7 +39,7 @@ def begin(reader: str) -> None:
         conditions.hold_ordinary(rig, on=True)
     _bring_up()
     if reader == GLTF and not bpy.app.timers.is_registered(_let_go):
-        # A failing exporter does not report its end.
+        # An exporter that fails never calls `end`, so a timer does.
         bpy.app.timers.register(_let_go, first_interval=_LOOK_AGAIN)
 
 

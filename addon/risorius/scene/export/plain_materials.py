@@ -31,7 +31,8 @@ from .lent_names import Loans
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
 _MASKS = ("alpha", "roughness")  # baked into one image, as red and green
 _SOCKETS = {"color": "Base Color", "roughness": "Roughness", "normal": "Normal"}
-# Inputs whose numbers are copied, because glTF and USD support them; their textures are left out.
+# Inputs of the Principled shader whose numbers are copied, because glTF and USD support these
+# inputs. Textures of these inputs are left out.
 _NUMBERS = ("Metallic", "Specular IOR Level", "IOR", "Coat Weight", "Coat Roughness", "Coat IOR")
 _FILM = 0.05  # opacity of a wet film: low to show the iris, not 0 because its highlight fades too
 _LAYER = "risorius_flat"  # name of the UV layer and of the image node of a bake
@@ -52,8 +53,8 @@ class _Flat:
         sources: input "color", "alpha" or "roughness" -> shader_inputs.Source.
         images: input -> reused or baked image, including "normal".
         baked: inputs to bake.
-        mean: True: roughness becomes one number, because polygons overlap in the UV map; later this
-            number.
+        mean: True: roughness becomes one number, because polygons overlap in the UV map; after the
+            bake, this number.
     """
 
     material: bpy.types.Material
@@ -69,7 +70,7 @@ class _Flat:
 
 
 def flatten(override: Override, loans: Loans, size: int) -> Generator[float, None, None]:
-    """Replace the materials of copied meshes by plain ones; a generator.
+    """Replace the materials of copied meshes by plain materials; a generator.
 
     Args:
         override: context override of the export, from export_animation.copies.
@@ -80,7 +81,7 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
         The progress, 0 to 1.
 
     Raises:
-        FaceError: Cycles is missing, or a mesh has no room for a UV map.
+        FaceError: Cycles is missing, or a mesh already has the maximum of eight UV maps.
     """
     items = [o for o in override["scene"].objects if o.type == "MESH"]
     for item in items:
@@ -102,7 +103,10 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
 
 
 def _join_slots(item: MeshObject) -> None:
-    """Merge neighbouring slots with equal node trees: an eye has two that differ in solid view."""
+    """Merge neighbouring material slots whose materials have equal node trees.
+
+    An eye has two such slots, because their materials have different colours in solid view.
+    """
     slots = item.data.materials
     for number in range(len(slots) - 1, 0, -1):
         one, other = slots[number - 1], slots[number]
@@ -181,8 +185,8 @@ def _ends(parts: Iterable[NDArray[np.float32]]) -> NDArray[np.int64]:
 
 
 def _corners(item: MeshObject, slot: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """The corners of the polygons with a material slot, int64[n], and the number of corners of each
-    of these polygons, int32[polygons]."""
+    """The corners of the polygons that use a material slot, int64[n], and the number of corners of
+    each of these polygons, int32[polygons]."""
     mesh = item.data
     index, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("material_index", index)
@@ -206,7 +210,10 @@ def _shown_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer | None:
 
 
 def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.float32]) -> None:
-    """Write UV coordinates of some corners into the bake layer, a copy of the shown layer."""
+    """Write UV coordinates of some corners into the UV map for baking.
+
+    A missing UV map for baking is created as a copy of the UV map that is active for rendering.
+    """
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
     begins = layer or shown
@@ -222,7 +229,10 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 
 
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
-    """Move the coordinates of the bake layer into the shown UV map, and remove the bake layer."""
+    """Copy the coordinates of the UV map for baking into the UV map that is active for rendering.
+
+    The UV map for baking is then removed.
+    """
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
         return
@@ -289,7 +299,7 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image for a bake; roughness without opacity gets a smaller one."""
+    """An empty image for a bake. It is smaller if it stores roughness without opacity."""
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -299,7 +309,10 @@ def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
 
 
 def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
-    """Set up a material copy to emit some of its inputs, with an image as target of the bake."""
+    """Set up a copy of a material for a bake: it emits the inputs `wanted` as colour.
+
+    The image is the target of the bake.
+    """
     if flat.work is None:
         flat.work = flat.material.copy()
         compat.make_node_tree(flat.work)
@@ -487,7 +500,10 @@ def _pack(image: bpy.types.Image) -> None:
 
 
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
-    """A packed image (a copy if reused) with a file name that is not in `files`; it is appended."""
+    """Pack a baked image, or a copy of a reused image, under a new file name.
+
+    The file name is appended to `files`. Returns: the packed image.
+    """
     taken = name not in flat.baked
     if taken:
         image = image.copy()
@@ -495,7 +511,8 @@ def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) ->
         if image.packed_file is None:
             _pack(image)
     ending = PurePath(image.filepath_raw).suffix.lower() if taken else ""
-    # Exporters identify images by their paths, and the file must not contain paths of this machine.
+    # The path is invented: exporters identify images by their paths, and the exported file must not
+    # contain paths of this machine.
     known = ending if ending in texture_search.EXTENSIONS else ".png"
     files.append(native.part("files.names").file_name(image.name, known, files))
     image.filepath_raw = f"//{files[-1]}"

@@ -119,7 +119,7 @@ def source(shader: Node, *names: str) -> Source:
         names: names of the input in different Blender versions; the first existing one is used.
 
     Returns:
-        Source; an empty one if the node has none of these inputs.
+        The Source; it has no value, node and socket if the shader has none of these inputs.
     """
     socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
     if socket is None:

@@ -20,7 +20,7 @@ class Sound:
     """A sound strip of the sequencer for a page.
 
     Attributes:
-        path: of the sound file.
+        path: path of the sound file.
         offset: seconds from the first exported frame to the start of the strip; below 0 if the
             strip starts earlier.
     """

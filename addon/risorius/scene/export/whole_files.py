@@ -12,7 +12,7 @@ _SECTION = struct.Struct("<16sqq")  # section of a USD crate file: name, offset,
 
 
 def is_cut(path: Path) -> bool:
-    """Whether the end of a USD or Alembic file is missing; in other formats, whether it is empty.
+    """Whether the end of a USD or Alembic file is missing, or a file of another format is empty.
 
     Args:
         path: path of a closed file.

@@ -26,7 +26,7 @@ _HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
 
 
 def all_expressions() -> dict[str, native.Expression]:
-    """Name -> built-in expression, in the order of the files."""
+    """Name -> built-in expression, in the order of the files of expressions."""
     return native.part("expressions").load()
 
 
@@ -75,7 +75,7 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
-    # A viseme is named by its name, because its label is only meant for panels.
+    # The action of a viseme gets the viseme's name, because its label is only meant for panels.
     sound = expression.group == "viseme"
     name = f"Face {expression.name if sound else expression.label}"
     old = _named(name)
@@ -101,7 +101,10 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
 
 
 def _named(name: str) -> bpy.types.Action | None:
-    """The action with a name, ignoring case, because labels of older versions were lower case."""
+    """The action with the given name, or None.
+
+    Case is ignored, because older versions of the add-on used lower case names.
+    """
     wanted = name.casefold()
     return next((action for action in bpy.data.actions if action.name.casefold() == wanted), None)
 
@@ -122,7 +125,7 @@ def give_picture(action: bpy.types.Action, path: Path) -> bool:
 
     Args:
         action: the asset.
-        path: of the PNG file.
+        path: path of the PNG file.
 
     Returns:
         Whether the preview was set; False if the file is missing or no PNG.

@@ -155,7 +155,7 @@ def find(items: dict[str, Item], name: str) -> Item:
 
     Args:
         items: expressions by name, from all_items.
-        name: of the expression.
+        name: name of the expression.
 
     Raises:
         LibraryError: no expression has this name.
@@ -230,7 +230,10 @@ def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
 
 
 def in_the_way(where: Path, entries: Sequence[Entry]) -> list[Entry]:
-    """Return the entries with `over` set to the existing file with the entry's file name.
+    """Find the files that new entries would replace.
+
+    Returns: the entries; the attribute `over` of each entry is the existing file with the entry's
+    file name, or None.
 
     Args:
         where: the folder.
@@ -310,7 +313,7 @@ def remove(item: Item) -> None:
 
 
 def read_all(where: Path) -> list[native.Expression]:
-    """The expressions of a folder; fails if any of them is unusable.
+    """The expressions of a folder; an error is raised if any expression is unusable.
 
     Args:
         where: a folder with TOML files.

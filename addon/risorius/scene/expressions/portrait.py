@@ -2,7 +2,7 @@
 """Draws small pictures of a face with an expression, in NumPy.
 
 A Sitter contains all data for drawing and no Blender data. So a thread can draw the pictures, and
-the user's scene does not change.
+the user's scene does not change. File space has the axes and the unit of the DNA file.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Piece:
     """One mesh to draw.
 
     Attributes:
-        index: of the mesh in the DNA.
+        index: index of the mesh in the DNA.
         triangles: int64[F, 3], vertex indices.
         uvs: float64[F, 3, 2], UV coordinates of the triangles' corners.
         colors: float64[F, 3] in [0, 1], colours of triangles without an image, and of hairs.
@@ -226,7 +226,7 @@ def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats
 
 
 class _Picture:
-    """Buffers of a picture: colour, normal, depth and gloss of each sample."""
+    """Buffers of a square picture: colour, normal, depth and gloss of each sample (pixel)."""
 
     def __init__(self, high: int) -> None:
         self.high = high
@@ -273,7 +273,7 @@ class _Picture:
         return picture.reshape(self.high, self.high, 3)[::-1]
 
     def _hollows(self) -> Floats:
-        """float64[h * w] in [0, 1]: how far a sample is behind the mean of its surroundings."""
+        """float64[h * w] in [0, 1]: how far a sample lies behind the mean depth around it."""
         depth = self.depth.reshape(self.high, self.high)
         there = np.isfinite(depth)
         held, reach = np.where(there, depth, 0.0), max(self.high // 24, 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Applies expressions to the sliders of a face, and makes expressions of its pose."""
+"""Applies expressions to the sliders of a face, and makes expressions from its pose."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def check(live: runtime.Runtime, item: Item) -> None:
         item: an expression of the grid.
 
     Raises:
-        LibraryError: the face lacks all controls of the expression; for expressions that are not
-            from Risorius, if it lacks any.
+        LibraryError: the face lacks all controls of a built-in expression, or at least one control
+            of another expression.
     """
     sliders = clip_actions.sliders_of(live)
     weights = item.expression.weights
@@ -61,7 +61,7 @@ def check(live: runtime.Runtime, item: Item) -> None:
 def goals(
     rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
 ) -> dict[str, float]:
-    """The slider values after blending an expression onto a pose, without limits.
+    """The slider values after blending an expression onto a pose, not clamped to slider limits.
 
     Args:
         rig: the character.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes pictures of expressions on a character, and caches them in files by a hash of their input.
+"""Makes pictures of expressions on a character, and caches the pictures in files.
 
-The files are in the add-on's user folder, so that every .blend with this character shares them.
+The name of a file is a hash of the data from which the picture was drawn. The files are in the
+add-on's user folder, so that every .blend with this character uses the same files.
 """
 
 from __future__ import annotations
@@ -96,8 +97,11 @@ def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
 
 
 def _meshes(live: runtime.Runtime) -> list[int]:
-    """Indices of the meshes to draw: for each mesh of the finest level, the finest level with at
-    most _MOST_FACES polygons, else the coarsest. Wet films are left out."""
+    """Indices of the meshes to draw.
+
+    Each mesh of LOD 0 is drawn in the finest LOD in which it has at most _MOST_FACES polygons. If
+    there is no such LOD, its coarsest LOD is drawn. Wet films are left out.
+    """
     dna = live.dna
     rows = dna.lod_mesh_mapping.rows or [range(len(dna.meshes))]
     chosen: dict[str, int] = {}
@@ -187,8 +191,8 @@ def _color_of(material: bpy.types.Material | None) -> list[float]:
 def _pixels(
     image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
 ) -> NDArray[np.float32] | None:
-    """float32[h, w, 4]: a reduced image; without alpha, the mean of its colours becomes the alpha.
-    None if its file is missing."""
+    """float32[h, w, 4]: an image, scaled down to at most _TEXELS. Without alpha, the mean of its
+    colours is the alpha. None if its file is missing."""
     if image.name_full not in known:
         copy = image.copy()
         try:
@@ -218,7 +222,7 @@ def make(
     """Draw pictures and write their files, without using Blender data.
 
     Args:
-        sitter: the character.
+        sitter: data of the character, from sitter_of.
         jobs: the pictures to draw.
         progress: function that is called with the progress, 0 to 1.
         cancelled: function that returns whether to stop.

@@ -51,8 +51,9 @@ def of(rig: ArmatureObject, shared: Path) -> Visemes:
 
 
 def beside(rig: ArmatureObject) -> Path | None:
-    """The folder near a face's DNA file in which authoring stores expressions; None if the path of
-    the DNA file is unknown.
+    """The folder near a face's DNA file in which rig authoring stores expressions.
+
+    None if the path of the DNA file is unknown.
 
     Args:
         rig: the face.

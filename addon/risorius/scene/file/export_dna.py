@@ -39,7 +39,7 @@ class ExportOptions:
 def export(
     context: Context, rig: ArmatureObject, options: ExportOptions | None = None
 ) -> tuple[bytes, list[str]]:
-    """The bytes of a character's DNA file.
+    """The bytes of a character's DNA file with the user's edits.
 
     Args:
         context: a Blender context with scene and view layer.
@@ -187,9 +187,10 @@ class _Job:
     def _neutral(
         self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
     ) -> None:
-        """Write the neutral coordinates that differ from the import; others keep their bits."""
+        """Write the neutral coordinates that differ from the import; others stay bit-identical."""
         moved = user_edits.changed(shape.points, mesh_plan.positions)
-        # The axes are only exchanged and mirrored, so each Blender coordinate is one of the file.
+        # Blender's axes are the file's axes in another order and direction, so each coordinate in
+        # Blender belongs to one coordinate in the file.
         theirs = moved @ (np.abs(self._space.axes) > 0.5)
         positions = dna_mesh.positions.copy()
         positions[theirs] = self._space.file_points(shape.points)[theirs]
@@ -218,7 +219,7 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Write skin weights of vertices that the user painted; other weights keep their bits."""
+        """Write skin weights of vertices that the user painted; others stay bit-identical."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
@@ -258,7 +259,7 @@ class _Job:
             if edit.moved:
                 change = self._space.file_points(edit.after[None, :3, 3])[0]
                 before = self._space.file_points(edit.before[None, :3, 3])[0]
-                # Coordinates that did not change keep their bits.
+                # Coordinates that did not change stay bit-identical.
                 far = np.abs(change - before) > 1e-6 * np.abs(before).max(initial=1e-9)
                 offsets[joint][far] = change[far]
             if edit.turned:
@@ -290,7 +291,7 @@ def _normalised(
 
 
 def _keep_report(rig: ArmatureObject, sentences: Sequence[str]) -> None:
-    """Write the report to a Text and to the console."""
+    """Write the report of an export to a Text and to the console."""
     title = f"{rig.name.removesuffix('_rig')} export report"
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
     text.from_string("\n".join(sentences) + "\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data of a replacement of a character's DNA file."""
+"""Holds the old and the new data while a character's DNA file is replaced."""
 
 from __future__ import annotations
 

@@ -38,7 +38,8 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """float64[4, 4]: the matrix to append to the file's local matrix."""
+        """float64[4, 4]: factor by which the joint's local matrix in the file is multiplied from
+        the right."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
@@ -71,10 +72,10 @@ def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
 def joint_edits(
     context: Context, rig: ArmatureObject, plan: plans.CharacterPlan
 ) -> dict[int, JointEdit]:
-    """The joints whose rest a user moved or rotated in edit mode.
+    """The joints whose rest pose a user moved or rotated in edit mode.
 
-    The rest is compared with a newly built armature. Differences count only beyond the rounding of
-    a bone's direction in float32, because edit mode recomputes roll and tail.
+    The rest pose is compared with a newly built armature. Differences that the rounding of a bone's
+    direction to float32 can cause are ignored, because edit mode recomputes roll and tail.
 
     Args:
         context: a Blender context with a view layer.
@@ -137,7 +138,7 @@ def replace_joints(context: Context, change: Change) -> None:
 
     Args:
         context: a Blender context with a view layer.
-        change: the replacement; its bone names are filled in.
+        change: the replacement; this function sets its old_bones and new_bones.
     """
     rig, old, new = change.rig, change.old.armature, change.new.armature
     if rig.data.users > 1:
@@ -255,8 +256,10 @@ def _edit(
 def _followers(
     edit_bones: bpy.types.ArmatureEditBones, kept: Mapping[int, str], gone: Collection[str]
 ) -> list[tuple[str, str | None, Matrix | None]]:
-    """The user's own bones, parents first: (name, new parent or None to keep it, matrix relative to
-    the parent), so that they follow their joints."""
+    """The user's own bones, parents first: (name, new parent, matrix relative to the parent).
+
+    With these values the bones follow their joints. New parent None: the bone keeps its parent.
+    """
     ours = set(kept.values()) | set(gone)
     found = []
     for bone in edit_bones:
@@ -291,7 +294,10 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Set joints to rest that the evaluator moved with the old file but not with the new file."""
+    """Reset the pose of joints that the evaluator moved with the old file.
+
+    Joints that the evaluator moves with the new file too are left out.
+    """
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replaces meshes and shape keys by those of a new file, in the same objects and datablocks."""
+"""Gives existing mesh objects and datablocks the meshes and shape keys of a new DNA file."""
 
 from __future__ import annotations
 
@@ -37,11 +37,13 @@ class Shape:
     Attributes:
         points: float32[V, 3], the basis.
         moved: float64[V, 3], offsets of the basis by the user's edit.
-        keys: key name -> float32[V, 3] positions; most unedited keys of Risorius are left out.
-        relative: key name -> name of its relative key.
-        channels: name of a key of Risorius -> index of its channel in the old file.
-        edits: name of an edited key of Risorius -> float64[V, 3] offsets by the edit.
-        own: names of the user's own keys.
+        keys: name of a shape key -> float32[V, 3] positions; most unedited shape keys of Risorius
+            are left out.
+        relative: name of a shape key -> name of the shape key to which it is relative.
+        channels: name of a shape key of Risorius -> index of its blend shape channel in the old
+            file.
+        edits: name of an edited shape key of Risorius -> float64[V, 3] offsets by the edit.
+        own: names of the user's own shape keys.
     """
 
     points: NDArray[np.float32]
@@ -114,7 +116,10 @@ def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
 def _refit(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """Refit one mesh: polygons, weights and layers, then shape keys."""
+    """Give one mesh object the polygons, skin weights, UVs, normals and shape keys of the new file.
+
+    The user's edits and attributes are transferred.
+    """
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
     same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
@@ -149,7 +154,7 @@ class _Nothing:
         return np.zeros((self._count, *np.shape(values)[1:]))
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The indices, limited to the last vertex."""
+        """The given indices; an index beyond the last new vertex becomes the last new vertex."""
         return [min(i, self._count - 1) for i in indices]
 
 
@@ -200,7 +205,7 @@ def _own_groups(change: Change, item: MeshObject) -> list[str]:
 def _things(
     change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
 ) -> list[str]:
-    """Descriptions of the user's edits of a mesh and additions to it, for a report."""
+    """Descriptions of the user's edits of a mesh and of the user's additions, for a report."""
     layers, lost = transfer.own_attributes(item.data)
     things = {
         "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),
@@ -369,7 +374,10 @@ def _rebuild(
     surface: transfer.OldSurface,
     bearer: transfer.Carry,
 ) -> None:
-    """Replace the polygons inside the mesh datablock, so that keys, drivers and pointers stay."""
+    """Replace the polygons inside the mesh datablock.
+
+    So the shape keys, the drivers and the pointers to the datablock stay.
+    """
     mesh = item.data
     own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
     count = len(mesh.vertices)
@@ -426,7 +434,7 @@ def _refit_shape(
 
 
 def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32 positions plus moves; positions without a move keep their bits."""
+    """float32 positions plus moves; positions with a move of 0 stay bit-identical."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
     result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)
@@ -441,7 +449,10 @@ def _points(
     channel_map: Sequence[int],
     bearer: transfer.Carry,
 ) -> NDArray[np.float32] | None:
-    """New coordinates of a key, after its relative key's; both are stored in `done`."""
+    """New coordinates of the shape key `name`.
+
+    The shape key to which it is relative is computed first. Both results are stored in `done`.
+    """
     if name in done:
         return done[name]
     above = shape.relative[name]
@@ -469,8 +480,11 @@ def _drop_gone_keys(
     channel_map: Sequence[int],
     deltas: Mapping[int, meshes.Deltas],
 ) -> None:
-    """Remove keys of Risorius whose channel is missing in the new file. Keys that are edited,
-    masked or needed by the user's keys stay as the user's own keys."""
+    """Remove shape keys of Risorius whose blend shape channel is missing in the new file.
+
+    A shape key stays, without its driver, if the user edited it, if it has a vertex group, or if a
+    shape key of the user is relative to it.
+    """
     key = parts.keys_there(item)
     needed = {above for name, above in shape.relative.items() if name in shape.own}
     for name, channel in shape.channels.items():
@@ -515,7 +529,10 @@ def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
 
 
 def finish_shapes(change: Change) -> None:
-    """Set the shape mode of all meshes, which adds new keys; drivers must be updated before."""
+    """Set the shape key mode of all meshes, which adds shape keys for new channels.
+
+    The drivers must already read the new channel indices.
+    """
     live = runtime.there(change.rig)
     labels = build.channel_labels(live.dna)
     there = parts.meshes_of(change.rig)

@@ -2,8 +2,8 @@
 """Replaces a character's DNA file and keeps its objects.
 
 The new character is built as separate objects first, so that a bad file changes nothing. Then its
-data move into the existing objects, meshes, keys and bones. References to these and the user's
-additions stay.
+data move into the existing objects, meshes, keys and bones. So references to these and additions
+by the user stay.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def replace_file(
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
-        path: of the DNA file; it may be the same file.
+        path: path of the DNA file; it may be the same file.
         progress: function that is called with the progress, 0 to 1.
 
     Returns:
@@ -172,7 +172,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
     label = former.name if former is not None else text.name
     parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
-    # Delete the new character's pointer, because its removal would remove the Text too.
+    # Delete the new character's pointer to the Text. Otherwise its removal would remove the Text.
     del fresh[parts.DNA]
     used = [r.get(parts.DNA) for r in parts.rigs()]
     if former is not None and former not in used:
@@ -189,7 +189,8 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
         if saved.whole(rig, key, lods.SAME - 1) not in (*levels, lods.SAME):
             rig.pop(key, None)
             rig[key] = levels[0]
-    # Bones, channels and maps have new indices, so forget the last written values.
+    # Bones, blend shape channels and animated maps have new indices, so forget the last written
+    # values.
     last_written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
@@ -226,7 +227,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
 
 
 def _share_materials(change: Change, item: MeshObject) -> None:
-    """Give a mesh of a new level of detail the materials of the same part's other level."""
+    """Give a mesh of a new level of detail the materials of the same mesh in another level."""
     by_index = {m.index: m for m in change.new.meshes}
     base = by_index[item[parts.MESH]].base
     for other in parts.meshes_of(change.rig):
@@ -248,7 +249,10 @@ def _number_meshes(rig: ArmatureObject) -> None:
 
 
 def _sliders(change: Change) -> None:
-    """Add the sliders of the new file; remove obsolete ones unless they have keys."""
+    """Add the sliders of the new file, and remove sliders that only the old file has.
+
+    Sliders with keys or drivers are not removed.
+    """
     controls = parts.controls_there(change.rig)
     face = controls.pose.bones[parts.FACE]
     maximum = parts.maximum_of(controls)
@@ -312,7 +316,7 @@ def _renew_board(
 
 
 def _keep_report(change: Change) -> None:
-    """Write the report to a Text and to the console."""
+    """Write the report of a replacement to a Text and to the console."""
     name = change.rig.name.removesuffix("_rig")
     if not change.report:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds a sample person in a thread."""
+"""Builds the DNA file of a sample person in a background thread."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..base.task import Task, telling
 
 
 class SampleTask(Task[bool]):
-    """Builds a person and writes the DNA file with its textures; the result is True.
+    """Builds a sample person and writes the DNA file with its textures; the result is True.
 
     Attributes:
         fetched: progress of the download, 0 to 1; None while nothing is downloaded.
@@ -21,10 +21,10 @@ class SampleTask(Task[bool]):
 
 
 def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
-    """A task that builds a person.
+    """A task that builds the DNA file of a sample person.
 
     Args:
-        path: of the new DNA file; its folder may contain the data package (.whl).
+        path: path of the new DNA file; its folder may contain the data package (.whl).
         person: a key of the sample package's PEOPLE.
         offline: True: do not download.
     """

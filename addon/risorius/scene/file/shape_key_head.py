@@ -90,18 +90,19 @@ def shapes_of(
     """A head and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
 
     Rotation and scale of the objects are applied; the location of the head is the origin. A shape
-    is the difference of a key from its relative key. Muted keys are left out.
+    is the difference between a shape key and the shape key to which it is relative. Muted shape
+    keys are left out.
 
     Args:
         context: its scene gives the unit.
         item: mesh object of the head with shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
         height_mm: height from the chin to the top to which the head is scaled; 0: no scaling.
-        said: the user's assignment of keys to controls, see risorius.author.input.said.
+        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
 
     Raises:
-        HeadError: the keys are not relative, or the mesh has no polygons.
-        ShapeFileError: no key moves a vertex.
+        HeadError: the shape keys are not relative, or the mesh has no polygons.
+        ShapeFileError: no shape key moves a vertex.
     """
     if not item.data.polygons:
         raise HeadError(told("{name} has no polygons.", name=item.name))
@@ -116,7 +117,7 @@ def shapes_of(
 
 
 def turn_of(context: Context, item: bpy.types.Object) -> Doubles:
-    """float64[3, 3]: from object space to centimetres with x left, y up, z to the front.
+    """float64[3, 3]: from object space to centimetres; x to the head's left, y up, z to the front.
 
     Args:
         context: its scene gives the unit.
@@ -132,7 +133,7 @@ def _axes(context: Context) -> Doubles:
 
 
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """A mesh at rest, without shapes, with its Mirror modifiers applied.
+    """The neutral mesh of an object without its shape keys; its Mirror modifiers are applied.
 
     Args:
         context, item, head: see part_of.
@@ -177,7 +178,7 @@ def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.Head
         head: mesh object of the head, whose location is the origin.
 
     Raises:
-        HeadError: the keys are not relative.
+        HeadError: the shape keys are not relative.
     """
     if item.data.shape_keys is None:
         return part_at_rest(context, item, head)
@@ -263,7 +264,7 @@ def rig_task(
     Args:
         shapes: the head and its shapes, from shapes_of.
         wishes: options of the rig.
-        said: the user's assignment of keys to controls, see risorius.author.input.said.
+        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
     """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
@@ -314,7 +315,8 @@ def joint_rig(
     Args:
         dna: the face with blend shapes.
         wishes: options of the rig.
-        kept: parts of the names of meshes that keep their weights and blend shapes, see RigOptions.
+        kept: texts; a mesh whose name contains one of them keeps its skin weights and blend shapes,
+            see RigOptions.
         progress: function that is called with the progress, 0 to 1; it returns False to cancel.
         fit_vertices: number of vertices to which joints are fitted, see RigOptions; None: the
             default.
@@ -336,7 +338,7 @@ def joint_rig(
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
     """Give the meshes of LOD 0 the materials of the objects that the face was made from.
 
-    Both must have the same polygons in the same order.
+    The new meshes and these objects must have the same polygons in the same order.
 
     Args:
         meshes: mesh objects of the new face.

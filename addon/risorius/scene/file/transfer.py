@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transfers the user's layers of a mesh to another topology by nearest points of the surface."""
+"""Transfers the user's mesh attributes, such as UV maps, to a mesh of another topology."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...logic.character import user_edits
 from ..base.blender_types import Attribute, Values
 
-# Attributes of the import or of Blender, which are not the user's.
+# Names of attributes that the import or Blender creates, and not the user.
 _OURS = {"position", "UVMap", "custom_normal", "material_index"}
 _SHADING = {"sharp_edge", "sharp_face"}
 OUR_PREFIX = "risorius_"  # prefix of attributes that the add-on's materials read
@@ -118,8 +118,8 @@ def triangles_of(
 
 
 def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Values]], list[str]]:
-    """The user's attributes of a mesh: (name, type, domain, values) of transferable ones, and the
-    names of all others."""
+    """The user's attributes of a mesh: (name, type, domain, values) of each attribute that can be
+    transferred, and the names of the other attributes of the user."""
     kept, other = [], []
     attributes: list[Attribute] = list(mesh.attributes)
     for layer in attributes:
@@ -161,7 +161,7 @@ class OldSurface:
         return len(self.triangles) > 0
 
     def give(self, mesh: bpy.types.Mesh, points: NDArray[np.float32], carry: Carry) -> None:
-        """Transfer the user's layers and the polygons' materials to the new polygons.
+        """Transfer the user's attributes and the polygons' material indices to the new polygons.
 
         Args:
             mesh: the Mesh with its new polygons.

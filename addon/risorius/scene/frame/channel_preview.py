@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test override of a channel: the user sets the weight of one blend shape until the next change.
+"""Overrides the weight of one blend shape channel for a test, until the next change.
 
 The deforming armature stores the override with the frame and a hash of the raw controls. If either
 changes, the override ends, so that no frame depends on a forgotten test. Saving and rendering end
@@ -40,7 +40,7 @@ def clear(rig: ArmatureObject) -> bool:
 
 
 def clear_all() -> bool:
-    """End the overrides of all characters, and tag the controls. Returns: whether any ended."""
+    """End the overrides of all characters, and update the faces. Returns: whether any ended."""
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
         last_written.forget()

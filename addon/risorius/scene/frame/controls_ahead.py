@@ -27,7 +27,8 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Session uid of the user's scene -> temporary scene with its controls.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# Whether the file was edited since the last frame; whether the file has a simulation.
+# _edited: whether the file may have been edited since the last frame. _simulated: whether the file
+# has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes that Blender evaluated since the last load, undo or redo.
@@ -44,10 +45,11 @@ def is_edited() -> bool:
 
 
 def is_needed() -> bool:
-    """Whether a simulation or a foreign handler needs the faces before the add-on's handlers run.
+    """Whether the faces must be evaluated before Blender evaluates a frame.
 
-    If not, the evaluation ahead would only cost time. It is also needed at the first frame after an
-    edit, because edited objects may read a face.
+    A simulation, or a frame handler of another add-on, needs the poses at that time. They are also
+    needed at the first frame after an edit, because edited objects may read a face. In all other
+    cases the early evaluation would only cost time.
     """
     if is_edited():
         _simulated.now = caches.any_simulates()
@@ -66,9 +68,9 @@ def note_evaluated(scene: bpy.types.Scene) -> None:
 def is_safe(user: bpy.types.Scene) -> bool:
     """Whether the separate graph may be built before a frame of a scene.
 
-    Building it makes Blender rebuild the graph of the scene. Blender 4.2 and 4.3 crash if the
-    latter was never evaluated, such as after switching a window to the scene. If this is False, the
-    faces are updated after the frame.
+    Building it makes Blender rebuild the scene's own graph. Blender 4.2 and 4.3 crash if that graph
+    was never evaluated, such as after switching a window to the scene. If the result is False, the
+    faces must be updated after the frame.
 
     Args:
         user: the scene to be evaluated.
@@ -96,7 +98,8 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
             _edited.now = False
             return graph, known
         # The graph contains a face: either Blender rebuilt the graph while controls pointed to
-        # their faces, or an object of the graph depends on a face. Rebuild it to find out.
+        # their faces, or an object of the graph depends on a face. Rebuild the graph to find out
+        # which of these is the cause.
         _close()
         graph = _evaluated(user, known)
         if _faces_in(graph, known, whole=True):
@@ -186,7 +189,10 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 
 
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
-    """Whether a graph contains the rig of any face. Args: whole  True: or any mesh of a face."""
+    """Whether a graph contains the deforming armature of any of the faces.
+
+    Args: whole  True: meshes of the faces count too.
+    """
     return any(
         item.evaluated_get(graph).is_evaluated
         for rig, _controls in faces

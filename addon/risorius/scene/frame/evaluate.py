@@ -28,9 +28,10 @@ from ..skinning import bone_writer, conditions, direct, live_keys
 from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
-# Session uid of a deforming armature -> work done before this frame.
+# Session uid of a deforming armature -> work done for it before Blender evaluates this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
-# Final positions of several faces, to be written together; None: write them immediately.
+# Final vertex positions of several faces, to be written together at the end of `together`; None:
+# outside `together`, so write positions immediately.
 _gathered = session.value(
     "evaluate.gathered", cast("list[direct.Job] | None", None), ("unregister",)
 )
@@ -111,7 +112,8 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     """
     if native.problem() or is_paused():
         return
-    # If rotations are read from joints, their constraints need the rotations of this frame first.
+    # If joint rotations are read from bones with constraints, these constraints must see the neck
+    # and head of this frame, so the face is evaluated before the frame.
     read = _look_at_joints(controls_ahead.is_edited())
     if not controls_ahead.is_needed() and not read:
         return
@@ -133,7 +135,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
 
 
 def _look_at_joints(edited: bool) -> bool:
-    """Update the Reading of all faces once per frame.
+    """Update the Reading (see joint_readings.py) of all faces once per frame.
 
     Returns: whether a joint rotation of any face is read from its bone.
     """
@@ -149,8 +151,9 @@ def _look_at_joints(edited: bool) -> bool:
 
 
 def after_frame(depsgraph: Depsgraph) -> None:
-    """Evaluate the faces that were not, or not correctly, evaluated before the frame, and count
-    late ones.
+    """Evaluate the faces that were not evaluated, or got a wrong pose, before the frame.
+
+    Faces whose pose changes by this second evaluation are counted as late.
 
     Args:
         depsgraph: the evaluated graph.
@@ -289,7 +292,10 @@ def _write_meshes(
 
 
 def _write_finished(job: direct.Job) -> None:
-    """Write final positions now, or together with other faces on all cores."""
+    """Write final vertex positions of a face to its meshes.
+
+    Inside `together` they are collected, and written later with other faces on all cores.
+    """
     if _gathered.now is None:
         direct.write([job])
     else:
@@ -298,7 +304,7 @@ def _write_finished(job: direct.Job) -> None:
 
 @contextmanager
 def together() -> Iterator[None]:
-    """Context manager: collect final positions, and write all of them together at the end."""
+    """Context manager: collect final vertex positions of faces, and write them all at the end."""
     if _gathered.now is not None:
         yield
         return
@@ -321,7 +327,10 @@ def _plan(
     moment: Moment,
     rendering: bool,
 ) -> conditions.Plan:
-    """The Plan (Direct or ordinary) of a face. Args: see evaluate; asked  inputs of the face."""
+    """The Plan of a face: whether it is evaluated in Direct mode or by Blender's modifiers.
+
+    Args: see evaluate; asked  inputs of the face.
+    """
     if rendering:  # a change of mode during a render would rebuild Blender's graph
         return conditions.known(rig) or conditions.ORDINARY
     if moment is Moment.LOAD:
@@ -343,7 +352,7 @@ def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment
 
 
 def bring_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a change by an operator: evaluate one character and the scene.
+    """Show the change that an operator made: evaluate one character and the scene.
 
     Args:
         context: its view layer is evaluated before and after.
@@ -352,7 +361,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), Moment.ANEW)
     context.view_layer.update()
-    # Blender 5.2 does not redraw views after an operator without anything left to evaluate.
+    # Blender 5.2 does not redraw views after an operator that leaves nothing to evaluate.
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

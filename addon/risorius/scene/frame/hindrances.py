@@ -16,7 +16,9 @@ _LEANS = 1e-4  # largest cosine between two axes of a matrix that does not count
 
 
 def words(rig: ArmatureObject) -> Iterator[str]:
-    """Yields sentences about joint keys that override the controls, and about sheared controls.
+    """Yields sentences about two causes: keyframes on joints, and a sheared control armature.
+
+    Keyframes on joints override the controls; a deforming armature cannot follow sheared controls.
 
     Args:
         rig: deforming armature.

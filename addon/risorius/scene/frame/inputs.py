@@ -168,7 +168,7 @@ def _rests(bone: bpy.types.PoseBone) -> bool:
 
 
 def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
-    """A bone's own rotation in the armature's axes, or None at rest."""
+    """A bone's rotation relative to rest and parent, in the armature's axes; None at rest."""
     if bone is None or _rests(bone):
         return None
     turn = rig_placement.own_turn(seen, bone)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Detects joints whose constraints depend on the neck poses that the joints themselves drive.
+"""Detects joints whose rotation depends on itself through the neck poses of the face.
 
-A constraint on the bone of a joint may depend, through any number of objects, on a bone or mesh
-that moves with the poses driven by this joint. Such a face has no consistent pose.
+The rotations of these joints drive neck poses (RBF correctives of the file). A constraint on the
+bone of such a joint may depend, through any number of objects, on a bone or mesh that moves with
+these poses. Such a face has no consistent pose.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def words(cause: str) -> str:
 
 
 def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.types.PoseBone) -> str:
-    """The reason why a joint follows its own neck poses, as text; empty if it does not.
+    """The reason why a joint's rotation depends on itself, as text; empty if it does not.
 
     Args:
         rig: deforming armature.

@@ -26,10 +26,11 @@ class Reading:
         held: indices of pose bones whose joint rotation is stored in raw controls.
         wiring: constraints, actions and drivers, compared to notice changes.
         keyed: indices of pose bones of neck and head with keys or drivers on the deforming
-            armature, which lead; the evaluator does not write them.
+            armature; the evaluator does not write these bones.
         places: joint index -> index of its pose bone, for rotations that are read from the bone.
-        circle: the reason why a joint with constraints is not read; "" if all are read.
-        is_fresh: whether the file was not edited since.
+        circle: the reason why a joint with constraints is not read, because its rotation depends
+            on itself; "" if all are read.
+        is_fresh: whether the file was not edited since the Reading was made.
     """
 
     held: tuple[int, ...]
@@ -54,7 +55,7 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
 
 
 def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
-    """Update the Reading of a face; a new circle is printed to the console.
+    """Update the Reading of a face; a new circular dependency is printed to the console.
 
     Args:
         rig: deforming armature.
@@ -102,7 +103,7 @@ def note_edit() -> None:
 
 
 def words(rig: ArmatureObject) -> str:
-    """The sentence of the panel about circular joints; "" if there are none.
+    """The sentence of the panel about joints that depend on themselves; "" if there are none.
 
     Args:
         rig: deforming armature.

@@ -23,7 +23,7 @@ class _Late:
     """Record of a late face.
 
     Attributes:
-        cause: name of the control or constraint that is the reason.
+        cause: name of the control or constraint that makes the face late.
         wiring: result of _wiring when the reason was found.
         frames: number of late frames.
     """
@@ -33,14 +33,16 @@ class _Late:
     frames: int = 0
 
 
-# Deforming armature -> reason why its controls depend on a face.
+# Deforming armature -> record of a face whose controls depend on a face.
 _circles: dict[int, _Late] = session.table("lateness.circles", ("undo", "load"))
-# Deforming armature -> control whose value changed during the frame.
+# Deforming armature -> record of a face with a control whose value changed during the frame.
 _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether the inputs of a face are known to depend on a face; reset if dependencies change.
+    """Whether it is known that the inputs of a face depend on this or another face.
+
+    The record is dropped if parents, drivers or constraints have changed.
 
     Args:
         rig, controls: deforming and control armature of the face.
@@ -55,7 +57,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that the inputs of a face depend on a face.
+    """Note that the inputs of a face depend on this or another face.
 
     Args:
         rig, controls: deforming and control armature of the face.
@@ -69,7 +71,8 @@ def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[s
 
     Args:
         rig: deforming armature.
-        before, after: states from last_written.inputs: bytes of the raw controls, level, ...
+        before, after: states from last_written.inputs before and after this evaluation: a tuple
+            that begins with the bytes of the raw controls.
         labels: names of the raw controls.
     """
     kept = _circles.get(rig.session_uid)
@@ -83,7 +86,10 @@ def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[s
 
 
 def _difference(before: object, after: object, labels: Sequence[str]) -> str:
-    """The first control with different values; "" if only the level of detail differs."""
+    """The first control with different values in two states, or a text about the head's rotation.
+
+    "" if only other inputs differ, such as the level of detail.
+    """
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""
     states = cast("tuple[object, ...]", before), cast("tuple[object, ...]", after)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solo and mute: shows a face with some controls only, or without its joints, shapes or maps.
+"""Solo and mute: shows a face with some controls only, or without joints, shapes or animated maps.
 
 The controls keep their values, so keys, bakes and exports do not change. The deforming armature
 stores the setting, so that undo restores it. Saving removes the setting during the save, so that
@@ -30,7 +30,7 @@ class Look:
 
     Attributes:
         solo: labels of the only controls that have an effect; empty: all.
-        muted: muted KINDS.
+        muted: parts of the face without effect, from KINDS: joints, shapes, maps.
         in_renders: whether renders use the setting too.
     """
 
@@ -40,7 +40,7 @@ class Look:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the whole face is shown."""
+        """Whether no control is solo and no part of the face is muted."""
         return not self.solo and not self.muted
 
 
@@ -75,7 +75,7 @@ def solo(rig: ArmatureObject, names: Collection[str]) -> None:
 
     Args:
         rig: deforming armature.
-        names: labels of these controls; empty: all controls.
+        names: labels of the controls that keep their effect; empty: all controls.
     """
     put(rig, replace(of(rig), solo=frozenset(names)))
 
@@ -121,7 +121,7 @@ def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArr
 
 
 def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> None:
-    """Set muted parts to rest, in place.
+    """Set the muted parts of a pose (joints, shapes or maps) to rest.
 
     Args:
         look: the setting.

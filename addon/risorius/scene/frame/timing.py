@@ -17,7 +17,8 @@ _KEPT = 30  # number of frames whose median the overlay shows
 
 
 class Frame:
-    """Times of one frame in ms: stages of Risorius, and Blender's own part."""
+    """Times of one frame in ms: the stages of Risorius, and Blender's animation, deformation and
+    drawing."""
 
     def __init__(self) -> None:
         self.begin = self.ended = perf_counter()
@@ -41,12 +42,15 @@ def begin() -> None:
 
 
 def animated() -> None:
-    """Note that Blender has evaluated curves, strips and drivers of the controls."""
+    """Note that Blender has evaluated the F-curves, NLA strips and drivers of the controls."""
     frames[-1].animation = _since(frames[-1].begin)
 
 
 def evaluated() -> None:
-    """Note that Blender has evaluated the frame, including work done before it."""
+    """Note that Blender has evaluated the frame.
+
+    If no face was evaluated before the frame, the whole time counts as Blender's animation.
+    """
     if frames[-1].characters:
         frames[-1].deform = _since(frames[-1].ended)
     else:
@@ -75,7 +79,7 @@ def add(times: Sequence[float]) -> None:
 
 
 def skinned(begin: float) -> None:
-    """Note that the final positions of faces were written.
+    """Note that the final vertex positions of faces were written.
 
     Args:
         begin: perf_counter before the writing.

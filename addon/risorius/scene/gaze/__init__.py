@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaze: turns the eyes towards a target, and moves the lids with the eyes."""
+"""Rotates the eyes of a face towards a target, and moves the lids with the eyes."""

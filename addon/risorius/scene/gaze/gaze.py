@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaze: both eyes look at their target, and lids follow.
+"""Lets both eyes look at their target, and moves the lids with the eyes.
 
-The values of the look controls are found by evaluating the rig, because these controls also move
-the centres of the eyes and turn them slightly aside. A few steps from a fixed start suffice, so a
-frame depends on its own controls only.
+Look controls are the raw controls that rotate an eye, such as eyeLookUpL. Their values are found by
+evaluating the rig repeatedly, because these controls also move the centres of the eyes and rotate
+the eyes slightly sideways. The search always starts at the same values, so that a frame depends
+only on its own controls. A few repetitions suffice.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ _LIDS = 0.5  # value added to the lid controls at full gaze and amount 1
 class Target:
     """The target of the eyes.
 
-    Places are in the control armature's axes, for a head that is not turned.
+    Positions are in the control armature's space, for a head that is not rotated.
 
     Attributes:
-        rest: rest place of the target, at which the eyes look ahead.
-        moved: displacement from the rest place.
-        meet: 0: both eyes turn by the displacement of the target, 1: both look at the target
-            itself.
+        rest: rest position of the target, at which the eyes look ahead.
+        moved: vector from the rest position to the target.
+        meet: convergence, 0: the eyes rotate only as far as the direction to the target changes
+            by `moved`; 1: both eyes look at the target itself.
     """
 
     rest: Vector
@@ -59,8 +60,10 @@ def target_of(
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
-        turns: rotations of "neck" and "head" in the armature's axes, including the body's.
-        local: displacement of the target bone including layers, in its own axes; None at rest.
+        turns: rotations of "neck" and "head" in the armature's axes, including rotations of the
+            body.
+        local: displacement of the target bone from rest, including layers, in the axes of the bone;
+            None at rest.
     """
     bone = seen.pose.bones.get("eyes")
     if bone is None:
@@ -99,7 +102,7 @@ def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
 
 
 def _middle(seen: ArmatureObject) -> Vector:
-    """The point between the two eye bones at rest."""
+    """The midpoint between the two eye bones at rest."""
     bones = seen.pose.bones
     heads = [bones[n].bone.head_local for n in ("eye_L", "eye_R") if n in bones]
     return sum(heads, Vector()) / max(len(heads), 1)
@@ -153,8 +156,11 @@ def asked(
 
 
 def _idle_turn(target: Target, centre: Vector) -> Float:
-    """float64[2] yaw and pitch in radians of an eye that turns by the displacement of the target
-    only. Older files depend on exactly these values."""
+    """float64[2] yaw and pitch in radians of an eye if the eyes do not converge.
+
+    The rotation is the change of the direction to the target since its rest position. Older files
+    depend on exactly these values.
+    """
     start = target.rest - centre
     before, after = yaw_pitch(start), yaw_pitch(start + target.moved)
     return np.array((after[0] - before[0], after[1] - before[1]))
@@ -163,7 +169,8 @@ def _idle_turn(target: Target, centre: Vector) -> Float:
 def _error(
     live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Vector, target: Target
 ) -> Float:
-    """float64[2]: yaw and pitch in radians that an eye still misses to look at its target."""
+    """float64[2]: yaw and pitch in radians by which the wanted direction of an eye differs from its
+    current direction."""
     joint, ahead = live.anchors.eyes.get(side), _AHEAD
     still, rest = np.array(centre[:], np.float64), np.array(target.rest[:], np.float64)
     there = still
@@ -178,7 +185,7 @@ def _error(
 
 
 def _within(live: runtime.Runtime, side: str, angles: Float, maximum: float) -> Float:
-    """Clips yaw and pitch to the range that the look controls of a side reach at `maximum`."""
+    """Clips yaw and pitch to the angles that an eye's look controls reach at value `maximum`."""
     low, high = np.zeros(2), np.zeros(2)
     for _index, *at_one in live.look[side]:
         low = np.minimum(low, np.array(at_one) * maximum)
@@ -194,7 +201,7 @@ def add_look(
     pitch: float,
     maximum: float,
 ) -> None:
-    """Raise the look controls of one eye by angles, at most to `maximum`.
+    """Increase the look controls of one eye, so that the eye rotates further by two angles.
 
     Args:
         live: the character's Runtime.
@@ -215,7 +222,7 @@ def frame_of(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion] | None = None,
 ) -> tuple[Float, Float]:
-    """Place and rotation of a joint, in the armature's axes.
+    """Position and rotation of a joint, in the armature's axes.
 
     Args:
         live: the character's Runtime.
@@ -224,7 +231,7 @@ def frame_of(
         turns: rotations of "neck" and "head", applied as on the bones of the rig.
 
     Returns:
-        float64[3] place in Blender units and float64[3, 3] rotation; joint scales are ignored.
+        float64[3] position in Blender units and float64[3, 3] rotation; joint scales are ignored.
     """
     chain = live.chain(joint)
     moved = np.asarray(deltas[chain.joints], np.float64)
@@ -253,8 +260,10 @@ def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion])
 
 
 def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternion]) -> Float:
-    """Undoes the rotations of neck and head on a point that is fixed in the world, so that the
-    result fits the unturned head; both in the armature's axes."""
+    """The position of a point relative to the head, for a head that is not rotated.
+
+    Both positions, `point` and the result, are in the armature's space.
+    """
     head = live.anchors.head
     if head is None or not turns:
         return point

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the gaze, lids and head of a character, as properties of its control armature."""
+"""Defines settings of gaze, lids and head of a character, as properties of its control armature."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties; values in files stay."""
+    """Remove the properties; their values in .blend files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)
 
@@ -85,7 +85,10 @@ def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
 
 
 def moves_lids(live: runtime.Runtime) -> bool:
-    """Whether a look control up or down moves blend shapes, or joints other than the eyes."""
+    """Whether a look control for looking up or down also moves more than the eye joints.
+
+    It may move other joints, or blend shapes.
+    """
     eyes = set(live.anchors.eyes.values())
     for controls in live.look.values():
         for index, _yaw, pitch in controls:

@@ -34,7 +34,7 @@ def _hold_of(controls: ArmatureObject) -> bpy.types.CopyLocationConstraint | Non
 
 
 def follow_head(context: Context, controls: ArmatureObject) -> None:
-    """Let the target follow the head again; the target keeps its visible place.
+    """Let the target follow the head again; the target stays at its visible position.
 
     Args:
         context: Blender context; its depsgraph has the evaluated bones.

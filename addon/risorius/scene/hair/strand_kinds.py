@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the strands that replace hair cards, by kind of hair."""
+"""Defines number and shape of the strands that replace hair cards, for each kind of hair.
+
+A lock is a group of strands of one card that share a root and a direction.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ class Kind(NamedTuple):
     aside: float
     along: float
     # Dense hair has fibres that pass light on to each other. Single hairs over skin only use the
-    # colour of the picture, because such fibres would be too dark there.
+    # colour of the cards' image, because such fibres would be too dark there.
     dense: bool
     root: float = 1.0  # radius at the root / `radius`, which is reached at 1/5 of the length
     coil: Coil | None = None

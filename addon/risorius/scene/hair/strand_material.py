@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The material of strands of hair."""
+"""Builds the material of hair strands, with the colours of the cards that they replace."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
 
 
 def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
-    """A colour to the power of an exponent: below 1 lightens, and dark colours most."""
+    """A colour to the power of an exponent.
+
+    An exponent below 1 makes the colour lighter; dark colours change most.
+    """
     node = tree.nodes.new("ShaderNodeGamma")
     node.inputs["Gamma"].default_value = exponent
     tree.links.new(colour, node.inputs["Color"])
@@ -71,7 +74,7 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
     fibre.inputs["Roughness"].default_value = 0.55
     fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
-        # The picture shows the light of many fibres together; one fibre gets a darker colour.
+        # The image shows the light of many fibres together, so a single fibre gets a darker colour.
         tree.links.new(_raised(tree, colour, _DEEPER), fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"

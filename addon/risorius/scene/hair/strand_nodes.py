@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The geometry nodes that turn cards of hair into strands."""
+"""Builds the geometry nodes that turn hair cards into strands.
+
+A card is a strip of polygons; each of its rows has a left and a right vertex. A lock is a group of
+strands of one card that share a root and a direction.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +55,10 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """The index, from 0, of the group of `size` numbers that a number belongs to."""
+        """The integer quotient of a number and `size`.
+
+        If numbers form groups of `size` successive numbers, this is the index of a number's group.
+        """
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
@@ -109,7 +116,7 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
     if kind.along:
-        # The last row has no next row: its strands slide along the segment before it.
+        # The last row has no next row, so its points slide along the segment that ends at it.
         back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
         most = min(_MOST_SLID, kind.along / unit / (_lengths(item, rows).mean() / (rows - 1)))
         share = g.random(-most, 0.4 * most, 5, lock)
@@ -148,7 +155,10 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A random displacement of each lock, up to `most` along each axis. The caller sets Scale."""
+    """A random displacement of each lock, up to `most` along each axis.
+
+    Returns: a node that scales the displacement; the caller connects its input Scale.
+    """
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
     parted.inputs["Max"].default_value = [most] * 3
@@ -158,15 +168,15 @@ def _aside(g: _Tree, lock: Socket, most: float) -> Node:
 def _slid(
     g: _Tree, mesh: Socket, place: Socket, end: Socket, start: Socket, share: Socket
 ) -> Socket:
-    """Place of a card's vertex after a strand has slid along the card.
+    """Position of a card's vertex for a strand that is shifted along the card.
 
     Args:
         g: the tree.
         mesh: the deformed cards.
-        place: the position of a vertex, a field.
-        end: place of the vertex before the slide.
+        place: the field of vertex positions.
+        end: position of the vertex without the shift.
         start: index of the vertex where the segment to the next row starts.
-        share: length of the slide as a fraction of that segment; negative: towards the root.
+        share: length of the shift as a fraction of that segment; negative: towards the root.
     """
     first, second = (
         g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))

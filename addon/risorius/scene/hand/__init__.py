@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tools for animation by hand: poses between poses, blinks, favourites."""
+"""Tools for animation by hand: breakdown poses, blinks, favourite sliders."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moves a pose between its neighbouring keys (breakdown, relax, push) or towards rest."""
+"""Moves a pose towards the keyframes around it (breakdown, relax, push) or towards rest."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _AT = 1e-3  # frames: keys closer than this are at the same frame
 
 @dataclass(frozen=True)
 class Neighbours:
-    """The poses at the keys before and after a frame.
+    """The poses at the keyframes before and after a frame.
 
     Attributes:
         before, after: the poses.
-        share: position of the frame between the two keys, 0 to 1.
+        share: position of the frame between the two keyframes, 0 to 1.
     """
 
     before: keying.Pose
@@ -31,11 +31,11 @@ class Neighbours:
 
 
 def key_frames(controls: ArmatureObject, paths: Collection[str] | None = None) -> list[float]:
-    """The frames of a face's keys, sorted and unique.
+    """The frames at which a face has keyframes, sorted and unique.
 
     Args:
         controls: the control armature.
-        paths: data paths whose keys count; None: all sliders and control bones.
+        paths: data paths whose keyframes count; None: all sliders and control bones.
     """
     found = {
         round(key.co.x, 3)
@@ -50,7 +50,7 @@ def key_frames(controls: ArmatureObject, paths: Collection[str] | None = None) -
 def next_key(
     controls: ArmatureObject, frame: float, forward: bool, paths: Collection[str] | None = None
 ) -> float | None:
-    """The frame of the next or previous key, or None.
+    """The frame of the next or previous keyframe; None if there is no such keyframe.
 
     Args:
         controls, paths: see key_frames.
@@ -69,20 +69,20 @@ def neighbours(
     paths: Collection[str],
     skipped: Collection[float] = (),
 ) -> Neighbours:
-    """The poses at the last key before a frame and at the first after it.
+    """The poses at the last keyframe before a frame and at the first keyframe after the frame.
 
     Args:
         controls: the control armature.
         frame: current frame.
         now: current pose.
-        paths: data paths whose keys count.
-        skipped: frames whose keys do not count.
+        paths: data paths whose keyframes count.
+        skipped: frames whose keyframes do not count.
 
     Returns:
-        Neighbours; with keys on one side only, both poses are equal.
+        Neighbours. If there are only earlier or only later keyframes, both poses are equal.
 
     Raises:
-        FaceError: neither side has a key.
+        FaceError: there is no earlier and no later keyframe.
     """
     frames = [f for f in key_frames(controls, paths) if f not in skipped]
     before = max((f for f in frames if f < frame - _AT), default=None)
@@ -163,7 +163,10 @@ def _blended(
 
 
 def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
-    """The rest pose. Args: rig the character, now a pose with the wanted sliders and bones."""
+    """The rest values of the sliders and bones that the pose `now` contains.
+
+    Args: rig  the character, now  the pose.
+    """
     live = runtime.there(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))
     bones: Mapping[str, tuple[float, ...]] = {

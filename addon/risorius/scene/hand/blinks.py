@@ -20,7 +20,7 @@ class Blink:
     """Timing of a blink in frames of the scene.
 
     Attributes:
-        close, hold, open: length of each part.
+        close, hold, open: length of each phase: the lids close, stay closed, and open.
         strength: slider value of the closed lids, 0 to 1.
         offset: delay of the character's right eye; negative: the right eye closes first.
         sides: L, R or both.
@@ -61,13 +61,13 @@ def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
 
 
 def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) -> int:
-    """Key a blink on the lid sliders; their keys within the blink are removed.
+    """Key a blink on the lid sliders; existing keys of these sliders during the blink are removed.
 
     Args:
         rig: the character.
-        frame: first frame.
+        frame: frame at which the blink begins.
         blink: its timing.
-        rules: settings of keys.
+        rules: settings for new keys.
 
     Returns:
         The number of inserted keys.
@@ -103,7 +103,7 @@ def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> 
 
     Args:
         rig: the character.
-        frame: first frame.
+        frame: frame at which the blink begins.
         blink: its timing.
         name: name of the layer if there is none yet.
     """

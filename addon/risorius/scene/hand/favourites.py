@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Favourite sliders, stored on the character or else in the user's preferences."""
+"""Reads and changes the favourite sliders of a face.
+
+A character may have its own list. Without this list, the list in the user's preferences is used."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live capture onto characters."""
+"""Shows live captures of a face on characters, and records them."""

@@ -30,7 +30,7 @@ _REDRAW = 0.25  # seconds between redraws of the status
 
 @dataclass
 class _State:
-    """State of the timer."""
+    """State of the timer that writes captured faces."""
 
     error: str = ""  # why the last capture ended by itself
     since_redraw: float = 0.0  # seconds
@@ -46,7 +46,7 @@ def last_error() -> str:
 
 
 def start(rig: ArmatureObject, settings: Settings) -> Session:
-    """Start the live capture of a character, which ends an earlier capture of it.
+    """Start the live capture of a character, and end an earlier capture of the same character.
 
     Args:
         rig: its deforming armature.
@@ -142,18 +142,18 @@ def finish_take(
         clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: see recordings.finish; the recording is kept there.
+        clip_units.ClipError: see recordings.finish; the recording is kept in `recordings`.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None
 
 
 def _tick() -> float | None:
-    """Called by the timer. Returns: seconds until the next call, or None to end."""
+    """Called by the timer. Returns: seconds until the next call; None ends the timer."""
     try:
         return _beat()
     except Exception:
-        # Blender drops a failing timer, so its sessions must end too.
+        # Blender removes a timer after an error, so the sessions that it updates must end too.
         _state.error = "Live capture ended by an error, which the console shows."
         for session in sessions.running():
             with contextlib.suppress(Exception):  # the first error is the one to show
@@ -225,7 +225,7 @@ _HANDLERS = (
 
 
 def register() -> None:
-    """Add the handlers."""
+    """Add the handlers for load, save, undo and redo."""
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

@@ -54,7 +54,7 @@ def show(session: Session, controls: ArmatureObject) -> bool:
 
 
 def _follow_ranges(session: Session, controls: ArmatureObject) -> None:
-    """Use the current ranges of the face; the face is written again if they changed."""
+    """Use the current capture ranges of the face. If they changed, the face is written again."""
     if session.ranges_seen != range_properties.changes():
         session.ranges_seen = range_properties.changes()
         session.shaper.ranges = range_properties.of(controls)

@@ -10,7 +10,7 @@ from .sessions import Session
 
 
 def recent_clip(session: Session, seconds: float) -> native.Clip:
-    """The recent frames of a session as captured: without ranges, gain, smoothing and neutral.
+    """The recent frames of a session, before ranges, gain, smoothing and neutral are applied.
 
     Args:
         session: session of the character.

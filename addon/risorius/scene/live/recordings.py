@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings of live capture: they become actions, or wait in memory for the user.
+"""Turns recordings of live capture into actions, or keeps them in memory for the user.
 
 A recording waits if it cannot become an action at its end, or if its face or file is gone, because
 a performance cannot be repeated.

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sessions of captured characters, and the receivers that they share.
+"""Manages the live capture sessions of characters, and the receivers that sessions share.
 
-No Blender object is kept: a character is found again each time and may be deleted.
+A session is the live capture of one character. A subject is a captured face, with the name that the
+sending app gives it. No Blender object is kept: a character is found again each time and may be
+deleted.
 """
 
 from __future__ import annotations
@@ -35,8 +37,9 @@ class Settings:
         port: port to listen on.
         everywhere: True: other computers can send; False: only this one.
         subject: name of the phone; "" for the first one received.
-        smoothing: 0 to 1.
-        gain, head_gain: factors of all units and of head rotations; head_gain 0 for none.
+        smoothing: strength of the smoothing, 0 (none) to 1.
+        gain, head_gain: factors of all captured controls and of head rotations; head_gain 0: the
+            head does not turn.
         mapping: name or file of the mapping to controls.
     """
 
@@ -110,7 +113,7 @@ def of(controls: bpy.types.Object | None) -> Session | None:
 
 
 def begin(controls: ArmatureObject, shaper: native.Shaper, settings: Settings) -> Session:
-    """Let a character follow a subject; it must not have a session.
+    """Begin a session of a character that has none, so that it follows a subject.
 
     Args:
         controls: its control armature.
@@ -156,13 +159,19 @@ def close(session: Session) -> None:
 
 
 def _reserve(key: tuple[str, int, str]) -> None:
-    """Let a receiver reserve a place for each subject that a session chose by name."""
+    """Let a receiver reserve a place for each subject that a session chose by name.
+
+    Other senders then cannot displace these subjects.
+    """
     chosen = {s.subject for s in _sessions.values() if s.key == key and s.subject}
     _receivers[key].reserve(chosen)
 
 
 def neutral_now(session: Session) -> bool:
-    """Take the newest received face as the face at rest. Returns: whether there was one."""
+    """Use the newest received face as neutral face, which is subtracted from all later faces.
+
+    Returns: whether a face was received.
+    """
     frame = session.receiver.latest(session.subject)
     if frame is None:
         return False
@@ -172,6 +181,6 @@ def neutral_now(session: Session) -> bool:
 
 
 def forget_neutral(session: Session) -> None:
-    """Show received faces without subtracting a face at rest."""
+    """Show received faces without subtracting a neutral face."""
     session.shaper.capture(None)
     session.sequence = 0

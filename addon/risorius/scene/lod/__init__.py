@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of detail of characters."""
+"""Chooses the levels of detail of characters."""

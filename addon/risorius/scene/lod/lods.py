@@ -29,8 +29,10 @@ def shows(item: MeshObject, level: int) -> bool:
 
 
 def heads(rig: ArmatureObject) -> list[MeshObject]:
-    """The head mesh of the finest existing level, or all meshes of that level. Args: rig deforming
-    armature."""
+    """The head meshes of the finest existing level; all meshes of this level if none is a head.
+
+    Args: rig  the deforming armature.
+    """
     items = parts.meshes_of(rig)
     first = min((min(levels_of(item), default=0) for item in items), default=0)
     shown = [item for item in items if shows(item, first)]
@@ -144,7 +146,8 @@ def _distance(seen: ArmatureObject, camera: bpy.types.Object) -> float:
 def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
     """Hide the meshes of other levels; meshes that the user hid stay hidden.
 
-    A flag that differs from the last written value was set by the user.
+    `flag` is the name of the property that hides a mesh in the viewport or in renders. If its value
+    differs from the last written value, the user has set it.
     """
     for item in parts.meshes_of(rig):
         written, users = f"{parts.HIDDEN_PREFIX}{flag}", f"{parts.HIDDEN_PREFIX}user_{flag}"
@@ -156,5 +159,6 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
-            # Otherwise a library override loses the value at load, and `flag` counts as the user's.
+            # Otherwise a library override loses the value when the file is opened, and the flag
+            # would count as a choice of the user.
             item.property_overridable_library_set(f'["{written}"]', True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of hair cards in the solid view: mean colour and opacity of their picture."""
+"""Computes the colour of hair cards in the solid view: the mean of their image."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LEAST = 0.02  # smallest opacity, so that hair stays visible
 
 
 def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
-    """Mean colour and opacity of the part of a picture that cards show.
+    """Mean colour and opacity of the part of an image that hair cards show.
 
     The solid view has one colour for each material. Cards of one dark, half transparent colour
     would look like blocks, because most of a card is transparent and overlaps other cards.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material of cloth: threads across and along, a soft sheen at the edges."""
+"""Builds the material of cloth: threads in two directions, and a soft sheen at the edges."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _NEAR, _FAR = 7.0, 14.0  # camera distances in eye distances: threads begin to f
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of a material.
+    """Build the node tree of a cloth material.
 
     Args:
         graph: Graph of the material.
@@ -32,7 +32,7 @@ def build(graph: Graph, look: Look) -> None:
     turns = _THREADS / look.unit
     across = graph.math("SINE", graph.math("MULTIPLY", graph.math("ADD", x, y), turns))
     along = graph.math("SINE", graph.math("MULTIPLY", z, turns))
-    # Far away a thread is smaller than a pixel and would flicker.
+    # The threads fade with distance, because threads smaller than a pixel would flicker.
     away = graph.node("CameraData").outputs["View Distance"]
     span = (_FAR - _NEAR) * look.unit
     near = graph.math("DIVIDE", graph.math("SUBTRACT", _FAR * look.unit, away), span, clamp=True)

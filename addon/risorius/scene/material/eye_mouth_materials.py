@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of eyes, teeth, tongue, gums, lashes and wet films. Textures are optional, because
-node patterns vary each surface."""
+"""Builds the materials of eyes, teeth, tongue, gums, lashes and wet films.
+
+Textures are optional, because procedural nodes can give each surface its details."""
 
 from __future__ import annotations
 
@@ -10,14 +11,14 @@ from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Color, Graph, Value
 
-# Mesh attributes. EYES: x and height from the eye's axis in radii, 1 on the front half; TEETH:
-# place along the arch, pi per tooth, and height, -1 to 1; MOUTH: depth behind the foremost vertex
-# in eye distances.
+# Mesh attributes of each vertex. EYES: x and height relative to the eye's axis, in eye radii, and
+# 1 on the front half, else 0. TEETH: position along the arch, pi per tooth, and height, -1 to 1.
+# MOUTH: depth behind the foremost vertex, in eye distances.
 EYES = "risorius_eye"
 TEETH = "risorius_teeth"
 MOUTH = "risorius_mouth"
 
-# Linear colours, chosen by eye.
+# Linear RGB colours, tuned by hand in renders.
 _SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
 _PUPIL, _IRIS_IN, _IRIS_OUT = (0.002, 0.002, 0.002), (0.19, 0.10, 0.045), (0.055, 0.066, 0.05)
 _LIMBUS = (0.022, 0.022, 0.02)
@@ -26,8 +27,9 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Lips and cheeks shade the inside of a mouth. Without cast shadows (Material Preview, exports)
-# molars would be as bright as incisors.
+# Depth in the mouth in eye distances, and colour by which the surface is multiplied at this depth.
+# The factor imitates the shadows of lips and cheeks: in Material Preview and exports, which have no
+# cast shadows, molars would otherwise be as bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -39,7 +41,7 @@ _COARSE = 1500  # vertices: a mesh with fewer has no separate teeth, so the mate
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of a material by the kind of its mesh.
+    """Build the node tree of a material by the kind of its mesh.
 
     Args:
         graph: Graph of the material.
@@ -58,10 +60,11 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 
 
 def eyes(graph: Graph, look: Look) -> None:
-    """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
+    """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The coat keeps the smooth normal of the eyeball, so that the highlight is round. The hollow
-    iris is lit on the side away from the light, as a real one is by refraction.
+    The clear coat over these is the cornea. The coat keeps the smooth normal of the eyeball, so
+    that the highlight is round. The hollow iris is lit on the side away from the light, as
+    refraction lights a real iris.
 
     Args:
         graph: Graph of the material.
@@ -95,7 +98,7 @@ def eyes(graph: Graph, look: Look) -> None:
 
 
 def _ball(graph: Graph, look: Look) -> None:
-    """The eyeball under a separate cornea mesh: a dry iris with relief and a wet sclera.
+    """Build the material of eyeballs under a separate cornea mesh: dry iris and wet sclera.
 
     Args:
         graph: Graph of the material.
@@ -159,8 +162,9 @@ def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
 
 
 def teeth(graph: Graph, look: Look) -> None:
-    """Enamel that yellows towards the gum; a coarse mesh without texture also gets single teeth
-    and gums.
+    """Build the material of teeth: enamel that gets yellower towards the gum.
+
+    On a coarse mesh without a texture, the nodes also draw single teeth and gums.
 
     Args:
         graph: Graph of the material.
@@ -199,7 +203,7 @@ def teeth(graph: Graph, look: Look) -> None:
 
 
 def tongue(graph: Graph, look: Look) -> None:
-    """The tongue: wet flesh with papillae as relief.
+    """Build the material of a tongue: wet flesh with papillae as relief.
 
     Args:
         graph: Graph of the material.
@@ -209,7 +213,7 @@ def tongue(graph: Graph, look: Look) -> None:
 
 
 def gum(graph: Graph, look: Look) -> None:
-    """Wet, mottled flesh: gums, caruncles, cartilage.
+    """Build the material of gums, caruncles and cartilage: wet, mottled flesh.
 
     Args:
         graph: Graph of the material.
@@ -261,7 +265,9 @@ def _flesh(
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards, from an alpha or colour texture, or else from a noise pattern.
+    """Build the material of lashes: hairs on cards.
+
+    The hairs come from an alpha texture, a colour texture with alpha, or else a noise pattern.
 
     Args:
         graph: Graph of the material.
@@ -275,7 +281,7 @@ def lashes(graph: Graph, look: Look) -> None:
         alpha = graph.image(mask, label="Alpha").outputs["Color"]
     elif picture is not None:
         node = graph.image(picture, label="Colour")
-        # A picture without alpha shows hairs on a plain ground, so the noise pattern stays.
+        # An image without alpha shows hairs on a plain ground, so the noise pattern is used.
         alpha = node.outputs["Alpha"] if picture.channels == 4 else alpha
         color = node.outputs["Color"] if picture.channels == 4 else color
     graph.set(Base_Color=color, Alpha=alpha, Roughness=_film(graph, look, 0.4, 0.6))
@@ -292,7 +298,7 @@ def _strands(graph: Graph, look: Look) -> Socket:
 
 
 def wet(graph: Graph, look: Look) -> None:
-    """A clear film that reflects like water at each angle.
+    """Build the material of wet films: a clear film that reflects like water at each angle.
 
     The film is transparent and does not refract, because a refracting shell keeps light from the
     eye under it in both engines. Only a cornea refracts, in Cycles and for camera rays alone, so
@@ -349,7 +355,7 @@ def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
 
 
 def _transparent(material: bpy.types.Material, method: str) -> None:
-    """Set EEVEE's method of transparency; light passes the clear parts in shadows too."""
+    """Set EEVEE's method of transparency, and let light pass through clear parts in shadows."""
     material.surface_render_method = method  # pyright: ignore[reportAttributeAccessIssue]
     material.use_transparency_overlap = False
     if hasattr(material, "use_transparent_shadow"):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material of hair cards: opacity from the picture, a soft highlight that fades at grazing
-angles."""
+"""Builds the material of hair cards.
+
+The opacity comes from the picture; the soft highlight fades at grazing angles."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of the material of scalp hair, brows or a beard.
+    """Build the node tree of the material of scalp hair, brows or a beard.
 
     Args:
         graph: Graph of the material.
@@ -43,7 +44,7 @@ def build(graph: Graph, look: Look) -> None:
 
 
 def outward_normal(graph: Graph) -> Socket:
-    """The file's normal for both sides of a card, because it is the normal of the skin.
+    """The normal from the DNA file, for both sides of a card; it is the normal of the skin below.
 
     Renderers flip normals on the back of a polygon, so the flip is undone.
     """
@@ -57,7 +58,7 @@ def outward_normal(graph: Graph) -> Socket:
 
 
 def see_through(graph: Graph) -> None:
-    """Make places without hair transparent; EEVEE dithers them."""
+    """Make the parts of the cards without hair transparent; EEVEE dithers the transparency."""
     material = graph.material
     material.surface_render_method = "DITHERED"
     material.use_transparency_overlap = False

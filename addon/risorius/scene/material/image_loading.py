@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loads textures once, packs them into the .blend, and sets the colour space of their role."""
+"""Loads each texture once, packs it into the .blend, and sets its space: colours or numbers."""
 
 from __future__ import annotations
 
@@ -30,9 +30,10 @@ COLOR_SPACES = (
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
 PACK_LIMIT = 64 << 20  # bytes; larger files are not packed, or a .blend would grow to gigabytes
-# In memory an image may take _ONE_IMAGE bytes + _MOST_TIMES its file size, all images of an import
-# _ALL_IMAGES bytes + _MOST_TIMES the size of their files. So 8192 x 8192 pixels of 4 bytes are
-# accepted even if the file is tiny because the picture has one colour.
+# Limits of the memory for images, in bytes. One image may take _ONE_IMAGE + _MOST_TIMES * its file
+# size. All images of an import together may take _ALL_IMAGES + _MOST_TIMES * the sum of their file
+# sizes. So an image of 8192 x 8192 pixels of 4 bytes is accepted even if its file is tiny because
+# the picture has one colour.
 _ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
 TILE = 512  # pixels, side of one tile of the mask atlas
 
@@ -186,7 +187,9 @@ class Images:
     def atlas(
         self, name: str, masks: Mapping[str, texture_search.Mask]
     ) -> tuple[bpy.types.Image | None, dict[str, tuple[int, int, int, int]]]:
-        """Pack the masks of many regions into one image, three in each tile, because a render
+        """Pack the masks of many regions into one image of square tiles.
+
+        A tile has three masks, one in each colour channel. One image is used because a render
         engine limits the number of textures of a material.
 
         Args:
@@ -194,7 +197,8 @@ class Images:
             masks: region -> texture_search.Mask.
 
         Returns:
-            The image or None, and region -> (column, row, channel, tiles in a row).
+            The image or None, and region -> (column and row of the tile, colour channel, number of
+            tiles in a row).
         """
         held = {r: m for r, m in masks.items() if m.path.is_file()}
         if not held:

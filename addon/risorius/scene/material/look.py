@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs from which one material is built: sizes, areas, textures."""
+"""Defines Look, the inputs from which one material is built: sizes, areas of skin, textures.
+
+The role of a texture is its purpose in the material, such as "color" or "normal". A wrinkle map is
+a texture of wrinkled skin, which an animated map fades in.
+"""
 
 from __future__ import annotations
 
@@ -21,19 +25,20 @@ class Look:
     Attributes:
         kind: kind of the mesh, see MeshPlan.
         base: mesh name without LOD.
-        rig: the deforming armature, whose `maps` array drives the map values.
+        rig: the deforming armature of the character, whose animated maps the material reads.
         extent: float64[3] size of the mesh in Blender units.
         unit: distance of the eyes in Blender units; patterns scale with it.
         vertices: number of vertices of the finest mesh.
         has_uvs: whether the mesh has a UV map.
-        simple: True leaves out subsurface scattering, relief and maps.
+        simple: True leaves out subsurface scattering, relief and animated maps.
         cornea: whether the face has a mesh of corneas over its eyes.
-        uses: uses of the animated maps.
-        areas: areas of a face that this mesh has.
-        border: whether the mesh has an open border away from the face.
+        uses: effects of the animated maps of the face.
+        areas: skin areas of a face, such as the forehead, that this mesh has.
+        border: whether the mesh has an open border away from the face, such as at the neck.
         found: texture_search.TexturePlan.
         images: loader of images.
-        atlas, places: image with the wrinkle masks, and the place of each region in it.
+        atlas, places: image with the wrinkle masks of all regions; region -> its tile and colour
+            channel in this image.
         offsets: role -> whether that wrinkle map stores differences; filled when needed.
     """
 
@@ -56,10 +61,10 @@ class Look:
     offsets: dict[str, bool] = field(default_factory=dict)
 
     def image(self, role: str, data: bool = False) -> bpy.types.Image | None:
-        """The image of a role, or None.
+        """The image that the mesh uses for a role, or None.
 
         Args:
-            role: such as "color", "cavity" or "normal:2", see texture_search.
+            role: purpose of a texture, such as "color", "cavity" or "normal:2", see texture_search.
             data: whether the pixels are numbers instead of colours.
         """
         return self.images.load(self.found.of(self.base, role), data)

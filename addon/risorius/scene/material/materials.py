@@ -17,8 +17,8 @@ from .image_loading import Images
 from .look import Look
 from .nodes import Graph
 
-# Colours of the solid view. Lashes are cards: opaque ones would cover the lids with black bands.
-# Cards with a picture get its colour and opacity, see card_color.
+# Colours of the solid view. Lashes are cards, and opaque cards would cover the lids with black
+# bands. Cards with a picture get the colour and opacity of the picture, see card_color.
 _VIEW_COLORS = {
     "skin": (0.62, 0.36, 0.27, 1.0),
     "eyes": (0.75, 0.70, 0.66, 1.0),
@@ -52,7 +52,8 @@ def build_materials(
         built: mesh objects, in the order of the plan's meshes.
         made: receives every new datablock.
         found: texture_search.TexturePlan; None for no textures.
-        simple: True builds cheaper materials without subsurface scattering, relief and maps.
+        simple: True builds cheaper materials without subsurface scattering, relief and animated
+            maps.
 
     Returns:
         Sentences about textures that are missing, cannot be read or stay outside the .blend.
@@ -145,8 +146,8 @@ def _build(
 def _choose_picture(look: Look, graph: Graph) -> None:
     """Make the colour image active, because the solid view's *Texture* mode shows the active image.
 
-    Without an image a pattern becomes active, so that the view shows the material's colour.
-    Otherwise it would show the first image, such as a mask.
+    Without a colour image, a node with a procedural pattern becomes active, so that the view shows
+    the material's colour. The view would otherwise show the first image, such as a mask.
     """
     pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
     colors = [n for n in pictures if n.image == look.image("color")]
@@ -194,8 +195,10 @@ def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
 def _add_attributes(
     mesh: bpy.types.Mesh, plan: plans.MeshPlan, frame: skin_folds.FaceFrame | None
 ) -> set[str]:
-    """Write the mesh attributes that materials of this kind read. Returns: the areas of a face
-    on a skin mesh, else none."""
+    """Write the mesh attributes that the material of a mesh reads.
+
+    Returns: the areas of a face that a skin mesh has; empty for other meshes.
+    """
     if not len(plan.positions):
         return set()
     if plan.kind == "eyes":
@@ -223,8 +226,10 @@ def _add(
 def _add_border(
     mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
 ) -> None:
-    """Write the closeness to an open border away from the face, 1 at the border, if there is
-    one."""
+    """Write an attribute: 1 at an open border away from the face, falling to 0 with distance.
+
+    A mesh without such a border gets no attribute.
+    """
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)
     used = np.empty(len(mesh.loops), np.int32)
@@ -273,8 +278,8 @@ def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArr
 def _tooth_coordinates(
     points: NDArray[np.float32] | NDArray[np.float64], unit: float
 ) -> NDArray[np.float64]:
-    """float64[V, 3]: place along the arch, pi per tooth; height from the mesh's middle, -1 to 1;
-    0."""
+    """float64[V, 3]: position along the arch, pi per tooth; height from the mesh's middle, -1 to
+    1; and 0."""
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     half = max((high[0] - low[0]) / 2, 1e-9)
@@ -287,7 +292,7 @@ def _tooth_coordinates(
 
 
 def map_drivers(material: bpy.types.Material | None) -> Iterator[bpy.types.FCurve]:
-    """The driver curves of the animated maps of a material."""
+    """The drivers (F-curves) through which animated maps change a material."""
     data = material.node_tree.animation_data if material and material.node_tree else None
     for curve in data.drivers if data else ():
         if skin_material.MAP_PREFIX in curve.data_path:

@@ -43,7 +43,7 @@ class Graph:
         return node
 
     def put(self, value: Value | None, socket: Socket) -> None:
-        """Link a socket to an input, or set its value; None leaves it."""
+        """Link an output socket to an input, or set the input to a value; None changes nothing."""
         if value is None:
             return
         if hasattr(value, "is_output"):
@@ -54,7 +54,10 @@ class Graph:
             socket.default_value = value
 
     def set(self, **values: Value | None) -> None:
-        """Set inputs of the Principled shader, `_` for the space in their names."""
+        """Set inputs of the Principled shader.
+
+        The keywords are the names of the inputs with `_` instead of spaces.
+        """
         for name, value in values.items():
             self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
 
@@ -244,7 +247,7 @@ class Graph:
 
         Args:
             height: 0 to 1.
-            distance: Blender units of height 1.
+            distance: relief in Blender units that a height of 1 means.
             normal: normal without the relief; None for the surface's own.
             strength: 0 to 1.
         """

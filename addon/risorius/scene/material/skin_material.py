@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Material of skin: subsurface scattering, pores, and the effects of animated maps on colour and
-normals."""
+"""Builds the material of skin: subsurface scattering, pores, and effects of animated maps.
+
+An animated map is a value of the rig that changes colours and normals of the skin in an area, such
+as the forehead. A texture set is a numbered set of textures of wrinkled skin.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +25,13 @@ _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
-# Density of folds in radians per eye distance.
+# Spatial frequency of the folds: phase in radians per eye distance, for each kind of fold.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # factor of blushes without a painted mask, which must stay faint
 _PORE_DEPTH = 0.032
 _GRAIN_DEPTH = 0.006
-# Range of light in light skin, in eye distances; smallest factor of this range in dark skin.
+# Distance in eye distances that light travels inside pale skin; smallest factor of this distance,
+# for dark skin.
 _SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
@@ -38,7 +42,10 @@ Member = tuple[str, Value]  # side of the face, value of the map
 
 
 class Bucket(NamedTuple):
-    """The effect that a sum of maps drives: "flush", a texture set by number, or folds by name."""
+    """An effect on the skin: reddening, a texture set, or folds.
+
+    The values of the animated maps with the same effect are added.
+    """
 
     kind: str  # "flush", "color", "normal" or "bump"
     number: int = 0  # of the texture set, for "color" and "normal"
@@ -46,8 +53,10 @@ class Bucket(NamedTuple):
 
 
 class Mask(NamedTuple):
-    """The part of the skin that maps affect: the texture of one map, a region of the painted masks,
-    or an area."""
+    """The part of the skin that animated maps affect.
+
+    The part is given by the texture of one map, by a region of the painted masks, or by an area.
+    """
 
     kind: str  # "own", "atlas" or "area"
     place: str = ""  # region for "atlas", area for "area"
@@ -102,7 +111,10 @@ class Skin:
         graph.set(Subsurface_Weight=weight, Subsurface_Radius=_RADIUS, Subsurface_Scale=far)
 
     def _areas(self) -> dict[str, Socket]:
-        """The masks of the areas, and of "left", the left half; empty for a mesh without a face."""
+        """Name of an area -> its mask; "left" is the left half of the face.
+
+        Empty for a mesh without a face.
+        """
         if not self.look.areas:
             return {}
         found = {}
@@ -114,7 +126,10 @@ class Skin:
     # --- animated maps -------------------------------------------------------------------
 
     def _read_maps(self) -> None:
-        """Add driven Value nodes for the visible maps of this mesh, and sum the maps by effect."""
+        """Add a driven Value node for each animated map that is visible on this mesh.
+
+        Maps with the same effect are summed.
+        """
         frame = None
         groups = {}
         for use in self.look.uses:
@@ -134,7 +149,10 @@ class Skin:
             self._file(bucket, amounts)
 
     def _targets(self, use: animated_maps.MapUse) -> list[tuple[Bucket, Mask]]:
-        """The effects of a map on this mesh, each with its mask; none if the map is invisible."""
+        """The effects of an animated map on this mesh, each with its mask.
+
+        Empty if the map is not visible on this mesh.
+        """
         look = self.look
         own = look.image(f"map:{use.label}", data=True)
         if own is not None:
@@ -164,8 +182,10 @@ class Skin:
         return value.outputs[0]
 
     def _masked(self, bucket: Bucket, mask: Mask, members: Sequence[Member]) -> Socket:
-        """The sum of the values of maps, times their mask. In an area, a map of one side affects
-        its own half only."""
+        """The sum of the values of animated maps, multiplied by their common mask.
+
+        If the mask is an area, a map of one side of the face affects only this side.
+        """
         graph = self.graph
         if mask.kind == "own":
             use = self.look.uses[mask.map_index]
@@ -249,8 +269,10 @@ class Skin:
         return color
 
     def _tint(self, color: Value, number: int, amount: Value) -> Value:
-        """Mix towards the colours of a texture set, or add them if they are differences around
-        0.5."""
+        """Mix a colour towards the colour texture of a texture set.
+
+        If the texture stores differences around 0.5, the differences are added instead.
+        """
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
         other = picture.outputs["Color"]
@@ -309,8 +331,10 @@ class Skin:
         return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
     def _normal(self) -> Socket:
-        """Pores and folds as one height field, because engines evaluate each height field three
-        times."""
+        """The normal of the skin, from a height field of pores and folds.
+
+        There is only one height field, because engines evaluate each height field three times.
+        """
         graph, look = self.graph, self.look
         normal = self._normal_map()
         pores = graph.cells(self.points, 75.0 / look.unit)
@@ -326,8 +350,11 @@ class Skin:
         return graph.bump(graph.total(heights), look.unit * 0.03, normal)
 
     def _normal_map(self) -> Socket | None:
-        """The normal of the textures with wrinkle sets mixed in by their amounts; None without
-        normal textures."""
+        """The normal from the normal textures; None if there are none.
+
+        The normals of the texture sets are mixed into the normal of the base texture by their
+        amounts.
+        """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)
         if base is None and not self.wrinkles:

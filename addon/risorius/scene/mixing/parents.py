@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the files of a mix, shows the preview mesh, and writes the mixed face."""
+"""Reads the files of a mix, shows the preview mesh, and writes the mixed face.
+
+The parents are the faces that are mixed. The share of a parent is its fraction of the mixed face.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ from ..base import session
 from ..base.blender_types import Context, MeshObject
 
 PREVIEW = "risorius_mix_preview"  # custom property of the object that shows the mix
-# Path -> (time of change, size), Dna.
+# Path -> ((time of the last change, size in bytes) of the file, its Dna).
 _read: dict[str, tuple[tuple[float, int], native.Dna]] = session.table(
     "parents.read", ("unregister",)
 )
-# Current paths -> data of the preview.
+# Paths of the faces that are mixed in the preview -> data of the preview.
 _seen: dict[tuple[str, ...], _Seen] = session.table("parents.seen", ("unregister",))
 
 Regions = Mapping[str, Mapping[int, float]]
@@ -34,7 +37,7 @@ class MixError(FaceError, ValueError):
 
 
 def region_names() -> tuple[str, ...]:
-    """The names of the regions of a face that can be mixed with shares of their own."""
+    """The names of the regions for which the user can set separate shares of the parents."""
     return tuple(native.part("mixing").REGIONS)
 
 
@@ -139,7 +142,7 @@ def show(
         context: Blender context.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: region -> number of a parent -> share, for regions with other shares.
+        regions: region -> number of a parent -> share, for regions with separate shares.
 
     Raises:
         ValueError: invalid shares.
@@ -193,11 +196,12 @@ def write(
         path: path of the new file.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: region -> number of a parent -> share, for regions with other shares.
+        regions: region -> number of a parent -> share, for regions with separate shares.
         progress: called with the finished share, 0 to 1.
 
     Returns:
-        Textures taken unmixed from the leading parent -> reason, a key of mixing.textures.WHY.
+        Textures taken unmixed from the parent with the largest share -> reason, a key of
+        mixing.textures.WHY.
 
     Raises:
         MixError: the new file is one of the parents.

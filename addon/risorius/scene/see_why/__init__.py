@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""See Why: the causes of the motion of each vertex, in millimetres."""
+"""Shows the causes of the motion of each vertex, in millimetres (panel See Why)."""

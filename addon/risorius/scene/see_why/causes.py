@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Causes of the motion of a vertex, firing correctives, and correctives of a control, in
-millimetres."""
+"""Finds the causes of a vertex's motion, firing correctives, and the correctives of a control.
+
+Motions are in millimetres. A corrective fires if its value is not 0. The index of a control counts
+raw controls, correctives, network outputs and outputs of RBF poses, in this order (written
+raw | corrective | network | pose).
+"""
 
 from __future__ import annotations
 
@@ -18,9 +22,9 @@ from . import displacement, present
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
 _LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
-# Deforming armature -> its last result.
+# Session uid of a deforming armature -> last result of `of_vertex`.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
-# Deforming armature -> firing correctives, and the inputs of that result.
+# Session uid of a deforming armature -> (inputs of `strongest`, its last result).
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 
@@ -29,14 +33,15 @@ class Cause:
     """A control that moves a vertex.
 
     Attributes:
-        control: its index in raw | corrective | network | pose.
-        name: its name in lists.
-        is_raw: whether it is a raw control, which has a slider.
+        control: index of the control, counted through raw controls, correctives, network outputs
+            and pose outputs in this order.
+        name: name of the control in lists.
+        is_raw: whether the control is a raw control, which has a slider.
         value: current value.
-        now: motion in millimetres that it currently causes.
-        full: motion in millimetres between its rest and its full value, with all others unchanged;
-            0 if it is no raw control.
-        label: label of its slider; "" for none.
+        now: motion of the vertex in millimetres that the control currently causes.
+        full: motion of the vertex in millimetres between rest and full value of the control, with
+            all other controls unchanged; 0 if the control is no raw control.
+        label: label of the control's slider; "" for none.
     """
 
     control: int
@@ -54,7 +59,7 @@ class Found:
 
     Attributes:
         mesh, vertex: index of the mesh in the file, and of the vertex.
-        moved: distance from neutral in millimetres.
+        moved: distance of the vertex from its neutral position in millimetres.
         causes: causes, the strongest first.
     """
 
@@ -151,7 +156,7 @@ def firing(now: present.Present) -> list[int]:
 
 
 def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
-    """For each of some controls, the current pose without the effect of this control.
+    """Index of a control -> the current pose without the effect of this control.
 
     Args:
         now: the current face.
@@ -187,7 +192,7 @@ def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
 
 
 def without(now: present.Present, control: int) -> Poses:
-    """The joint deltas and channel weights of the current pose without a corrective.
+    """Joint deltas and blend shape weights of the current pose without the effect of a corrective.
 
     Args:
         now: the current face.
@@ -272,7 +277,9 @@ def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
 
 
 def sliders_of(rig: ArmatureObject, control: int) -> list[str]:
-    """The labels of the raw controls that a control depends on: its own, or those of its factors.
+    """The labels of the raw controls on which a control depends, directly or through its factors.
+
+    A raw control depends only on itself.
 
     Args:
         rig: deforming armature.
@@ -303,7 +310,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh nearest to a place in the current pose; -1: none.
+    """The vertex of a mesh nearest to a position in the current pose; -1 if there is none.
 
     Args:
         rig: deforming armature.

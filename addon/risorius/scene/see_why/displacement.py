@@ -101,7 +101,7 @@ def vertices(
         live: Runtime of the character.
         mesh: index of the mesh in the file.
         joints: float32[J, 9] deltas.
-        shapes: float32[B] weights of the channels.
+        shapes: float32[B] weights of the blend shape channels.
     """
     skin = skin_of(live, mesh)
     zero = np.zeros_like(skin.points, np.float32)
@@ -127,13 +127,13 @@ def at_vertex(
     joints: NDArray[np.float32],
     shapes: NDArray[np.float32],
 ) -> Doubles:
-    """Places of one vertex in many poses, float64[N, 3] in Blender units.
+    """Positions of one vertex in N poses, float64[N, 3] in Blender units.
 
     Args:
         live: Runtime of the character.
         mesh, vertex: mesh and vertex index.
         joints: float32[N, J, 9] deltas.
-        shapes: float32[N, B] weights of the channels.
+        shapes: float32[N, B] weights of the blend shape channels.
     """
     skin = skin_of(live, mesh)
     deltas = np.zeros((shapes.shape[1], 3))
@@ -201,11 +201,11 @@ def distances(
 
 
 def meshes_at(rig: ArmatureObject, lod: int) -> list[int]:
-    """Indices in the file of the meshes that a level shows.
+    """Indices in the file of the meshes that a level of detail shows.
 
     Args:
         rig: deforming armature.
-        lod: the level.
+        lod: the level of detail.
     """
     shown = [m for m in parts.meshes_of(rig) if lods.shows(m, lod)]
     return [int(m[parts.MESH]) for m in shown]

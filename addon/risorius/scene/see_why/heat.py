@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat maps: motion of each vertex as a colour attribute of the face's meshes.
+"""Shows heat maps: colours the vertices of a face by the length of their motion.
 
-Materials are unchanged, because the solid view shows the attribute. A property of the deforming
-armature stores the state, so that undo restores it. Saved files contain no heat map.
+The colours are a colour attribute of the meshes, which the solid view shows, so materials are
+unchanged. A property of the deforming armature stores the choice of the heat map, so that undo
+restores it. Saved files contain no heat map.
 """
 
 from __future__ import annotations
@@ -35,9 +36,10 @@ from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
-# Deforming armature -> inputs of its colours.
+# Session uid of a deforming armature -> values from which its colours were computed.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
-# Deforming armature -> its map while a file is saved.
+# Session uid of a deforming armature -> (kind, what) of the heat map that is removed during a save,
+# see Heat.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 
@@ -50,7 +52,7 @@ class Heat:
         kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
             neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
         what: label of the control, index of the corrective, or index of the layer.
-        most: millimetres of the hottest colour.
+        most: motion in millimetres that gets the hottest colour.
     """
 
     kind: str
@@ -117,7 +119,7 @@ def _is_as_imported(item: MeshObject, count: int) -> bool:
 def _distances(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> dict[int, NDArray[np.float64]]:
-    """Index of a mesh -> distance of each vertex between the two poses, in Blender units."""
+    """Index of a mesh -> distances of its vertices between the poses of `_pair`, Blender units."""
     one, other = _pair(rig, now, kind, what, depsgraph)
     meshes = displacement.meshes_at(rig, now.lod)
     return {m: displacement.distances(now.live, m, one, other) for m in meshes}
@@ -153,7 +155,10 @@ def _state(now: present.Present, kind: str) -> object:
 
 
 def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
-    """Write heat as the active colours of a mesh. Args: shares  float64[V], 0 cold to 1 hot."""
+    """Write the colours of a heat map as the active colour attribute of a mesh.
+
+    Args: shares  float64[V], 0 for the coldest colour to 1 for the hottest.
+    """
     held = item.data.color_attributes
     layer: Attribute = held.get(parts.HEAT)
     if layer is not None and (layer.domain != "POINT" or len(layer.data) != len(shares)):
@@ -171,7 +176,7 @@ def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
 
 
 def _take_off(item: MeshObject) -> None:
-    """Remove the heat of a mesh, and activate its earlier colour attributes again."""
+    """Remove the heat map from a mesh, and activate its earlier colour attributes again."""
     data = item.data
     held = data.color_attributes
     layer = held.get(parts.HEAT)
@@ -188,13 +193,15 @@ def _take_off(item: MeshObject) -> None:
 
 
 def hide(rig: ArmatureObject) -> bool:
-    """Remove the heat map of a character; 3D views are restored if no other face has a map.
+    """Remove the heat map of a character.
+
+    The settings of the 3D views are restored if no other face has a heat map.
 
     Args:
         rig: its deforming armature.
 
     Returns:
-        Whether there was one.
+        Whether the character had a heat map.
     """
     had = rig.pop(parts.HEAT, None) is not None
     _shown.pop(rig.session_uid, None)
@@ -216,7 +223,7 @@ def take_away() -> None:
 
 
 def give_back(depsgraph: Depsgraph) -> None:
-    """Restore the maps that `take_away` removed. Args: depsgraph graph for reading layers."""
+    """Restore the heat maps that `take_away` removed. Args: depsgraph  graph to read layers."""
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
         if kept is not None:
@@ -237,7 +244,8 @@ def end_all() -> None:
 
 
 def follow_undo() -> None:
-    """After undo and redo: update the views to the existing heat maps."""
+    """After undo and redo: let 3D views show vertex colours if there is still a heat map, else
+    restore the settings of the views."""
     if any(parts.HEAT in rig for rig in parts.rigs()):
         heat_views.show()
         watch()
@@ -246,7 +254,7 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether it has changed.
+    """Update the colours of a character if its pose has changed. Returns: whether the pose changed.
 
     Args:
         rig: its deforming armature, with a heat map.

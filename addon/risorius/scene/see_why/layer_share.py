@@ -45,7 +45,8 @@ def raw_pair(
         raise FaceError(told("This layer plays nothing now."))
     at = stack.places.index(place)
     layer = stack.layers[at]
-    # Muting a solo layer would let others through, so use a layer that moves nothing.
+    # The layer is replaced by a layer that moves nothing. The layer is not muted instead, because
+    # muting a solo layer would let other layers take effect.
     nothing = np.zeros(len(live.labels) + len(clip_units.BONES), np.float32)
     stack.layers[at] = replace(layer, mask=nothing)
     stack.weights = ()  # so that the mixer reads its layers again

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The current pose of a face, and names of its controls."""
+"""Gets the current pose of a face, and the names of its controls."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Present:
 
     @property
     def rests(self) -> NDArray[np.float32]:
-        """float32[R], all controls at rest."""
+        """float32[R], rest values of the raw controls."""
         return np.array(self.live.rests, np.float32)
 
     def pose(self) -> native.Pose:
@@ -51,7 +51,9 @@ class Present:
 
 
 def of(rig: ArmatureObject) -> Present | None:
-    """The current pose of a character; None if its data or controls are lost, or it is baked.
+    """The current pose of a character.
+
+    None if its data or controls are lost, or if the character is baked.
 
     Args:
         rig: its deforming armature.
@@ -113,7 +115,7 @@ def factors_of(live: runtime.Runtime) -> Factors:
 
 
 def name_of(live: runtime.Runtime, control: int) -> str:
-    """The name of a control in lists: its last part; for a corrective its shape or its factors.
+    """The name of a control for lists: its short name; for a corrective its shape or its factors.
 
     Args:
         live: Runtime of the character.

@@ -33,8 +33,9 @@ class Row(NamedTuple):
             left out by the user; MUTED: left out because the key is muted.
         controls: raw controls without prefix.
         expression: name of the expression, or "".
-        by: title of the vocabulary that knows the name, or WORDS; "" for none.
-        is_known: whether its name is known, regardless of the user's assignment.
+        by: title of the vocabulary that contains the name; WORDS if the name was recognised by its
+            words; "" if it was not recognised.
+        is_known: whether the name of the key is known, regardless of the user's assignment.
         is_said: whether the user assigned the key.
         holder: another key with the same assignment; "" for none.
     """
@@ -56,7 +57,7 @@ class Names(NamedTuple):
 
     @property
     def unknown(self) -> int:
-        """The number of unknown names without the user's assignment."""
+        """The number of keys whose name is unknown and that the user has not assigned."""
         return sum(not row.is_known and not row.is_said for row in self.rows.values())
 
 
@@ -101,7 +102,7 @@ def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
 
 
 def own_control(key: str) -> str:
-    """The name of a key's own control.
+    """The name of a new control that belongs only to this key.
 
     Args:
         key: name of the key; it may contain letters that are invalid in controls.
@@ -190,7 +191,7 @@ UNIT = "UNIT"
 
 @session.cached(("unregister",), 1)
 def choices() -> tuple[Choice, ...]:
-    """All possible assignments of a key: ARKit units first, because most people know them, then
+    """All possible assignments of a key: first ARKit units, which most people know, then
     controls and expressions."""
     vocabulary, words = native.part("controls.vocabulary"), tables.controls()
     units = [

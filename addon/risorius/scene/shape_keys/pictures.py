@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws pictures of shape keys on their head, and of possible assignments on the sample man.
 
-A thread draws them without a window (scene/expressions/portrait.py). They are cached as files,
-named by a hash of the drawn data. The moving part is orange.
+A thread draws the pictures without a window (scene/expressions/portrait.py). The pictures are
+cached as files, named by a hash of the drawn data. Vertices that a shape key moves are orange.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Model:
 
     Attributes:
         points: float64[V, 3], the face looks along -y.
-        ways: name of a key -> float32[V, 3] displacement.
-        triangles: int64[F, 3].
+        ways: name of a shape key -> float32[V, 3], displacements from the neutral head.
+        triangles: int64[F, 3], vertex indices.
         frame: centre of the pictures, and half their height.
         paths: name of a key -> file of its picture.
     """
@@ -65,7 +65,7 @@ class Job(NamedTuple):
     Attributes:
         model: the head.
         keys: names of keys.
-        samples: values of assigned.Choice.
+        samples: values of assigned.Choice, drawn on the sample man.
     """
 
     model: Model
@@ -80,8 +80,8 @@ _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo
 def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
     """Name of a key -> path of its picture, which may not exist; None before the first `model_of`.
 
-    Panels call this often, so it computes no hashes: edited keys keep their old pictures until
-    they are drawn again.
+    Panels call this function often, so it computes no hashes: edited shape keys keep their old
+    pictures until new pictures are drawn.
 
     Args:
         item: the head.
@@ -131,8 +131,10 @@ def _digest(*parts_of_it: bytes) -> str:
 
 
 def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
-    """float64[V]: largest motion of each vertex, relative to the largest motion of the same key, so
-    that a brow counts as much as a jaw. Keys with almost no motion do not count."""
+    """float64[V]: largest relative motion of each vertex by any shape key, 0 to 1.
+
+    A motion is divided by the largest motion of the same shape key, so that a brow counts as much
+    as a jaw. Shape keys with almost no motion do not count."""
     lengths = [np.nan_to_num(np.linalg.norm(way, axis=1), posinf=0.0) for way in ways.values()]
     furthest = [float(length.max(initial=0.0)) for length in lengths]
     share = np.zeros(count)
@@ -193,7 +195,7 @@ def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) ->
         colors: float64[F, 3].
         length: float64[V], motion of each vertex.
         triangles: int64[F, 3].
-        furthest: motion with the full colour.
+        furthest: motion that gets the full colour, in the unit of `length`.
     """
     share = np.sqrt(length / max(furthest, 1e-12))
     share = np.where(share > _FAINT, share, 0.0)[triangles].mean(axis=1)[:, None] * _STRONG
@@ -209,7 +211,9 @@ def sample_path(value: str) -> Path:
 
 
 def without_picture(values: Sequence[str]) -> list[str]:
-    """The assignments whose picture file is missing, one for each file.
+    """The assignments whose picture file is missing.
+
+    Only the first of several assignments with the same picture file is returned.
 
     Args:
         values: values of assigned.Choice.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stores the unknown curves of the last import, and the user's assignments of them.
+"""Stores the curves of the last import that match no control, and the user's assignments.
 
 The control armature stores them as JSON. The assignments can be added to a mapping.
 """

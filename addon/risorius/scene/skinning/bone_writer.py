@@ -23,12 +23,13 @@ class Writer:
 
     Attributes:
         count: number of bones of the armature.
-        where: int64[n] positions of bones that the evaluator owns.
+        where: int64[n], indices of the pose bones that the evaluator writes.
         space: risorius.BoneSpace of these bones, in the same order.
         turning: for each joint of neck and head: (name of the control bone, row in `where`, share
             of the rotation, rest rotation).
-        buffers: channel -> float32 for all bones; None if the evaluator owns every bone.
-        driving: joint -> position of its bone, for joints whose rotation is stored in raw controls.
+        buffers: property such as "location" -> float32, its values for all bones, flat; None if
+            the evaluator writes every bone.
+        driving: joint -> index of its pose bone, for joints whose rotation is in raw controls.
     """
 
     count: int
@@ -50,15 +51,16 @@ def write(
     depsgraph: Depsgraph | None,
     keyed: Collection[int] = (),
 ) -> bool:
-    """Write the joints that the evaluator owns; other bones keep the user's values.
+    """Write the bones of all joints that the rig moves; other bones keep the user's values.
 
     Args:
         rig: the deforming armature, the original.
         live: its Runtime.
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> additional Quaternion in the armature's axes.
-        depsgraph: graph for reading animated values of other bones; None if they have none.
-        keyed: positions of bones of neck and head that also keep the user's values.
+        depsgraph: graph for reading animated values of other bones; None if the other bones have no
+            animation.
+        keyed: indices of pose bones of neck and head that also keep the user's values.
 
     Returns:
         Whether Blender accepted the values; it silently refuses bulk writes to overrides.
@@ -91,7 +93,7 @@ def _buffers(count: int) -> dict[str, NDArray[np.float32]]:
 def pose_of(
     writer: Writer, deltas: NDArray[np.float32], turns: Mapping[str, Quaternion]
 ) -> dict[str, NDArray[np.float32]]:
-    """The values of the bones that the evaluator owns.
+    """The values of the bones that the evaluator writes.
 
     Args:
         writer: see writer_of.

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds caches of simulations, and caches that were baked when faces were one frame late.
 
-A cache does not store which version baked it, so the form number of the characters in its scene
-decides: before form 2 every simulation saw the face of the frame before. A character of an older
-file keeps its form number while such a cache exists, and is checked again when the file is opened.
+A cache does not store which version baked it, so the version number of the characters in its scene
+decides (base/form.py): before version 2 every simulation saw the face of the previous frame. A
+character of an older file keeps its version number while such a cache exists, and is checked again
+when the file is opened.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ SIMULATED = frozenset(
 )
 Key = tuple[int, str]  # session uid of an object or scene, and the name of its modifier or part
 
-# Deforming armature -> caches that were baked at load and have not been freed since.
+# Session uid of a deforming armature -> caches that were already baked when the file was opened and
+# have not been freed since.
 _late: dict[int, set[Key]] = session.table("caches.late", ("load",))
 
 
@@ -89,7 +91,7 @@ def note_old(rig: ArmatureObject) -> bool:
         rig: its deforming armature.
 
     Returns:
-        Whether any of them still exists.
+        Whether any of these caches still exists.
     """
     if rig.session_uid not in _late:
         _late[rig.session_uid] = {key for scene in rig.users_scene for key in _baked(scene)}

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Decides which meshes of a face can be in Direct mode, and whether its bones have to be posed.
 
-Direct mode writes finished positions to the live key of a mesh and disables its armature modifier.
-A Plan is made when the file changes and kept while frames play.
+Direct mode writes final vertex positions to the live shape key of a mesh and disables its armature
+modifier. A Plan is made when the file changes and kept during playback. The tables have session
+uids of datablocks as keys.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
 @dataclass(frozen=True)
 class Plan:
-    """How a face is shown.
+    """The way in which a face is shown: by Direct mode or by Blender's modifiers.
 
     Attributes:
-        direct: session uids of the mesh objects in Direct mode, which get finished positions.
+        direct: session uids of the mesh objects in Direct mode, which get final vertex positions.
         posed: whether the bones of the deforming armature are posed.
-        why: why bones are posed, or why a mesh is not in `direct`; empty if all meshes are and no
-            bones are posed.
+        why: why bones are posed, or why a mesh is not in `direct`; empty if all meshes are in
+            `direct` and no bones are posed.
     """
 
     direct: frozenset[int] = frozenset()
@@ -59,9 +60,10 @@ class _Kept:
     is_fresh: bool = True
 
 
-# Deforming armature -> its plan.
+# Session uid of a deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh object -> number of the add-on's last write to it; an update of this write is no edit.
+# Mesh object -> number of the add-on's last write to it. The update that reports this write does
+# not count as an edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
 # Scene and view layer -> the last write that an update of its graph reported.
@@ -97,7 +99,9 @@ def known(rig: ArmatureObject) -> Plan | None:
 
 
 def note_moved(rig: ArmatureObject) -> None:
-    """Mark a plan as outdated, because keys or drivers move joints; a script's keys cause no edit.
+    """Mark a plan as outdated, because keys or drivers move joints.
+
+    This is necessary because Blender reports no edit for keys that a script inserted.
 
     Args:
         rig: deforming armature.
@@ -108,7 +112,7 @@ def note_moved(rig: ArmatureObject) -> None:
 
 
 def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
-    """Keep a face in the form of files: bones posed, modifiers enabled. Calls may be nested.
+    """Keep a face out of Direct mode: bones posed, modifiers enabled. Calls may be nested.
 
     Args:
         rig: deforming armature.
@@ -122,7 +126,7 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 
 def note_written(item: MeshObject) -> None:
-    """Note a write of the add-on, whose update is no edit. Args: item  the mesh object."""
+    """Note a write of the add-on, so that it does not count as an edit. Args: item  the mesh."""
     _writes.now += 1
     _written[item.session_uid] = _writes.now
 
@@ -133,8 +137,8 @@ def forget_written() -> None:
 
 
 def end_updates(depsgraph: Depsgraph) -> None:
-    """Called at the end of the handlers of an update, because Blender evaluates their writes
-    without another update.
+    """Note that the handlers of an update are done. Blender reports no further update for their
+    writes, so the next update of these objects is an edit.
 
     Args:
         depsgraph: graph of the update; graphs of other view layers report the writes later.
@@ -263,13 +267,13 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Note undo or redo: the following update of all restored datablocks is no edit."""
+    """Note undo or redo: the next update, of all restored data, does not count as an edit."""
     _restored.now = True
 
 
 def look_quickly() -> None:
-    """Mark plans as outdated if settings that are quick to compare have changed: modes, selection,
-    modifiers and keys."""
+    """Mark plans as outdated if settings that are quick to compare have changed, such as object
+    modes, selection, modifiers and shape keys."""
     for rig in parts.rigs():
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
@@ -465,8 +469,8 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
         rig: the deforming armature.
 
     Returns:
-        In Direct mode the modifier that the add-on disabled, whatever it points to; otherwise the
-        first armature modifier of this rig.
+        In Direct mode the modifier that the add-on disabled, even if the user has changed its
+        object; otherwise the first armature modifier of this rig.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None
@@ -480,7 +484,10 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
 
 
 def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
-    """Yield the reasons if the armature modifier is not the first enabled one, or was changed."""
+    """Yield the reasons why the modifiers of a mesh prevent Direct mode.
+
+    The armature modifier must be unchanged, enabled, and before all other enabled modifiers.
+    """
     own = armature_of(item, rig)
     if own is None or own.object != rig:
         yield told("{mesh} has no armature modifier of {rig}.", mesh=item.name, rig=rig.name)
@@ -505,7 +512,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
-    """Whether a mesh with channels has no live key, as in the mode Keys."""
+    """Whether a mesh has blend shapes but no live shape key, as in KEYS mode."""
     number = runtime.mesh_number(live, item)
     moves = number is not None and live.morph(number).channel_indices.size > 0
     return moves and meshes.live_block(item) is None
@@ -514,7 +521,10 @@ def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
 def _keys(
     item: MeshObject, rig: ArmatureObject, live: runtime.Runtime, number: int
 ) -> Iterator[Sentence]:
-    """Yield the reasons if other shape keys than an unchanged live key shape a mesh."""
+    """Yield the reasons why the shape keys of a mesh prevent Direct mode.
+
+    The live shape key must be unchanged, and no other shape key may have an effect.
+    """
     key, block = item.data.shape_keys, meshes.live_block(item)
     if key is None or block is None:
         if key is not None:
@@ -551,7 +561,10 @@ def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _reads_bones(item: bpy.types.Object, rig: ArmatureObject) -> bool:
-    """Whether an object of the character reads the rig by more than a mesh's armature modifier."""
+    """Whether an object of the character reads the deforming armature.
+
+    One modifier of a mesh object, the armature modifier, does not count.
+    """
     count = 0
     for modifier in item.modifiers:
         properties = modifier.bl_rna.properties
@@ -581,5 +594,5 @@ def _has_driver_on(owner: bpy.types.ID | None, rig: ArmatureObject) -> bool:
 
 
 def _drives_more(material: bpy.types.Material, rig: ArmatureObject) -> bool:
-    """Whether a driver of a material or of its node tree reads the rig itself."""
+    """Whether a driver of a material or of its node tree reads the deforming armature."""
     return _has_driver_on(material, rig) or _has_driver_on(material.node_tree, rig)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct mode: writes final vertex positions to the live keys of meshes, without posing bones.
+"""Direct mode: writes final vertex positions to live shape keys of meshes, without posing bones.
 
 A mesh in Direct mode has the property FINISHED, which survives undo, duplication and automatic
-saves. Its live key has final positions, and its armature modifier is disabled.
+saves. Its live shape key has final positions, and its armature modifier is disabled.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from . import bone_writer, conditions, skins
 
 @dataclass(frozen=True)
 class Shape:
-    """The inputs of a shown face.
+    """The inputs from which the shown pose of a face is computed.
 
     Attributes:
         joints: float32[J, 9] deltas of a Pose.
@@ -91,9 +91,10 @@ class Job:
     anew: bool
 
 
-# Deforming armature -> the plan to whose modes its meshes were last switched.
+# Session uid of a deforming armature -> the plan that `settle` last applied to its meshes.
 _settled: dict[int, conditions.Plan] = session.table("direct.settled", ("rewrite", "undo", "load"))
-# Deforming armature -> its last written Frame, and (second table) the compiled data of its face.
+# _shown: session uid of a deforming armature -> its last written Frame. _faces: the same uid ->
+# compiled data of the face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
@@ -135,7 +136,7 @@ def _is_taken(item: MeshObject, rig: ArmatureObject) -> bool:
 
 
 def take(item: MeshObject, rig: ArmatureObject) -> None:
-    """Switch a mesh to Direct mode; its positions are written afterwards.
+    """Switch a mesh to Direct mode. The caller writes its positions afterwards.
 
     Args:
         item: the mesh object; it gets a live key if it has none.
@@ -151,7 +152,7 @@ def take(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def give_back(item: MeshObject, rig: ArmatureObject) -> None:
-    """Switch a mesh from Direct mode to its armature modifier; its live key is written afterwards.
+    """Let the armature modifier deform a mesh again. The caller writes its live key afterwards.
 
     Args:
         item: the mesh object.
@@ -167,7 +168,9 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
-    """float32[V, 3]: the live key that a mesh has in Live mode, before skinning; None without keys.
+    """float32[V, 3]: positions of a mesh after its blend shapes and before skinning.
+
+    In LIVE mode the live shape key has these positions. None if the mesh has no shape keys.
 
     Args:
         item: the mesh object.
@@ -183,8 +186,8 @@ def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | No
 
 
 def _reset_edited(item: MeshObject, rig: ArmatureObject) -> None:
-    """Give the live key of a mesh in edit mode its positions before skinning, because the mesh
-    stores them when the user leaves edit mode."""
+    """Give the live key of a mesh in edit mode its positions before skinning. Blender copies the
+    key from the edited mesh when the user leaves edit mode."""
     edit, block = bmesh.from_edit_mesh(item.data), meshes.live_block(item)
     layers: Any = edit.verts.layers.shape
     rest = rest_form(item, rig)
@@ -218,7 +221,7 @@ def prepare(
     items: Sequence[MeshObject],
     anew: bool,
 ) -> Job:
-    """Note the shown inputs of a face, and compile its data if bones or skins have changed.
+    """Store the inputs of a face as shown, and compile its data if bones or skins have changed.
 
     Args:
         rig: deforming armature; nothing is written to it.
@@ -256,7 +259,7 @@ def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
 
 
 def write(jobs: Sequence[Job]) -> None:
-    """Write finished positions to the live keys of faces, all faces at once.
+    """Write final vertex positions to the live shape keys of all given faces at once.
 
     Args:
         jobs: see `prepare`.
@@ -278,7 +281,7 @@ def write(jobs: Sequence[Job]) -> None:
 
 
 def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
-    """Index of a mesh -> memory address and number of the points of its live key."""
+    """Index of a mesh -> memory address of the points of its live shape key, number of points."""
     found = {}
     for number, item in items.items():
         block = meshes.live_block(item)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the sum of all blend shape channels to the live key of a mesh.
+"""Writes the sum of all blend shape channels to the live shape key of a mesh.
 
-Writing a key is an edit of its mesh, and an edit resets simulations: cloth would stay at its first
-step. So before a frame the key of a mesh with a simulation is written without notifying Blender,
-in the key and its copies in the graphs of all scenes. Graphs of renders and exporters are notified
-afterwards.
+For Blender, writing a shape key is an edit of the mesh, and an edit resets simulations: cloth would
+stay at its first step. So before a frame, the live shape key of a mesh with a simulation is written
+without notifying Blender, both in the original and in its copies in the graphs of all scenes.
+Graphs of renders and exporters are notified afterwards.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def write(
     force: bool,
     ahead: bool = False,
 ) -> None:
-    """Write the sum of all channels to the live key of a mesh, if it has one.
+    """Write the sum of all blend shape channels to the live key of a mesh, if it has one.
 
     Args:
         item: the mesh object.
@@ -68,14 +68,20 @@ def write(
 
 
 def bears_simulation(item: bpy.types.Object) -> bool:
-    """Whether an edit of an object resets a simulation: its own, or one that it influences."""
+    """Whether an edit of an object resets a simulation.
+
+    The object may be simulated, or influence other simulated objects, for example by a force field.
+    """
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None
     return field or body or any(m.type in caches.SIMULATED for m in item.modifiers)
 
 
 def reach(depsgraph: Depsgraph) -> None:
-    """Tag keys for an update if their silent writes did not reach a dependency graph.
+    """Tag live shape keys for an update if a dependency graph has other positions.
+
+    This happens if positions were written without notifying Blender, and the graph belongs to a
+    render or an exporter.
 
     Args:
         depsgraph: the evaluated graph.
@@ -97,7 +103,7 @@ def reach(depsgraph: Depsgraph) -> None:
 def _write_unheard(
     key: bpy.types.Key, block: bpy.types.ShapeKey, points: NDArray[np.float32]
 ) -> None:
-    """Write points to a key and to its copies in graphs, without notifying Blender."""
+    """Write points to a shape key and to its copies in all graphs, without notifying Blender."""
     points = np.ascontiguousarray(points, np.float32)
     ctypes.memmove(block.points[0].as_pointer(), points.ctypes.data, points.nbytes)
     last_written.unheard.add(key.session_uid)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Switches faces from Direct mode to the form in files (bones posed, modifiers on) and back."""
+"""Switches faces from Direct mode to the ordinary form, and back.
+
+In the ordinary form the bones are posed and the armature modifiers are enabled. Faces are saved in
+this form.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,12 @@ from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes
 from . import bone_writer, conditions, direct
 
-# Mesh object -> the finished positions that it had before the file was written.
+# Session uid of a mesh object -> positions in Direct mode, kept while a file is written.
 _finished: dict[int, NDArray[np.float32]] = session.table("ordinary.finished", ("undo", "load"))
 
 
 def take_on(rigs: Iterable[ArmatureObject]) -> None:
-    """Give faces the form of files before a file is written, without an evaluation.
+    """Give faces the ordinary form before a file is written, without an evaluation.
 
     Args:
         rigs: deforming armatures.
@@ -33,7 +37,7 @@ def take_on(rigs: Iterable[ArmatureObject]) -> None:
 
 
 def leave(rig: ArmatureObject) -> None:
-    """Give a face the form of files in its visible pose; the next evaluation restores Direct mode.
+    """Give a face the ordinary form in its visible pose; the next evaluation restores Direct mode.
 
     Args:
         rig: deforming armature.
@@ -57,7 +61,7 @@ def leave(rig: ArmatureObject) -> None:
 
 
 def is_unknown(rigs: Iterable[ArmatureObject]) -> bool:
-    """Whether the form of files is unknown for a face, as between undo and the next update.
+    """Whether the ordinary form of a face is unknown, as between undo and the next update.
 
     Args:
         rigs: deforming armatures.

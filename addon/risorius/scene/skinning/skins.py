@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads the bones and skin weights of a face from Blender, compiled for the native skinning."""
+"""Reads the bones and skin weights of a face from Blender, compiled for the native skinning.
+
+The skin of a mesh is the compiled form of its skin weights.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,8 @@ class Bones:
     """The bones of a deforming armature.
 
     Attributes:
-        names: bone -> its position among the pose bones.
-        joints: joint -> position of its bone.
+        names: bone name -> index of the pose bone.
+        joints: joint index -> index of its pose bone.
         chain: risorius.JointChain of the bones.
         location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
             the rows of its joints.
@@ -56,17 +59,18 @@ class Skin:
     names: dict[str, int]
 
 
-# Deforming armature -> Bones; mesh object -> Skin.
+# _bones: session uid of a deforming armature -> Bones. _skins: session uid of a mesh object ->
+# Skin.
 _bones: dict[int, Bones] = session.table("skins.bones", ("rewrite", "undo", "load"))
 _skins: dict[int, Skin] = session.table("skins.skins", ("load",))
 _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
-# Mesh objects that somebody edited since the file was opened.
+# Session uids of mesh objects that were edited since the file was opened.
 _edited: set[int] = session.keep("skins.edited", set, ("load",))
 
 
 @session.at("undo")
 def doubt() -> None:
-    """Compare skins with their meshes before they are used again.
+    """Make `of` compare each kept skin with its mesh before the next use.
 
     Meshes that were not edited since the file was opened need no comparison.
     """
@@ -188,8 +192,8 @@ def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
     """The weights of a mesh's vertex groups.
 
     Returns:
-        int64[V] number of weights of each vertex; int64[N] position of each weight's bone, -1 for
-        none; float32[N] the weights.
+        int64[V] number of weights of each vertex; int64[N] index of the pose bone of each weight,
+        -1 for none; float32[N] the weights.
     """
     vertices, groups_there = item.data.vertices, item.vertex_groups
     counts = np.fromiter((len(v.groups) for v in vertices), np.int64, len(vertices))

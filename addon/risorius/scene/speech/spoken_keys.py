@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stores the sounds of a voice with its action, and updates the mouth's keys after corrections.
 
-In each curve only the keys between the last key before the changed frames and the first key after
-them are replaced. These two keys get new inner handles; all other keys are unchanged.
+A voice is the recorded speech from which an action was made. A sound is a phoneme and the frame at
+which it begins. In each curve only the keys between the last key before the changed frames and the
+first key after the changed frames are replaced. These two keys stay, but their handles towards the
+replaced keys are set anew. All other keys are unchanged.
 """
 
 from __future__ import annotations
@@ -79,7 +81,7 @@ class Spoken(Protocol):
 
 
 def of(action: bpy.types.Action) -> Spoken:
-    """The voice of an action. Args: action any; without a voice the list is empty."""
+    """The voice of an action. Args: action  any; without a voice the list of sounds is empty."""
     return cast(Spoken, getattr(action, PROPERTY))
 
 
@@ -209,7 +211,7 @@ def rebuild(action: bpy.types.Action) -> int:
 
 
 def trouble(action: bpy.types.Action) -> str:
-    """Why the voice of an action cannot be corrected, a Sentence; or ""."""
+    """The Sentence with the reason why the voice of an action cannot be corrected; "" if it can."""
     try:
         _check(action)
     except SpokenError as error:
@@ -318,7 +320,7 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Replace the keys between the last key before a span of frames and the first key after it."""
+    """Replace the keys between the last key before and the first key after a span of frames."""
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
@@ -351,7 +353,7 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Frames and values of a control in a span of frames; both end values are the curve's own."""
+    """Frames and values of a control in a span of frames, with the curve's values at both ends."""
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shows the sounds of a voice as scene markers, and reads them back after the user moved them.
 
-Scene markers are used instead of action markers, because timeline, dope sheet, graph editor and
-NLA all show them, even if the voice is a layer and not the active action. The user's own markers
-are never changed.
+A voice is the recorded speech from which an action was made; its sounds are phonemes. Scene markers
+are used instead of action markers, because timeline, dope sheet, graph editor and NLA all show
+scene markers, even if a layer plays the action of the voice. The user's own markers are never
+changed.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ from ...logic.animation.spoken import Board, Mark, Placing
 from ..base import parts, saved
 from . import spoken_keys, voices
 
-# Property of a scene, as JSON: the shown voice, its markers, and the user's own markers when they
-# were added. Markers cannot be tagged, because since Blender 5 they store frame and name only.
+# Property of a scene, as JSON: the shown voice, its markers, and the user's own markers at the time
+# when the markers of the voice were added. Markers have no tag of their own, because since Blender
+# 5 a marker stores only a frame and a name.
 _KEPT = "risorius_markers"
 
 
@@ -36,7 +38,7 @@ def named(text: str) -> str | None:
 
 
 def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
-    """The mark of the voice whose markers a scene shows ("" for none), and the markers."""
+    """The id of the voice whose markers a scene shows ("" for none), and the markers."""
     there = [Mark(m.frame, m.name) for m in scene.timeline_markers]
     try:
         kept = json.loads(saved.text(scene, _KEPT) or "{}")

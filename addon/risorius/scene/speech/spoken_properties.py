@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The words and sounds of a voice as properties of its action, so that they are saved, appended,
-copied and undone with the action."""
+"""Defines the words and sounds of a voice as properties of its action, so that Blender saves,
+appends, copies and undoes them with the action."""
 
 # Blender properties are declared as annotations that are not types:
 # pyright: reportInvalidTypeForm=false
@@ -93,7 +93,7 @@ class RISORIUS_PG_sound(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_spoken(bpy.types.PropertyGroup):
-    """The sounds of a voice, and further inputs of its mouth."""
+    """The sounds of a voice, and other data from which the keys of the mouth are made."""
 
     sounds: bpy.props.CollectionProperty(type=RISORIUS_PG_sound)
     active: bpy.props.IntProperty(name="Place", update=_jump, options=set(), min=0)
@@ -124,5 +124,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the property; values in files stay."""
+    """Remove the property; its values in .blend files stay."""
     delattr(bpy.types.Action, spoken_keys.PROPERTY)

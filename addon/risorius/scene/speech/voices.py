@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finds the voices that a face plays, and maps their frames to frames of the scene."""
+"""Finds the voices that a face plays, and maps their frames to frames of the scene.
+
+A voice is the recorded speech from which an action was made.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ from . import spoken_keys
 
 
 def all_of(controls: ArmatureObject) -> list[bpy.types.Action]:
-    """The actions with a voice that a face plays: of the chosen layer, then its own action, NLA
-    strips and other layers.
+    """The actions with a voice that a face plays, in this order: action of the chosen layer, active
+    action, NLA strips, other layers.
 
     Args:
         controls: its control armature.
@@ -37,7 +40,8 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
     """The mapping from frames of an action to frames of the scene.
 
-    Repeats of a layer are ignored, and warped time is replaced by the line through its ends.
+    Repeats of a layer are ignored. If a layer has warp points, the mapping is the line through the
+    first and the last warp point.
 
     Args:
         controls: the face's control armature.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Camera, three lights and a backdrop around a face, in a collection of their own.
+"""Builds a camera, three lights and a backdrop around a face, in a new collection.
 
-The user may change or delete them, because nothing of the face refers to them.
+The user may change or delete these objects, because no part of the face refers to them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _EDGE = (0.010, 0.011, 0.014, 1.0)
 
 
 def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.Collection:
-    """Build the studio of a face at its current place, scaled to its head.
+    """Build the studio around a face at its current position, scaled to the size of the head.
 
     Args:
         context: Blender context; the studio is added to its scene.
@@ -51,8 +51,8 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
 
 
 def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
-    """The matrix in the world, without scale, of the point between the eyes; the distance between
-    the eyes; the low and high corner of the face's bounding box in this space."""
+    """World matrix, without scale, of the midpoint between the eyes; distance between the eyes; low
+    and high corner of the face's bounding box in the space of this matrix."""
     meshes = parts.meshes_of(rig)
     world = np.array(rig.matrix_world, np.float64)
     eyes = _eyes(rig)
@@ -79,10 +79,11 @@ def _places(item: MeshObject) -> np.ndarray:
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:
-    """The largest height at which the front of the body ends, compared in 8 strips below the face.
+    """The height of the lower edge of the body's front.
 
-    A hem may hang lower at the sides, and a picture that reaches down to the lowest point would
-    show a gap in the middle.
+    The lowest point in each of 8 vertical strips is found, and the highest of these points counts.
+    A hem may hang lower at the sides, and a picture that reaches down to the lowest point of all
+    would show a gap in the middle.
 
     Args:
         places: float64[V, 3] of each mesh, in the head's axes.
@@ -100,7 +101,10 @@ def _hem(places: list[np.ndarray], apart: float) -> float:
 
 
 def _eyes(rig: ArmatureObject) -> np.ndarray:
-    """float64[2, 3]: the eyes' joints at rest in the rig's space; no rows unless there are two."""
+    """float64[2, 3]: positions of the eye joints at rest in the rig's space.
+
+    float64[0, 3] unless the face has two eye joints at different positions.
+    """
     live = runtime.of(rig)
     if live is None:
         return np.zeros((0, 3))
@@ -110,7 +114,10 @@ def _eyes(rig: ArmatureObject) -> np.ndarray:
 
 
 def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Guess the point between the eyes and their distance from the corners of bounding boxes."""
+    """Guess the midpoint between the eyes, and the distance between the eyes.
+
+    Args: corners  float64[n, 3], corners of bounding boxes, axes  float64[3, 3], axes of the head.
+    """
     inside = corners @ axes
     low, high = inside.min(axis=0), inside.max(axis=0)
     tall = max(float(high[2] - low[2]), 1e-6)
@@ -142,7 +149,7 @@ def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
 
 
 def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
-    """The matrix of a camera or lamp that looks from a place to a target."""
+    """The matrix of a camera or lamp at a position, directed at a target."""
     way = Vector(target) - Vector(place)
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo Apply Transform, Set Origin and similar steps on parts of a face.
+"""Undoes Apply Transform, Set Origin and similar steps on parts of a face.
 
-Joints, meshes and controls must fit each other. These steps move an object's transform into its
-data: the rig, which follows the controls, would be transformed twice, and a mesh would leave its
-joints. Blender does not report these steps, so the state of each part is stored and compared.
+The parts of a face are its deforming armature (rig), its control armature and its meshes. They must
+fit each other. These steps of Blender move an object's transform into its data: the rig, which
+follows the controls, would be transformed twice, and a mesh would leave its joints. Blender does
+not report these steps, so the state of each part is stored and compared.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ class _Seen:
         own: its matrix, without parent and constraints.
         hung: its parent inverse matrix.
         parent: session uid of its parent, 0 for none.
-        points: float32[N, 3] ends of its bones or some of its vertices; empty while the user
-            edits them.
+        points: bytes of a float32[N, 3] array, ends of its bones or some of its vertices; empty
+            while the user edits them.
     """
 
     own: Matrix
@@ -169,7 +170,8 @@ def _places(
     seen: Mapping[bpy.types.Object, _Seen],
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
-    """Matrices of the parts of a face in the world, or in the space of a foreign parent."""
+    """The matrix of each part of a face: world matrix, or matrix relative to a parent object that
+    does not belong to the face."""
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -198,7 +200,8 @@ def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object])
             data.transform(back)
         data.update_tag()
     item.matrix_parent_inverse = before.hung
-    # Frames move an armature without an update, so its stored state may be of another frame.
+    # A frame change moves an armature without an update, so its stored matrix may come from another
+    # frame.
     same = item.parent is not None or now.own == before.own
     item.matrix_basis = before.own if same else moved.stood
     for child in item.children:
@@ -208,8 +211,8 @@ def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object])
 
 
 def _clear_deltas(rig: ArmatureObject) -> bool:
-    """Move the delta transforms of a rig into its transform, because Blender's Apply is wrong with
-    deltas. Returns whether there were any."""
+    """Move the delta transforms of a rig into its transform, because Apply Transform gives wrong
+    results with deltas. Returns whether there were any."""
     neutral = Vector(), Euler(), Quaternion(), Vector((1.0, 1.0, 1.0))
     names = ("location", "rotation_euler", "rotation_quaternion", "scale")
     if all(getattr(rig, f"delta_{n}") == v for n, v in zip(names, neutral, strict=True)):
@@ -228,21 +231,26 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """Restore the place of a child of a part; Blender does so itself, but not under all bones."""
+    """Restore the world transform of a child of a part.
+
+    Blender itself does not restore the transforms of some children of bones.
+    """
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
 
 
 def _is_held(item: bpy.types.Object) -> bool:
-    """Whether the place of a part is locked and not animated."""
+    """Whether the transform of a part is locked, not animated and without constraints."""
     locked = all((*item.lock_location, *item.lock_rotation, *item.lock_scale))
     return locked and item.animation_data is None and not item.constraints
 
 
 def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
-    """The matrix that moves a part's data back, or None if no step has moved its transform into
-    them."""
+    """The matrix that moves the data of a part (vertices or bones) back to their earlier places.
+
+    None if no step of Blender has moved the transform of the part into its data.
+    """
     old, new = (
         np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
         for seen in (moved.before, now)
@@ -259,7 +267,8 @@ def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
     near = _NEAR * max(np.abs(old).max(), np.abs(new).max())
     if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
         return None
-    # Set Origin moves an object with a constraint too far or not far enough.
+    # Set Origin moves an object with a constraint by a wrong distance, so world positions do not
+    # show whether Set Origin was used. A changed location or centred data show its use.
     told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
     return Matrix.Translation(Vector(shift.tolist())) if told else None
 

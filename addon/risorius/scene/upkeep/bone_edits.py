@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base import parts, session
 
-# Session uid of an armature -> its bones' names, marks and places at rest, as last seen.
+# Session uid of an armature -> (names, roles and joint indices of its bones; rest matrices).
 _seen: dict[int, tuple[Sequence[object], bytes]] = session.table(
     "bone_edits.seen", ("undo", "load")
 )

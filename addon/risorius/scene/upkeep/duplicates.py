@@ -16,7 +16,7 @@ from ..skinning import ordinary
 
 
 def separate_all() -> list[str]:
-    """Separate every character from its original.
+    """Give every duplicated character its own data, see `separate`.
 
     Returns:
         Sentences about changes, for a report.
@@ -62,7 +62,10 @@ def separate(rig: ArmatureObject) -> list[str]:
 
 
 def _own_mesh(item: MeshObject) -> list[str]:
-    """Give a mesh object its own mesh datablock, if another object uses its shapes too."""
+    """Give a mesh object its own mesh datablock if another object uses its datablock too.
+
+    Two faces cannot share a mesh datablock with shape keys.
+    """
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
     users = [o for o in bpy.data.objects if o.data == item.data]

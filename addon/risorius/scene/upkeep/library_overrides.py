@@ -2,8 +2,9 @@
 """Makes overrides of linked characters that can be animated.
 
 Blender refuses bulk writes to linked data and to overrides that are not editable, and to the
-shape keys of every override. So the override is made fully editable, and its meshes either have
-real keys, which drivers move without any write, or are copied into this file.
+shape keys of every override. So the override is made fully editable. Its meshes either have real
+keys (a shape key for each channel), which drivers move without any write, or the meshes are copied
+into this file.
 """
 
 from __future__ import annotations
@@ -94,8 +95,9 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
 
 
 def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
-    """Make shapes of an override movable; meshes whose keys cannot be driven are copied into this
-    file.
+    """Make the shape keys of an override follow the controls.
+
+    Meshes with a live key are copied into this file, because drivers cannot move a live key.
 
     Args:
         rig: the override's deforming armature.
@@ -118,13 +120,13 @@ def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
 
 
 def is_locked(item: MeshObject) -> bool:
-    """Whether the shapes of a mesh object belong to another file."""
+    """Whether the mesh datablock of an object, with its shape keys, belongs to another file."""
     return item.data.library is not None or item.data.override_library is not None
 
 
 def unlock_shapes(rig: ArmatureObject) -> bool:
-    """Copy all meshes whose shapes belong to another file into this file, so that their mode can be
-    switched. Returns whether there were any."""
+    """Copy all meshes that belong to another file into this file, so that the mode of their shape
+    keys can be switched. Returns whether a mesh was copied."""
     owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
     for item in locked:
@@ -159,7 +161,8 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
         if material.name not in owned:
             owned[material.name] = _local_copy(material)
         item.data.materials[index] = owned[material.name]
-    # Blender 5.2 reports overrides without their hierarchy as errors when a file is opened.
+    # Remove the old overrides. Without their hierarchy, Blender 5.2 reports them as errors when the
+    # file is opened.
     for old in dict.fromkeys(left):
         if old is not None and old.override_library is not None and old.users == 0:
             bpy.data.batch_remove([old])
@@ -185,7 +188,10 @@ def _instance_of(context: Context, rig: ArmatureObject) -> bpy.types.Object | No
 
 
 def _linked_root(rig: ArmatureObject) -> bpy.types.Collection | ArmatureObject:
-    """The linked collection with this rig inside a local one, or the rig itself."""
+    """The linked collection that contains this rig and is a child of a local collection.
+
+    The rig itself if there is no such collection.
+    """
     homes = [s.collection for s in bpy.data.scenes if s.library is None]
     homes += [c for c in bpy.data.collections if c.library is None]
     for home in homes:
@@ -203,7 +209,10 @@ def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
 
 
 def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
-    """Move an override to the place of its instance, and empty the instance."""
+    """Move an override to the position of an instance of the linked collection.
+
+    The instance then shows nothing, and is deleted if no other datablock uses it.
+    """
     place = shown.matrix_world.copy()
     shown.instance_collection = None
     shown.instance_type = "NONE"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Updates characters of older files to the current form, one step for each form number.
+"""Updates saved data of characters to the current form, one step for each form (version number).
 
 Linked characters cannot be written, so code that reads characters must understand every form. A
 character of a newer form is unchanged and plays with the features that this version knows.
@@ -14,7 +14,8 @@ from ..character import armatures, values
 from ..frame import joint_turns
 from ..skinning import caches
 
-# Session uids of characters for which a sentence was returned that is not repeated.
+# Session uids of characters whose newer form, or whose late caches, `bring_up_all` has reported.
+# These sentences are returned only once for each character.
 _said: set[int] = session.keep("migrations.said", set, ("load",))
 
 
@@ -48,8 +49,8 @@ def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     if reached > found:
         if form.VERSION in controls:
             del controls[form.VERSION]  # the stored value may not be a number
-        # For an override of an older library the number is lost when the file is saved, so it is
-        # updated again.
+        # A file does not keep this number on an override of an older library, so this character
+        # is updated each time the file is opened.
         controls[form.VERSION] = reached
     late = caches.words(rig) if rig.session_uid not in _said else ""
     if late:
@@ -78,7 +79,7 @@ def newer(rig: ArmatureObject) -> str:
 
 
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """Add the property Needs Risorius; store muted tracks of a baked character by name."""
+    """Add the property Needs Risorius; store muted NLA tracks of a baked character by name."""
     changed = []
     if not controls.override_library:
         controls[form.NEEDS] = form.WORDS
@@ -91,7 +92,7 @@ def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
-    """Let simulations see the face of their own frame; None while older bakes exist."""
+    """Find bakes in which simulations see the face one frame late; None while such bakes exist."""
     if caches.note_old(rig):
         return None
     if caches.have_nodes(rig):
@@ -108,7 +109,7 @@ def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_4(rig: ArmatureObject, _controls: ArmatureObject) -> list[str]:
-    """Let materials read animated maps from a mesh, because Direct mode does not pose bones."""
+    """Let materials read animated maps from a mesh, because Direct mode updates no armature."""
     if not rig.override_library:
         if armatures.joints_are_shown(rig):
             rig[parts.JOINTS_SHOWN] = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Repairs renamed and deleted parts of a character, or describes the ones that cannot be repaired.
+"""Repairs renamed and deleted parts of a character, or describes parts that cannot be repaired.
 
 Objects, meshes, materials, collections, actions and joints' bones may have any name. Actions, pose
 assets and scripts depend on the names of control bones and sliders, so these are restored.
@@ -51,7 +51,7 @@ def heal_all() -> list[ArmatureObject]:
 
 
 def _bone_names(controls: ArmatureObject) -> list[str]:
-    """Restore the names of renamed control bones; Blender updates the paths of their curves."""
+    """Restore the names of renamed control bones; Blender updates the paths of their F-curves."""
     bones = controls.data.bones
     if controls.data.library is not None or controls.mode == "EDIT":
         return []
@@ -151,7 +151,7 @@ def outside(rig: ArmatureObject) -> list[bpy.types.Object]:
 
 
 def bring_back(item: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Restore deleted parts into the collection of the remaining ones.
+    """Restore deleted parts of a character into the collection of its remaining parts.
 
     Args:
         item: an object of the character.
@@ -193,6 +193,7 @@ def _is_dead(rig: ArmatureObject) -> bool:
     used = bpy.data.user_map(subset=held)
     owners = {u.as_pointer(): u for users in used.values() for u in users}
     strangers = [u for p, u in owners.items() if p not in ours]
-    # Scenes do not count, because parts in collections were excluded above.
+    # Users of these types do not keep a character alive. Scenes are among them, because characters
+    # with a part in a collection of a scene were excluded above.
     lesser = (bpy.types.Material, bpy.types.Key, bpy.types.Scene)
     return all(isinstance(u, lesser) for u in strangers)

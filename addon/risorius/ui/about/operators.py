@@ -15,7 +15,7 @@ from ..common import FaceOperator, face_rig, usable
 
 
 def describe(rig: ArmatureObject) -> list[str]:
-    """The contents of a face as text: counts, a line for each mesh, and shapes without effect.
+    """The contents of a face as text: counts, a line for each mesh, and shapes that move nothing.
 
     Args:
         rig: deforming armature of the face.

@@ -229,7 +229,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _read(
         self, context: Context, live: runtime.Runtime
     ) -> tuple["native.Clip", list[str], str]:
-        """Read the file as a clip of raw controls; also report lines and the mapping's name."""
+        """Read the file. Returns: clip of raw controls, lines for the report, mapping's name."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
@@ -253,7 +253,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         return clip, lines_of(report), report.mapping
 
     def _keep_unknown(self, controls: ArmatureObject, mapping: str, names: Sequence[str]) -> None:
-        """Store the curves that the mapping does not know, so that the user can map them."""
+        """Store the names of curves that the mapping lacks, so that the user can map them."""
         settings = {key: getattr(self, key) for key in self.properties.keys()}  # noqa: SIM118
         plain = {k: v for k, v in settings.items() if isinstance(v, (str, int, float))}
         found = unknown_curves.Unknown(mapping, {**plain, "filepath": self.filepath}, list(names))
@@ -270,8 +270,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     ) -> "native.Clip":
         """Stretch the clip by the chosen capture range, and add a line about it to the notes.
 
-        A table of raw controls is never stretched by the face's range, because it may have been
-        stretched before.
+        The face's stored range is never applied to a table of raw controls, because such a table
+        may have been stretched before.
         """
         module, ranges = native.part("ranges"), None
         is_raw = mapping == "controls"
@@ -442,7 +442,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
 
 
 def draw_import(self: Menu, _context: Context) -> None:
-    """Entry of File > Import."""
+    """Draw the entry for animation in the menu File > Import."""
     self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
 
 

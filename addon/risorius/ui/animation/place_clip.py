@@ -123,7 +123,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Set controls to rest that the animation leaves unchanged, or report their number."""
+        """Set all controls that the animation leaves unchanged to rest, or report their number."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:
@@ -135,7 +135,7 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of the layer that the clip becomes. Args: context  has the frame rate."""
+        """Settings of the layer that plays the clip. Args: context  has the frame rate."""
         return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:

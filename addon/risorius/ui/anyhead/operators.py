@@ -151,7 +151,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         return making.rig_task(head, self._template(context), transfer, wishes)
 
     def _template(self, context: Context) -> making.Template:
-        """The face with the expressions.
+        """The face whose expressions the new rig gets.
 
         Raises:
             FaceError: there is no such face.
@@ -243,7 +243,7 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
 
 def _source(rig: ArmatureObject) -> str:
-    """The path of the file that a face was imported from, which may not exist; "" if unknown."""
+    """The path from which a face was imported; the file may be gone; "" if unknown."""
     return bpy.path.abspath(saved.text(rig, parts.SOURCE))
 
 

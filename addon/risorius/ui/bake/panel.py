@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Bake and Export, and warnings about late faces in the panel Face."""
+"""The panel Bake and Export, and the panel Face's warnings about faces that follow a frame late."""
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
@@ -33,7 +33,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
-    """Draw warnings about a face that is evaluated a frame late or that something hinders.
+    """Draw warnings about a face that is evaluated a frame late or does not follow its controls.
 
     Args:
         layout: layout of the panel.

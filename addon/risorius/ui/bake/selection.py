@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The faces and frames for a bake or an export."""
+"""Chooses the faces, frames and level of detail of a bake or an export."""
 
 import bpy
 
@@ -22,11 +22,11 @@ RANGES = (
 
 
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
-    """The characters of the selected objects, or the active character if none is selected.
+    """The deforming armatures of all selected faces, or of the active face if none is selected.
 
     Args:
         context: context with the scene and the selection.
-        every: True: all characters of the scene.
+        every: True: the armatures of all faces of the scene.
     """
     items = context.scene.objects if every else context.selected_objects
     rigs = [parts.rig_of(item) for item in items]
@@ -47,7 +47,7 @@ class FacesOperator(FaceOperator):
     )
 
     def faces(self, context: Context) -> list[ArmatureObject]:
-        """The characters that the operator works on.
+        """The deforming armatures of the faces that the operator changes or exports.
 
         Raises:
             BakeError: no face is selected.

@@ -80,7 +80,7 @@ class _OwnArmature(_Leading):
 
 
 class _OnBoard(HandOperator):
-    """Base of operators that need a face that its board moves."""
+    """Base of operators for a face whose sliders follow the face board."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -142,7 +142,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
-        """Replace the existing board by the other kind, and convert pose and keys."""
+        """Replace the existing board by a board of another kind, and convert pose and keyframes."""
         done = board_keys.exchange(context, rig, kind)
         lost = board_keys.lost(done.loss)
         if lost is not None:
@@ -166,7 +166,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
 
 def _take_up(context: Context, rig: ArmatureObject) -> None:
-    """Enter pose mode and show the new board beside the head, if the controls are visible."""
+    """Enter pose mode and show the new board beside the head.
+
+    Nothing happens if the control armature is hidden or not selectable.
+    """
     controls = parts.controls_there(rig)
     if not controls.visible_get() or controls.hide_select:
         return

@@ -30,7 +30,7 @@ def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime)
 
 
 def draw_kinds(layout: UILayout, kind: str | None) -> None:
-    """Buttons that add a board or replace it by the other kind.
+    """Draw buttons that add a board, or replace the existing board by a board of another kind.
 
     Args:
         layout: layout of the panel or menu.

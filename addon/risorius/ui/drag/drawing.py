@@ -61,7 +61,7 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Start drawing for an operator. Args: user  name of the operator, also for `end`."""
+    """Start drawing for an operator. Args: user  name of the operator; `end` gets the same."""
     _users.add(user)
     if not _handles:
         view = bpy.types.SpaceView3D
@@ -104,7 +104,7 @@ def is_drawing() -> bool:
 
 
 def colours_of(far: Float) -> Float32:
-    """The colours of vertices, float32[V, 4]; the one that moves farthest is the most opaque.
+    """The colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
 
     Args: far  float64[V], distance that each vertex moves.
     """
@@ -172,13 +172,18 @@ def _draw_marks() -> None:
     if first is None:
         return
     if shown.lines:
-        _write(shown.lines, first, context.preferences.system.ui_scale)
+        write(shown.lines, first, context.preferences.system.ui_scale)
 
 
-def _write(lines: list[str], at: Vector, scale: float) -> None:
+def write(lines: list[str], at: Vector, scale: float) -> None:
     """Draw lines of text beside a place.
 
     The background is dark, so that outlines of bones do not disturb the text.
+
+    Args:
+        lines: one or more lines.
+        at: the place, in pixels of the region.
+        scale: scale of the interface.
     """
     blf.size(0, round(12 * scale))
     wide = max(blf.dimensions(0, text)[0] for text in lines)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators of points on the skin: pins, and handles that are selected, hidden and keyed."""
+"""Operators that pin points of the skin, and that select, hide and key handles on it."""
 
 import bpy
 
@@ -17,7 +17,10 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """Base of operators on one point, which is the vertex of the properties or under the cursor."""
+    """Base of operators on one point of a face.
+
+    A click uses the point under the cursor; scripts set the properties `mesh` and `vertex`.
+    """
 
     mesh: bpy.props.IntProperty(
         name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
@@ -51,7 +54,8 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same click selects a handle, and Blender may reverse the order of our key bindings.
+        # The same kind of click selects a handle. If Blender tries this operator first, a handle is
+        # refused here, so that the select operator gets the click.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:

@@ -174,7 +174,7 @@ class RISORIUS_OT_drag(Operator):
         return {"FINISHED"}
 
     def _click(self, context: Context) -> None:
-        """Select the handle at a press without motion, or else the object under the cursor."""
+        """After a press without motion, select the pressed handle, or a bone under the cursor."""
         point = {"mesh": self.mesh, "vertex": self.vertex if self._is_handle else -1}
         if self._is_handle or _selected(context, self._held.rig):
             bpy.ops.risorius.select_handle("EXEC_DEFAULT", True, **point)  # pyright: ignore  ours
@@ -223,7 +223,7 @@ class RISORIUS_OT_drag(Operator):
 
 
 def can_drag(cls: type[Operator]) -> bool:
-    """Poll: whether the file has a face; otherwise set the reason. Args: cls  the operator."""
+    """Poll: whether the file has a face; if not, set the poll message. Args: cls  operator."""
     if not usable(cls):
         return False
     if not parts.rigs():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The drag tool of the 3D view's toolbar: while it is active, a press on the skin starts a drag.
 
-All other keys of Blender stay the same. While the tool is active, handles and pins of the active
-face are drawn, and the point under the cursor.
+All other shortcuts of Blender stay the same. While the tool is active, it draws the handles and
+pins of the active face, and the point under the cursor.
 """
 
 from typing import cast
@@ -42,7 +42,7 @@ _KEYS = (
     ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
 )
 
-# "workspace and mode" -> the tool that was active before this one.
+# "<workspace> <mode>" -> name of the tool that was active before the drag tool.
 _before: dict[str, str] = session.table("tool.before", ("unregister",))
 # Session uid of a face, and its (mesh, vertex) under the cursor; at most one entry.
 _pointed: list[tuple[int, tuple[int, int]]] = session.keep("tool.pointed", list, ("load",))

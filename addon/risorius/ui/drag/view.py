@@ -58,7 +58,7 @@ def under(context: Context, event: bpy.types.Event) -> View | None:
         if area.type != "VIEW_3D":
             continue
         held = [r for r in area.regions if _is_in(r, event)]
-        # Sidebars overlap the view.
+        # Sidebars overlap the view, so a cursor over a sidebar is in two regions.
         if held and all(r.type == "WINDOW" for r in held):
             data = held[0].data
             if isinstance(data, bpy.types.RegionView3D):

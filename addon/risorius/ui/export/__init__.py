@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export of animation with Blender's exporters, as a clip or as a table, and of faces."""
+"""Exports animation with Blender's exporters, as a clip or as a table; exports faces."""
 
 from . import game_face, operators, web
 

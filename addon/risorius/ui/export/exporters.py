@@ -35,7 +35,7 @@ Settings = dict[str, object]  # settings of one of Blender's exporters
 
 
 class ExportOperator(Protocol):
-    """The properties of the export operator that the settings depend on."""
+    """The properties of our export operator that decide the settings of Blender's exporter."""
 
     format: str
     step: float
@@ -117,12 +117,13 @@ def _alembic(_operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     }
 
 
-# Functions that return the exporter's settings for a format; unknown settings are left out.
+# Functions that return the exporter's settings for a format. Settings that the exporter of this
+# Blender lacks are left out.
 _SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
 
 
 def whole_step(operator: ExportOperator) -> int:
-    """The step in whole frames, at least 1, because exporters accept no fractions."""
+    """The step between exported frames, a whole number, because exporters accept no fractions."""
     return max(1, round(operator.step))
 
 
@@ -160,7 +161,7 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
         except RuntimeError as error:  # an error message of Blender's exporter
-            said = str(error).replace(f"{path.parent}{os.sep}", "")  # a temporary folder
+            said = str(error).replace(f"{path.parent}{os.sep}", "")  # the folder is temporary
             raise FaceError(said.strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
         raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The form for the licence of a VRM; all of its fields are unset at first."""
+"""The form for the licence in a VRM file; at first all fields of the form are unset."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Exports the animation of faces with Blender's exporters, or of their controls."""
+"""Exports moving faces with Blender's exporters, or the curves of their controls as a file."""
 
 from collections.abc import Generator
 from pathlib import Path

@@ -137,9 +137,9 @@ def _put(
     shared: bool,
     over: Path | None = None,
 ) -> None:
-    """Make a pose asset of the expression in this file, with a picture.
+    """Make a pose asset of the expression in the open .blend file, with a picture.
 
-    If `shared`, the library stores it too, in a new file or in place of the file `over`.
+    If `shared`, the library stores the expression too, in a new file or instead of the file `over`.
     """
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
@@ -211,7 +211,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
 
 
 class _OfOne(_LibraryOperator):
-    """Base of operators on the named expression, or on the last clicked one without a name."""
+    """Base of operators on the named expression; without a name, on the last clicked one."""
 
     expression: bpy.props.StringProperty(name="Expression", options={"SKIP_SAVE"})
 

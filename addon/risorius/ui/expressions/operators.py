@@ -132,7 +132,8 @@ class Blends(Mixes):
             self.cancel(context)
             return {"CANCELLED"}
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
-            # Accepted by a press after a click, or by the release after a drag.
+            # Accept the blend: if it began with a click, at the next press of the button; if it
+            # began with a drag, at the release of the button.
             context.workspace.status_text_set(None)
             return self.execute(context)
         if event.type == "MOUSEMOVE":
@@ -177,7 +178,8 @@ class Blends(Mixes):
         return super().execute(context)
 
 
-# Blender loses a registered class if another registered class derives from it, so both have bases.
+# Blender loses a registered class if another registered class derives from it. So the shared code
+# of these operators is in the classes Applies and Blends, which are not registered.
 class RISORIUS_OT_expression(Applies, Operator):
     """Move the sliders to an expression. Ctrl: swap left and right, Shift: add to the pose"""
 

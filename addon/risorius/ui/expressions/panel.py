@@ -17,7 +17,7 @@ from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
 _ICON = 20.0  # pixels of an icon, and of a picture per unit of its size
-# Characters, by their look, whose pictures were started automatically in this session.
+# Looks of characters for which this session has started to draw pictures automatically.
 _asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 
@@ -160,7 +160,7 @@ def _ask_once(look: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; a timer calls this, because panels must not."""
+    """Start the operator that draws pictures; a timer calls this, as panels must not start it."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.render_thumbnails.poll():

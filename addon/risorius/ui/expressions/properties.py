@@ -13,12 +13,12 @@ from ..blender_types import Context, Item
 from ..words import say
 
 ALL, STARRED = "ALL", "STARRED"
-# Strings of dynamic enum items; Blender keeps no references to them.
+# Strings of dynamic enum items, kept alive here because Blender keeps no references to them.
 _known: dict[str, list[Item]] = session.table("expressions.properties.known", ("unregister",))
 
 
 def region_items(_self: object, _context: object) -> list[tuple[str, str, str, int]]:
-    """The regions of a face as items of an enum with several choices.
+    """The regions of a face as items of an enum property from which the user may choose several.
 
     Args:
         _self, _context: passed by Blender, not used.
@@ -103,7 +103,7 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_expressions:
-    """The settings of the window manager.
+    """The settings of the grid of expressions.
 
     Args:
         context: context of Blender.

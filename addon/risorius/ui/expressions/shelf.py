@@ -17,7 +17,7 @@ from ..blender_types import Context, Operator, OperatorBase
 from ..common import active_controls
 from .operators import Applies, Blends
 
-_LIBRARIES = (  # Blender passes these numbers
+_LIBRARIES = (  # with Blender's numbers for the kinds of asset libraries
     ("LOCAL", "This File", "", 1),
     ("ALL", "All", "", 2),
     ("ESSENTIALS", "Essentials", "", 3),

@@ -53,7 +53,7 @@ def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> li
 
 
 def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """Modes that change the target of edits and keys."""
+    """Modes that change the effect of edits and keyframes: capture, bake, tweak and board."""
     session = sessions.of(controls)
     if session is not None and session.recording is not None:
         yield Mode(words.say("Recording"), "REC", "risorius.live_record", alert=True)

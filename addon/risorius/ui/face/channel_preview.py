@@ -20,7 +20,7 @@ _items: list[Item] = session.keep("channel_preview.items", list, ("unregister",)
 
 
 def _test(context: Context, rig: ArmatureObject, channel: int, value: float | None) -> None:
-    """Set the channel's override of a face, or end it if `value` is None, and update the face."""
+    """Show a channel of a face with a test weight, or end the test if `value` is None."""
     if value is None:
         channel_preview.clear(rig)
     else:
@@ -106,7 +106,7 @@ def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
 
 
 def weight_property() -> object:
-    """The slider that shows and sets the override of the active face; it stores nothing."""
+    """The slider that shows and sets the test weight of the active face; it stores nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
         translation_context=CONTEXT,

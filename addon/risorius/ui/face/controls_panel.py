@@ -142,10 +142,11 @@ def draw_sliders(
     followers: Mapping[str, str],
     given: Mapping[str, float],
 ) -> None:
-    """Draw one line for each control; left and right share a line, and a long name is above it.
+    """Draw one line for each control; left and right share a line.
 
-    Of two linked sides only the leading slider is drawn. Values from the face board are drawn as
-    read-only bars, because their sliders have no effect.
+    A name that is too long for the line is drawn above it. Of two linked sides only the leading
+    slider is drawn. Values from the face board are drawn as read-only bars, because their sliders
+    have no effect.
 
     Args:
         context: context of the panel.
@@ -162,7 +163,10 @@ def draw_sliders(
 
 
 def _draw_parted(layout: UILayout, part: _Part, rests: Mapping[str, float]) -> None:
-    """Draw the most used sliders; the others are under More, with the number of moved ones."""
+    """Draw the most used sliders, and the heading More with the others.
+
+    The heading shows how many of its sliders are not at rest.
+    """
     first, more = part.lines()
     _draw_lines(layout, part, first)
     if not more:
@@ -206,7 +210,7 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 def _draw_sides(column: UILayout, linked: bool) -> None:
     """Draw headings of the columns Left and Right.
 
-    A slider is too narrow for a letter before its number.
+    They replace the letters L and R, for which a slider has no room before its number.
     """
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")

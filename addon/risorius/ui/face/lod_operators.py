@@ -83,7 +83,7 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
 
 
 def _size(rig: ArmatureObject) -> float:
-    """The longest side of the bounding boxes of the single meshes, in Blender units."""
+    """The longest side of all bounding boxes, one for each mesh, in Blender units."""
     return max((max(m.dimensions[:]) for m in parts.meshes_of(rig)), default=0.25)
 
 

@@ -111,7 +111,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
         ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
         ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
-        # A line of its own, because eight levels leave no room for a label.
+        # The label has a separate line, because eight buttons leave no room for it.
         column.label(text=text, text_ctxt=words.CONTEXT)
         row = column.row(align=True)
         row.active = not auto

@@ -27,7 +27,7 @@ from ..words import say
 _MARK = 0.3215  # a marker value that no user sets
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
-# last: Blender's last operator that was checked; selected: its setting Selected Only.
+# "last" -> Blender's last operator that was checked; "selected" -> its setting Selected Only.
 _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
@@ -65,7 +65,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if led:
             board.mark(rig, _MARK)
         tools = context.scene.tool_settings
-        # Blender would key the sliders when it pastes them, before they are swapped.
+        # Blender would insert keyframes when it pastes the sliders, before they are swapped.
         auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
         try:
             bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
@@ -99,7 +99,7 @@ def _draw(self: Menu, context: Context) -> None:
 
 
 def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
-    """Whether Blender's operator has just pasted a pose flipped; True only once per call."""
+    """Whether Blender's operator has just pasted a pose flipped; True only once for each paste."""
     last = manager.operators[-1] if len(manager.operators) else None
     kind = last.bl_idname if last is not None else ""
     state = (last.as_pointer() if last is not None else 0, kind)
@@ -147,7 +147,7 @@ def _once_more() -> None:
 
 
 def register() -> None:
-    """Add the menu entries, the keys, and the handler that notices Blender's operator."""
+    """Add the menu entries, the shortcuts, and the handler that notices Blender's operator."""
     bpy.types.VIEW3D_MT_pose.append(_draw)
     bpy.app.handlers.depsgraph_update_post.append(_updated)
     config = current_context().window_manager.keyconfigs.addon
@@ -166,7 +166,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the menu entries, the keys and the handlers."""
+    """Remove the menu entries, the shortcuts and the handlers."""
     for keymap, item in _keys:
         keymap.keymap_items.remove(item)
     _keys.clear()

@@ -19,12 +19,13 @@ from ..blender_types import Context
 _FRONT = Vector((0.0, -1.0, 0.0))  # direction in which an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer
 _ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # types of regions that overlap a view
-_SIDE = 0.77  # cosine of 40 degrees: views from farther aside are turned
+_SIDE = 0.77  # cosine of 40 degrees: views farther off the front are rotated
 
 
 def frame(context: Context, rig: ArmatureObject) -> None:
-    """Frame a face in the 3D views of the user's window, and turn views from the side to the front.
+    """Frame a face in the 3D views of the user's window.
 
+    A perspective view that is more than 40 degrees off the front rotates to a view from the front.
     Views through a camera do not change, nor views that already show the face well. A solid view
     with Blender's default material colours switches to texture colours, which show iris, lips and
     brows. Undo does not restore views.
@@ -83,9 +84,9 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
 def show_with_board(context: Context, rig: ArmatureObject) -> None:
     """Frame the head and its face board side by side in a 3D view, from the front.
 
-    The view is the one of the context, which leaves its camera, or else the largest one without a
-    camera. Head and board are not covered by sidebar, toolbar and headers. A view locked to an
-    object or the 3D cursor does not change.
+    If the context has a 3D view, this view is framed, and a camera view becomes a free view.
+    Otherwise the window's largest view that shows no camera is framed. Sidebar, toolbar and headers
+    do not cover head and board. A view locked to an object or the 3D cursor does not change.
 
     Args:
         context: context of Blender; without a window nothing happens.
@@ -113,7 +114,7 @@ def show_with_board(context: Context, rig: ArmatureObject) -> None:
 
 
 def _largest_or_own(context: Context) -> bpy.types.Area | None:
-    """The 3D view of the context, or the largest one of the window without a camera."""
+    """The 3D view of the context, or the window's largest 3D view that shows no camera."""
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
     if context.area in areas:
@@ -124,9 +125,10 @@ def _largest_or_own(context: Context) -> bpy.types.Area | None:
 
 
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
-    """The part of a region that no other region of its area covers, in pixels from its corner.
+    """The rectangle of a region that no other region of its area covers.
 
-    Sidebar, toolbar and headers cover a part if the preferences let regions overlap.
+    Sidebar, toolbar and headers cover a part if the preferences let regions overlap. The rectangle
+    is in pixels from the lower left corner of `region`.
     """
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:
@@ -177,7 +179,7 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
         if view_fit.is_well_in_view(middle, radius, far, held, view.view_distance):
             continue
         view.view_location, view.view_distance = middle, far
-        # Views along an axis (front, side, top) are chosen with a key and keep their direction.
+        # An orthographic view, such as Front or Right, keeps the direction that the user chose.
         seen_from = view.view_rotation @ Vector((0.0, 0.0, 1.0))
         if perspective and seen_from.dot(turn @ _FRONT) < _SIDE:
             view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")

@@ -91,7 +91,7 @@ def register() -> None:
     """Bind the key of Frame Selected to our operator, which acts if only outlines are selected."""
     config = current_context().window_manager.keyconfigs.addon
     if config is None:
-        return  # in background mode
+        return  # in background mode there is no key configuration
     keymap = config.keymaps.new("3D View", space_type="VIEW_3D")
     item = keymap.keymap_items.new(RISORIUS_OT_frame_face.bl_idname, "NUMPAD_PERIOD", "PRESS")
     item.properties.instead = True  # pyright: ignore  each operator has its own
@@ -99,7 +99,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the key."""
+    """Remove the shortcut."""
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

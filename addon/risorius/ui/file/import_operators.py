@@ -87,7 +87,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
 
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
-    # Several files, chosen in the file browser or dropped together.
+    # Folder and names of several files that were chosen in the file browser or dropped together.
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
     files: bpy.props.CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
@@ -299,7 +299,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
 
 
 def draw_import(self: Menu, _context: Context) -> None:
-    """Add an entry to File > Import."""
+    """Add the entry for DNA files to the menu File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
 
 
@@ -335,7 +335,7 @@ class RISORIUS_MT_sample_studio(Menu):
 
 
 def draw_add(self: Menu, _context: Context) -> None:
-    """Add an entry to the 3D view's Add menu."""
+    """Add the submenu of sample faces to the 3D view's Add menu."""
     self.layout.menu(RISORIUS_MT_sample.bl_idname, icon="USER")
 
 

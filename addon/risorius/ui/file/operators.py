@@ -65,7 +65,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
 
 
 class _FileOperator(FaceOperator):
-    """Base of operators on a face that may lack its controls or DNA, which a file restores."""
+    """Base of operators on a face that may lack controls or DNA; the operator restores both."""
 
     whole_face = False
 
@@ -175,9 +175,9 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
 
 def draw_export(self: Menu, _context: Context) -> None:
-    """Add entries to File > Export."""
+    """Add the entries for faces to the menu File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Placed near Blender's own entries, which write live faces at rest.
+    # Users also find Blender's own exporters in this menu, but these write live faces at rest.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

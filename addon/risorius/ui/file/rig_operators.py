@@ -241,7 +241,7 @@ def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object])
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:
-    """Add an entry to the menu of the shape key list and to the menu Object."""
+    """Draw Make Rig from Shape Keys in the menu of the shape key list or in the menu Object."""
     self.layout.separator()
     self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The base class of operators that change controls by hand and insert keys."""
+"""The base class of operators that change controls by hand and insert keyframes."""
 
 from collections.abc import Collection
 
@@ -23,7 +23,7 @@ MOMENTS = (
 class HandOperator(FaceOperator):
     """Base of all operators that move sliders or control bones.
 
-    Subclasses define `move`; the base class inserts keys.
+    Subclasses define `move`; the base class inserts keyframes.
     """
 
     at: bpy.props.EnumProperty(
@@ -39,7 +39,7 @@ class HandOperator(FaceOperator):
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Prepare for a frame; called before each `move`."""
+        """Let a subclass prepare for a frame, before `move` is called for this frame."""
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

@@ -25,7 +25,10 @@ TARGETS = (
 
 
 def proposed(context: Context) -> str:
-    """The name of the most likely target of the eyes: the active object, or the camera, or "".
+    """The name of the most likely target of the eyes; "" if there is none.
+
+    It is the active or another selected object that is no part of a face; empties are preferred. If
+    there is no such object, it is the scene's camera.
 
     Args:
         context: context with the selection and the scene.

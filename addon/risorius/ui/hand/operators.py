@@ -209,8 +209,8 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
 def proposed_range(context: Context) -> tuple[int, int]:
     """First and last frame for a tweak.
 
-    They are those of the selected keys, or of the preview range, or the frames around the current
-    one. If all keys are selected, the selection is ignored, because an import selects its keys.
+    The range of the selected keyframes, or the preview range, or else frames around the current
+    one. If all keyframes are selected, the selection is ignored, because an import selects them.
 
     Args:
         context: context with the face and the scene.

@@ -37,7 +37,7 @@ class _Running(OperatorBase):
 
 
 def _has_controls(cls: type[Operator], context: Context) -> bool:
-    """Poll: whether a face is active; otherwise set the reason."""
+    """Poll: whether a face is active; if not, set the poll message."""
     if active_controls(context) is None:
         cls.poll_message_set(say("Select a face first."))
         return False

@@ -30,7 +30,7 @@ def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
-    """The user's settings, stored with the window."""
+    """The user's settings of live capture, stored with the window manager."""
 
     source: bpy.props.EnumProperty(
         name="Source",
@@ -95,7 +95,7 @@ def choices(context: Context) -> RISORIUS_PG_live:
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The settings in the form that scene/live/sessions.py needs."""
+    """The settings as the class with which scene/live/sessions.py starts a capture."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

@@ -23,7 +23,7 @@ _REASONS = (
 
 
 class RISORIUS_UL_ranges(UIList):
-    """One line per control, with its neutral and extreme."""
+    """One line per control, with its neutral and its extreme value."""
 
     def draw_item(
         self,

@@ -206,7 +206,7 @@ class RISORIUS_MT_face_about(Menu):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
-        # Blender's operators are not in our translation table.
+        # Names of Blender's operators are not in our translation table, so give a translated text.
         text = words.say("Preferences")
         layout.operator(
             "preferences.addon_show", text=text, icon="PREFERENCES", translate=False

@@ -23,7 +23,7 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
     """Sentences about textures that were not mixed, except hair, which is never mixed.
 
     Args:
-        own: name of a texture -> reason.
+        own: name of a texture -> reason why it was not mixed.
     """
 
     def names(why: str) -> str:
@@ -184,7 +184,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         except (OSError, *native.user_errors()) as error:
-            # The name of the missing file, if the file of a parent is missing.
+            # If the file of a mixed face is missing, the error contains its name.
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""The faces to mix and their shares; the preview follows changes."""
+"""Stores the faces to mix and their shares; a change updates the preview."""
 
 from typing import cast
 
@@ -44,7 +44,7 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_mix(bpy.types.PropertyGroup):
-    """The user's settings, stored with the window."""
+    """The user's settings of Mix Faces, stored with the window manager."""
 
     parents: bpy.props.CollectionProperty(type=RISORIUS_PG_mix_parent)
 

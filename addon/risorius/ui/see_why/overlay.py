@@ -99,7 +99,7 @@ def _draw() -> None:
         return
     pen = _Pen(context)
     gpu.state.blend_set("ALPHA")
-    # Start above the redo panel, which is in this corner.
+    # The text starts above the redo panel, which is in the lower left corner.
     x, y = 20.0 * pen.scale + _tools(context), 72.0 * pen.scale
     if shown is not None:
         y = _draw_ramp(pen, words.say(title(context, rig, shown)), shown, x, y)

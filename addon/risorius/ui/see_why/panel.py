@@ -154,7 +154,7 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
 
 
 def _ask_soon() -> None:
-    """Compute the list 0.2 s later, so that a drag of a slider need not wait for it."""
+    """Compute the strongest correctives 0.2 s later, so that a dragged slider need not wait."""
     if not _soon.now:
         _soon.now = True
         bpy.app.timers.register(_ask, first_interval=0.2)

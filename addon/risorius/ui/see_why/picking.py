@@ -157,7 +157,7 @@ def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int
     data = cast("bpy.types.Mesh", seen.data)
     mesh = causes.mesh_of(item)
     if len(data.vertices) != len(cast("MeshObject", item).data.vertices):
-        local = np.array(rig.matrix_world.inverted() @ where)  # subdivided: find the nearest vertex
+        local = np.array(rig.matrix_world.inverted() @ where)  # subdivided mesh: nearest vertex
         return rig, mesh, causes.nearest(rig, mesh, local)
     local = seen.matrix_world.inverted() @ where
     corners = data.polygons[polygon].vertices

@@ -17,7 +17,7 @@ def spoken(context: Context, name: str) -> str:
 
     Args:
         context: context with the preferences.
-        name: name of a control, or names of a corrective's factors.
+        name: name of a control; for a corrective, the names of its controls joined with " x ".
     """
     swapped = as_seen(context)
     return _PRODUCT.join(

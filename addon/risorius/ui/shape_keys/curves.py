@@ -36,7 +36,7 @@ class _OfCurves(FaceOperator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the face has unknown curves; otherwise set the reason."""
+        """Whether the face has unknown curves; if not, set the poll message."""
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:

@@ -52,7 +52,7 @@ class OfHead(OperatorBase):
     def poll(cls, context: Context) -> bool:
         """Whether the active object is a head whose keys can be assigned.
 
-        If not, the reason is set.
+        If not, set the poll message.
         """
         if not usable(cls):
             return False
@@ -88,7 +88,10 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Store the assignment of the key. Args: context  of it, value  None: by its name."""
+        """Store an assignment of the key; the value None removes the user's assignment.
+
+        Args: context  context of Blender; value  the assignment.
+        """
         item = head_of(context)
         name = self.key or shown.active_key(item)
         if name not in assigned.of(item).rows:

@@ -25,7 +25,7 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # height of the large picture, in lines
 _LITTLE = 2.0  # height of a picture in the list, in lines
-# Heads with assignments whose pictures were started automatically.
+# (head, sample) for which the panel has already started to draw missing pictures.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
@@ -59,7 +59,7 @@ class RISORIUS_UL_shape_key_names(UIList):
         both = line.column(align=True)
         words.show(both, item.name)
         below = both.row(align=True)
-        # Blender's list reacts to clicks on its first line only.
+        # Blender's list reacts to clicks on its first line only, so the second line is a button.
         below.alignment = "LEFT"
         is_open = not row.is_known and not row.is_said
         below.active = is_open or row.is_said
@@ -146,7 +146,7 @@ def _draw_count(layout: UILayout, names: assigned.Names) -> None:
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
-    """Draw the active key's picture, the sample of its assignment, and buttons."""
+    """Draw the active shape key's picture, the sample man's picture of its control, and buttons."""
     box = layout.box()
     pair = box.split(factor=0.5)
     _draw_picture(pair.column(align=True), picture, row.key)
@@ -187,7 +187,7 @@ def _ask_once(mesh: int, sample: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; a timer calls this, because panels must not."""
+    """Start the operator that draws pictures; a timer calls this, as panels must not start it."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.shape_key_pictures.poll():

@@ -35,7 +35,7 @@ def tooltip_of_choice(choice: assigned.Choice) -> str:
 
 
 def becomes(row: assigned.Row) -> str:
-    """The assignment of a key in a few words. Args: row  from assigned.of."""
+    """The assignment of a shape key in a few words. Args: row  from assigned.of."""
     if row.kind == assigned.EXPRESSION:
         own = _expressions().get(row.expression)
         label = words.say(own.label) if own is not None else row.expression
@@ -70,7 +70,7 @@ def who_knows(row: assigned.Row) -> str:
 
 
 def words_of_controls(controls: tuple[str, ...]) -> str:
-    """A short text for controls: one title, the equivalent ARKit shape, or the first and a number.
+    """A short text for controls: title, equivalent ARKit shape, or first title and "and 3 more".
 
     Args:
         controls: names of controls without their prefix.
@@ -93,17 +93,19 @@ def words_of_value(value: str) -> str:
 
 
 def value_of(row: assigned.Row) -> assigned.Said:
-    """The assignment of a key as a file of names stores it. Args: row  from assigned.of."""
+    """A shape key's assignment in the form of a file of names. Args: row  from assigned.of."""
     if row.expression:
         return f"@{row.expression}"
     return row.controls[0] if len(row.controls) == 1 else list(row.controls)
 
 
 def sample_of(row: assigned.Row) -> str:
-    """The value of the assigned.Choice whose picture the sample man shows for a key; "" for none.
+    """The value of the assigned.Choice that a shape key is assigned to; "" for none.
+
+    The panel shows the picture of the sample man for this value.
 
     Args:
-        row: row of the key, from assigned.of.
+        row: row of the shape key, from assigned.of.
     """
     if row.kind == assigned.EXPRESSION:
         return f"@{row.expression}" if row.expression in _expressions() else ""

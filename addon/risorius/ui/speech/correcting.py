@@ -38,7 +38,7 @@ def are_moved(context: Context, action: bpy.types.Action) -> bool:
 
 
 class _Corrects(FaceOperator):
-    """Base of all corrections, which update keys and markers and report errors as sentences."""
+    """Base of all corrections; each updates keyframes and markers, and reports errors."""
 
     reads_markers = False  # True: usable while changed markers are not applied
 

@@ -123,8 +123,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             accents=self.use_accents,
             correctable=True,
             library=self._own or None,
-            # Animated at the scene's frame rate, not resampled, so that lips meet exactly on a
-            # frame.
+            # The voice is animated at the scene's frame rate and not resampled, so that lips meet
+            # exactly on a frame.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = rig.session_uid

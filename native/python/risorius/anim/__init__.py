@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Animation over time: clips and their files, mixed layers, reactions, idle life."""
+"""Animates controls over time: clips and their files, mixed layers, reactions, idle movement."""

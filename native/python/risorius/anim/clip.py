@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips: named control curves over time, and their .rzc files, read completely or in parts.
+"""Defines clips (curves of named controls), and reads .rzc clip files completely or in parts.
 
 A clip plays on every character whose rig has these controls.
 """
@@ -19,8 +19,8 @@ from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames that are resampled at a time
-# Largest result of one read, plus BYTES_PER_BYTE times the file's size: 75 minutes of 1,000
-# controls at 60 frames per second.
+# Memory that the clip from one read may take, in bytes, in addition to BYTES_PER_BYTE times the
+# file's size. It suffices for 75 minutes of 1,000 controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -28,7 +28,7 @@ Times = npt.NDArray[np.float64]
 
 
 class Event(NamedTuple):
-    """An event at a time of a clip: a word, a note, a reaction to fire."""
+    """A named event at a time of a clip, such as a spoken word, a note or a reaction to start."""
 
     time: float
     """Seconds, on the clip's own clock."""
@@ -169,7 +169,8 @@ class Clip:
             place = np.interp(wanted, self.times, np.arange(count, dtype=np.float64))
         else:
             place = np.clip((wanted - self.start) * self.rate, 0.0, count - 1.0)
-            # The division rounds, but the time of a frame must give that frame.
+            # The times of frames are rounded. A position within 1e-9 of a frame becomes that frame,
+            # so that the time of a frame gives its exact values.
             near = np.rint(place)
             place = np.where(np.abs(place - near) < 1e-9 * np.maximum(near, 1.0), near, place)
         place = np.nan_to_num(place, nan=0.0)  # NaN counts as the time of the first frame
@@ -183,18 +184,18 @@ class Clip:
         """The clip with evenly spaced frames at `rate` per second, from its first to its last time.
 
         Raises:
-            BudgetError: long gaps between frames would give more frames than a clip of this size
-                may need.
+            BudgetError: long gaps between frames would give more frames than the memory budget for
+                a clip of this size allows.
         """
         count = self._even_count(rate, 1e-6)
         times = self.start + np.arange(count) / rate
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with evenly spaced frames at its own rate, from its first time on.
+        """The clip with evenly spaced frames at its `rate`, from the time of its first frame on.
 
         Raises:
-            BudgetError: see resampled.
+            BudgetError: too many frames, see resampled().
         """
         count = self._even_count(self.rate, 0.5)
         start = float(self.frame_times()[0]) if self.frame_count else self.start
@@ -202,7 +203,8 @@ class Clip:
         return self.replaced(curves=curves, start=start, times=None)
 
     def _even_count(self, rate: float, rounding: float) -> int:
-        """The number of frames at `rate` from the first to the last time. Raises: BudgetError."""
+        """The number of frames at `rate` from the first to the last time, rounded down after adding
+        `rounding`. Raises BudgetError if they need too much memory."""
         frames = self.duration * rate
         budget = Budget.of(self.curves.nbytes + 8 * self.frame_count)
         each = 4 * len(self.names) + 8  # float32 of each control, and a time
@@ -231,7 +233,8 @@ class Clip:
         return out
 
     def selected(self, names: Sequence[str]) -> Clip:
-        """The clip with only the named controls, in the order of `names`. Raises: KeyError."""
+        """The clip with only the named controls, in this order. Raises KeyError for an unknown
+        name."""
         rows = [self._index[name] for name in names]
         return self.replaced(names=names, curves=self.curves[rows])
 
@@ -319,18 +322,18 @@ class Clip:
 class ClipReader:
     """Reads a .rzc file in parts.
 
-    Frames are decoded in blocks, and the last block stays in memory compressed. For playback, read
-    a few hundred frames at a time.
+    The file stores frames in compressed blocks. The most recently read block stays in memory in
+    its compressed form. For playback, read a few hundred frames at a time.
 
     Attributes:
         names: names of the controls.
-        rate, start: as in a Clip.
+        rate, start: frames per second, and time of the first frame in seconds.
         has_times: whether each frame has its own time.
         frame_count: number of frames in the file.
         byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
             a recovery.
-        block_starts: first frame of each block, and the number of frames.
-        events, metadata: as in a Clip.
+        block_starts: index of the first frame of each block, and at the end the frame count.
+        events, metadata: events of the clip and facts about it, see Clip.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:
@@ -369,7 +372,7 @@ class ClipReader:
     def read(
         self, frames: tuple[int, int] | None = None, controls: Sequence[str] | None = None
     ) -> Clip:
-        """Read frames begin to end - 1 of the named controls, or of all.
+        """Read the named controls (None: all) in `frames` (begin, exclusive end; None: all).
 
         Returns:
             A clip that starts at the time of its first frame. It has the events within its time

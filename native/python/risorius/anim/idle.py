@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Idle movement from a random seed: blinks, saccades with lids that follow, and subtle motion.
+"""Makes idle movement from a random seed: blinks, saccades with lids, and subtle motion.
 
 Randomness comes from the raw bits of PCG64, which NumPy keeps stable; all other arithmetic is sums,
 products and quotients. So every machine makes the same blinks at the same times.
@@ -22,7 +22,8 @@ Doubles = npt.NDArray[np.float64]
 
 PREFIX = "CTRL_expressions."
 LOOKS = ("Left", "Right", "Up", "Down")
-# Subtle motion: control without side -> highest value, and seconds between random values.
+# Subtle motion: control name without L or R -> highest value, and seconds from one random value
+# to the next.
 MICRO = {
     "browRaiseIn": (0.07, 1.7),
     "browRaiseOuter": (0.05, 2.3),
@@ -55,14 +56,14 @@ class Life:
     """Parameters of idle life.
 
     Attributes:
-        blinks_per_minute: blinks without double blinks and blinks of large saccades, which add
-            about 2 per minute. People blink 17 times at rest, 26 when talking, 4.5 when reading
-            (Bentivoglio et al. 1997).
-        double_blinks: share of blinks that a second blink follows at once, 0 to 1.
+        blinks_per_minute: mean number of spontaneous blinks. Second blinks of double blinks, and
+            blinks that large saccades trigger, add about 2 per minute. People blink 17 times per
+            minute at rest, 26 when talking, 4.5 when reading (Bentivoglio et al. 1997).
+        double_blinks: fraction of blinks that a second blink follows at once, 0 to 1.
         gaze: factor for the range of the gaze; 0 looks straight ahead.
         look_degrees: degrees that an eye turns if eyeLookLeft/Right and eyeLookUp/Down are 1.
-        lid_follow: share of a full blink by which the upper lid follows a full look down; the
-            character's own look controls add to it.
+        lid_follow: value of eyeBlink that a full look down adds, so that the upper lid follows the
+            eye, 0 to 1. If the rig's eyeLookDown lowers the lid too, both movements add up.
         micro: factor for the subtle motion of brows, lids, nostrils, mouth and jaw.
     """
 
@@ -75,7 +76,8 @@ class Life:
 
 
 class Blink(NamedTuple):
-    """A blink: times in seconds, and `amount`, the closing of the lids from 0 to 1."""
+    """A blink: its start and the durations of its phases in seconds, and `amount`, the closing of
+    the lids from 0 to 1."""
 
     start: float
     close: float
@@ -108,7 +110,7 @@ def idle(
     loop: bool = False,
     life: Life | None = None,
 ) -> Clip:
-    """Make a clip of a face at rest, for a layer below or above others.
+    """Make a clip of a face at rest, for use as one of the layers of a Mixer.
 
     Args:
         seed: 0 or more; the same seed gives the same clip.
@@ -172,7 +174,10 @@ class _Dice:
         return low + (high - low) * ((int(self._bits.random_raw()) >> 11) * 2.0**-53)
 
     def normal(self) -> float:
-        """Approximately normal: the sum of twelve uniform numbers, which needs no logarithm."""
+        """A random number, approximately normal with mean 0 and standard deviation 1.
+
+        It is a sum of twelve uniform numbers, because logarithms differ between machines.
+        """
         total = -6.0
         for _ in range(12):
             total += self.uniform()
@@ -318,7 +323,8 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """The next point to look at, in degrees: often near the middle if the gaze is far from it."""
+    """The next point to look at, in degrees. A gaze far from straight ahead often returns near
+    it."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale
@@ -358,7 +364,7 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Curves of subtle motion; both sides share three quarters of it."""
+    """Curves of subtle motion; three quarters of the motion is equal on the left and right."""
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (
@@ -378,7 +384,7 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1] without a period: two octaves of cubic B-splines."""
+    """Slow noise in [-1, 1], two octaves of cubic B-splines; periodic only if `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mixes layers of clips and poses, reactions and exclusive controls to the controls of a face."""
+"""Computes a face's controls from layers of clips and poses, reactions, and exclusion rules."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Mixer:
                 first.
 
         Raises:
-            ValueError: an invalid layer or reaction; the sentence names its field.
+            ValueError: an invalid layer or reaction; the message names the invalid field.
         """
         self.names = tuple(names)
         low, high = _limits(self.names, ranges)
@@ -184,7 +184,7 @@ class Mixer:
         self.layers = tuple(layers)
 
     def missing(self, place: int) -> list[str]:
-        """The names of a layer's curves without a control in this mixer. Args: place  its index."""
+        """Names of the curves of layer number `place` that match no control of this mixer."""
         known = set(self.names)
         return [name for name in self._layers[place][0].clip().names if name not in known]
 
@@ -213,7 +213,7 @@ class Mixer:
         return self._core.fire(self._reaction_index[name], time, strength)
 
     def fire_events(self, events: Iterable[Event], offset: float = 0.0) -> int:
-        """Fire every event with the name of a reaction; returns their number.
+        """Start a reaction for each event that has the name of a reaction; return how many started.
 
         Args:
             events: events of a clip; an event's value is the strength if it is a number.
@@ -261,7 +261,7 @@ class Mixer:
 
         Args:
             start: time of the first frame in seconds.
-            end: time in seconds; the last frame is at it, or less than one frame before.
+            end: time in seconds; the last frame is at `end`, or less than one frame before `end`.
             rate: frames per second.
         """
         count = max(math.floor((end - start) * rate + 1e-6) + 1, 0)
@@ -269,7 +269,7 @@ class Mixer:
         return Clip(self.names, frames.T, rate, start=start)
 
     def _curves(self, layer: Layer) -> LayerCurves:
-        """The curves that were made for the same source and mask, or new ones."""
+        """A layer's native curves, reused from an existing layer with the same source and mask."""
         for old, curves in self._layers:
             if old.source is layer.source and old.mask is layer.mask:
                 return curves
@@ -349,7 +349,7 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
 
 
 def _strength(text: str) -> float:
-    """The number in [0, 1] in an event's value, otherwise 1."""
+    """The strength in an event's value: a number, clamped to [0, 1]; 1 if it is no number."""
     try:
         value = float(text)
     except ValueError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reactions that a Mixer fires, and rules of controls that exclude each other; read from TOML."""
+"""Reads from TOML the reactions of a Mixer and the rules of controls that exclude each other."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Reaction:
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:
-        """The parts as the native mixer expects them, without controls that the face lacks."""
+        """The parts as the native mixer expects them. Controls that the face lacks are left out."""
         out = []
         for p in self.parts:
             there = {index[name]: weight for name, weight in p.weights.items() if name in index}
@@ -63,7 +63,10 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """A rule: active controls `by` multiply the controls `of` by 1 - amount * measure(by)."""
+    """A rule: active controls `by` weaken each control in `of` by a factor.
+
+    The factor is 1 - amount * measure(by).
+    """
 
     name: str
     by: tuple[str, ...]
@@ -82,7 +85,7 @@ class Exclusives:
     """Pairs; the common amount is subtracted from both."""
 
     def rules_of(self, index: Index) -> tuple[list[_Yield], list[tuple[int, int]]]:
-        """The rules as the native mixer expects them, without controls that the face lacks."""
+        """The rules as the native mixer expects them. Controls that the face lacks are left out."""
 
         def there(names: tuple[str, ...]) -> npt.NDArray[np.uint32]:
             return np.array([index[name] for name in names if name in index], np.uint32)
@@ -96,7 +99,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
-        ValueError: invalid file; the text has the file, the found and the expected value.
+        ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "reactions.toml")
     prefix = table.get("prefix", "")
@@ -108,7 +111,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
-        ValueError: invalid file; the text has the file, the found and the expected value.
+        ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "exclusives.toml")
     prefix = table.get("prefix", "")
@@ -138,7 +141,7 @@ def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any]
 
 @cache
 def _own(file: str) -> dict[str, Any]:
-    """A table of the package; cached, because every new mixer needs it."""
+    """Read a TOML file of this package. The result is cached, because each new mixer needs it."""
     text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
     return toml.parse(text)
 

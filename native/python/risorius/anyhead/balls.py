@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eyeballs among the meshes of a head that stands in no known way: balls that come in pairs."""
+"""Finds the eyeballs of a head of unknown direction and unit: spheres that occur in pairs."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..author.geometry.skeleton import Doubles
 from ..author.heads.islands import Ball, ball_of, islands_of
 from ..author.heads.parts import HeadPart
 
-_LEAST = 12  # vertices of a ball
-_MOST = 400  # islands of a mesh: hair and crowds of buttons have more
-_LARGE = 0.3  # of the longest side of all meshes: no eye is as wide
-_ALIKE = 0.1  # of the radius, by which both eyes of a pair may differ
+_LEAST = 12  # smallest number of vertices of a sphere
+_MOST = 400  # meshes with more islands, such as hair, are skipped
+_LARGE = 0.3  # of the longest side of all meshes: larger islands are no eyes
+_ALIKE = 0.1  # of the radius: largest difference of both radii of a pair
 _APART = (2.0, 9.0)  # radii from one eye of a pair to the other
 
 
 def paired_balls(parts: Sequence[HeadPart]) -> list[Doubles]:
-    """float64[3] each: middles of balls that have a partner of their size beside them.
+    """float64[3] each: centres of spheres near which a second sphere of similar radius lies.
 
     Args:
         parts: meshes of a head, of any unit and direction.

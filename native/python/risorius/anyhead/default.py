@@ -1,25 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""The default template: the sample person, which is built once and kept in the cache folder."""
+"""Builds the default template, the sample person, once and stores it in the cache folder."""
 
 from __future__ import annotations
 
 import hashlib
-import tempfile
+import shutil
 from pathlib import Path
 from types import ModuleType
 
-from .. import Dna, DnaError, load
+from .. import DnaError, load
 from ..base.version import __version__
-from ..files import fileio
 from ..files.caches import cache_folder
 from ..people import NoPeopleError, people
 from .errors import AnyHeadError
 
-_TEXELS = 64  # texture size in pixels; small because the textures are deleted
+_TEXELS = 512  # texture size in pixels; only parts that a head lacks, such as eyes, use textures
 
 
-def default_template() -> Dna:
-    """The sample person as a face of blend shapes. The first call takes half a minute to build it.
+def default_template() -> Path:
+    """The DNA file of the sample person, a face of blend shapes with its textures beside it.
+
+    The first call takes half a minute to build the person.
 
     Raises:
         AnyHeadError: the person's data are not on this machine; the message says how to get them.
@@ -29,25 +30,37 @@ def default_template() -> Dna:
         package = people()
     except NoPeopleError as missing:
         raise AnyHeadError(f"name a DNA file as template: {missing}") from None
-    path = cache_folder() / f"template-{__version__}-{_digest(package)}.dna"
-    if path.is_file():
-        try:
-            return load(path)
-        except DnaError:
-            path.unlink()  # incomplete, for example after a full disk: built again below
-    if not package.is_fetched():
-        raise AnyHeadError(
-            "a template was expected: name a DNA file with expressions, or build the sample person "
-            "once with `risorius sample man.dna`, whose data are then the template's as well"
-        )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        dna = package.build_sample(
-            Path(folder) / "template.dna", rig=None, offline=True, texture_size=_TEXELS, say=_quiet
-        )
-    assert isinstance(dna, Dna)
-    fileio.write_bytes(path, dna.to_bytes())
-    return dna
+    folder = cache_folder() / f"template-{__version__}-{_digest(package)}"
+    path = folder / "person.dna"
+    if not _is_complete(path):
+        if not package.is_fetched():
+            raise AnyHeadError(
+                "a template was expected: name a DNA file with expressions, or build the sample "
+                "person once with `risorius sample man.dna`, whose data are then the template's "
+                "as well"
+            )
+        _remove_earlier(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        package.build_sample(path, rig=None, offline=True, texture_size=_TEXELS, say=_quiet)
+    return path
+
+
+def _is_complete(path: Path) -> bool:
+    """Whether a DNA file can be loaded; it cannot after a full disk, for example."""
+    try:
+        load(path)
+    except (DnaError, OSError):
+        return False
+    return True
+
+
+def _remove_earlier(folder: Path) -> None:
+    """Removes templates that earlier code with the same version number built."""
+    for path in folder.parent.glob(f"template-{__version__}-*"):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def _quiet(_line: str) -> None:

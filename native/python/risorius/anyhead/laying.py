@@ -29,7 +29,7 @@ class Laid:
         trust: float64[V], 0 to 1: confidence in the position of each vertex.
         registered: the registration; None: none was needed because the head has the template's
             triangles.
-        jaw: difference of the lower teeth from the template; None: unknown.
+        jaw: change of the lower jaw from the template to the head; None: unknown.
     """
 
     points: Doubles

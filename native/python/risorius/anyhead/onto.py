@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Transfers the expressions of a template to a head: from meshes to a face of blend shapes.
 
-The steps: standing, laying, transfer, fittings, repair, author's joining, ShapeSet, Dna.
+The steps: rotate and scale the head (standing), register the template's skin onto it (laying),
+transfer the displacements, find or add eyes and teeth (fittings), repair lids and lips, join the
+meshes (author.heads.joining), and make a Dna (author.input.shape_face).
 """
 
 from __future__ import annotations
@@ -117,7 +119,7 @@ def onto(
     """
     o, tell = options or OntoOptions(), say or _silent
     notes = _own_shapes(parts)
-    tell("looking for the face")
+    tell("finding the face")
     _at(progress, 0.0)
     head = stand(where, parts, unit, o.wishes, o.marks, _part(progress, 0.0, _FACE))
     found = patiently(partial(sort_parts, head.parts), lambda: _at(progress, _FACE))
@@ -126,10 +128,10 @@ def onto(
     tell("reading the template")
     _at(progress, _FACE)
     source = read_template(template, _part(progress, _FACE, _TEMPLATE))
-    tell(f"laying {counted(len(source.surface.points), 'vertex', 'vertices')} of the template onto "
-         f"{len(target.points):,} of the head")  # fmt: skip
+    tell(f"fitting the template ({counted(len(source.surface.points), 'vertex', 'vertices')}) to "
+         f"the head ({len(target.points):,})")  # fmt: skip
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
-    tell(f"carrying {counted(len(source.ways), 'expression')} over")
+    tell(f"transferring {counted(len(source.ways), 'expression')}")
     wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
     jaw = None if laid.jaw is None else jaw_by_teeth(laid.jaw, template, found)
     carried = transfer(source, target, laid.points, laid.trust, wanted, rest, jaw)
@@ -162,7 +164,7 @@ def _mended(
     """The displacements of the poses, repaired unless the options forbid it."""
     if not o.repaired or not o.strength:
         return ways
-    tell("closing lids and lips, taking skin out of eyes and teeth")
+    tell("repairing contacts of lids, lips, eyes and teeth")
     out = repair(
         target, fitted.face.mesh.faces, fitted, head.found.landmarks, None,
         _of_length(ways, single=True), subset(ways, [pose for pose in ways if len(pose) > 1]),
@@ -186,7 +188,8 @@ def _of_length(ways: SparseShapes[Pose], *, single: bool) -> SparseShapes[str]:
 
 
 def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None = None) -> Read:
-    """The head with expressions as a face of blend shapes, in the form of author.input.spec.Read.
+    """The head with expressions as a face of blend shapes: the same type as spec.read_face()
+    returns.
 
     Args:
         made: the head with expressions; its shapes are changed.
@@ -248,7 +251,7 @@ def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:
-    """Copy the GUI controls of a template that drive raw controls of the face."""
+    """Copy from a template the GUI controls that drive raw controls of the face."""
     names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
     table = template.gui_to_raw
     led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Registers a template onto a head of any topology: interface of the native registration."""
+"""Registers a template onto a head of any topology, by the native registration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Pair = tuple[int, Sequence[float]]
 
 
 class RegistrationError(RisoriusError):
-    """Surfaces, pairs or options cannot be used, or no surface of the target is near the start."""
+    """Surfaces, pairs or options cannot be used, or the target is not near the start positions."""
 
     code = "registration"
 
@@ -123,7 +123,8 @@ def register(
 
 
 def _corners(surface: Surface) -> npt.NDArray[np.int32]:
-    """int32[T, 3]: corners for the native code; an invalid index becomes -1, which it refuses."""
+    """int32[T, 3]: corners of the triangles; an invalid index becomes -1, which the native code
+    refuses."""
     corners = np.asarray(surface.triangles).reshape(-1, 3)
     known = (corners >= 0) & (corners < len(surface.points))
     return np.where(known, corners, -1).astype(np.int32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A head of any unit and direction made to stand: cm, y up, the face towards z, its left at x."""
+"""Rotates and scales a head of any unit and direction: cm, y up, face towards +z, left at +x."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 @dataclass(frozen=True)
 class Standing:
-    """A head that stands.
+    """A head in the standing space: cm, y up, the face towards +z, left at +x.
 
     Attributes:
         parts: its meshes, without shapes.
-        found: the form and the landmarks, of the standing head.
-        own: the landmarks where the head was before.
-        notes: what was guessed, a sentence each.
+        found: the fitted head model and the landmarks in the standing space.
+        own: the landmarks in the space of the input meshes.
+        notes: sentences about guesses.
     """
 
     parts: list[HeadPart]
@@ -52,20 +52,21 @@ def stand(
     marks: Landmarks | None,
     progress: Progress | None = None,
 ) -> Standing:
-    """Find the face and turn and scale all meshes.
+    """Find the face of a head, and rotate and scale all meshes to the standing space.
 
     Args:
-        where: what errors call the head.
-        parts: in one space; they stay as they are.
-        unit: of their numbers as the format has it, "cm" or "m".
-        wishes: what is said and not guessed.
-        marks: landmarks that a person gave, in the space of the parts.
-        progress: told the share that is done, 0 to 1; False stops.
+        where: name of the head in error messages.
+        parts: the meshes of the head in one space; they are not changed.
+        unit: the unit of the head's file format, "cm" or "m".
+        wishes: values that the user gave and that are not guessed.
+        marks: landmarks that the user placed, in the space of the parts.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        AnyHeadError: no polygons, or wishes that cannot be.
-        LandmarkError: no face, or landmarks that are missing.
-        Stopped: progress said False.
+        AnyHeadError: there are no polygons, or a value of `wishes` is invalid.
+        LandmarkError: no face was found, or landmarks are missing.
+        Stopped: `progress` returned False.
     """
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
@@ -106,8 +107,11 @@ def stand(
 
 
 def _found(skin: Surface, hints: Hints, progress: Progress | None) -> tuple[Found, bool]:
-    """The form of a head, and whether its polygons are to be turned. What hangs on it may be
-    turned where the head is not."""
+    """The fitted head model, and whether all polygons must be reversed.
+
+    Reversed polygons are tried first if most polygons face inward. If no face is found in them, the
+    original ones are used, because perhaps only attached meshes are inside out.
+    """
     if _inside_out(skin):
         try:
             return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints, progress), True
@@ -117,7 +121,7 @@ def _found(skin: Surface, hints: Hints, progress: Progress | None) -> tuple[Foun
 
 
 def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:
-    """All that may be skin, as one surface; the mesh that a person named alone."""
+    """All meshes that may be skin, as one surface; only the named mesh if `named` is not ""."""
     chosen = [part for part in parts if part.source == named] if named else list(parts)
     if not chosen:
         names = ", ".join(dict.fromkeys(part.source for part in parts))
@@ -144,12 +148,12 @@ def _check_size(where: str, parts: Sequence[HeadPart]) -> None:
 
 
 def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]:
-    """What makes the head's numbers cm, and what is odd about them.
+    """The factor from the head's unit to cm, and notes on an unusual height.
 
     Args:
-        height: of the face in them, from the chin to the top.
-        unit: as the format says.
-        wishes: as a person says.
+        height: height of the face from the chin to the top, in the head's unit.
+        unit: the unit of the file format.
+        wishes: the user's unit, scale or height, which have precedence.
     """
     if wishes.height_mm:
         return wishes.height_mm / (UNITS["cm"] * height), []
@@ -171,10 +175,10 @@ def _stood(part: HeadPart, turn: Doubles, *, backwards: bool) -> HeadPart:
 
 
 def _inside_out(surface: Surface) -> bool:
-    """Whether most triangles show their backs, as in a mirrored file.
+    """Whether triangles face inward, as in a mirrored file, so that the volume is negative.
 
     Args:
-        surface: closed, or with openings that are small against the whole.
+        surface: a closed surface, or one with small openings.
     """
     middle = surface.points[np.unique(surface.triangles)].mean(axis=0)
     a, b, c = (surface.points[surface.triangles[:, k]] - middle for k in range(3))
@@ -182,12 +186,12 @@ def _inside_out(surface: Surface) -> bool:
 
 
 def _upright(rotation: Doubles) -> Doubles:
-    """The rotation that makes a head stand, float64[3, 3].
+    """float64[3, 3]: the rotation of a head to the standing space.
 
-    A head within 20 degrees of the axes of its file keeps to these axes.
+    If the head is within 20 degrees of the axes of its file, the rotation maps axes to axes.
 
     Args:
-        rotation: float64[3, 3], from the standing form to the head.
+        rotation: float64[3, 3], the rotation from the standing space to the head.
     """
     axes = np.zeros((3, 3))
     for row, column in ((1, 1), (2, 2)):  # up, then front

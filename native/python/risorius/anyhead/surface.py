@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A triangle mesh with its normals, edges and border."""
+"""Defines a triangle mesh, and computes its normals, edges and border."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Surface:
         """A surface of polygons, which are split into fans of triangles.
 
         Args:
-            points: float64[V, 3].
+            points: float64[V, 3], vertex positions.
             faces: vertices of each polygon, counter-clockwise seen from outside.
         """
         sizes = np.fromiter(map(len, faces), np.int64, len(faces))

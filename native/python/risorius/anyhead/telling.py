@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Progress of long work, which the caller may stop."""
+"""Reports the progress of long work to the caller, who can stop the work."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from .errors import Stopped
 
-Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
+Progress = Callable[[float], object]  # receives the finished share, 0 to 1; False stops
 
 
 def telling(
@@ -18,7 +18,7 @@ def telling(
     It raises Stopped if `progress` returns False.
 
     Args:
-        progress: told the share of the whole work.
+        progress: receives the finished share of the whole work, 0 to 1.
         begin, end: shares of the whole work at which the part begins and ends.
     """
 

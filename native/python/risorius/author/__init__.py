@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint rigs made from expressions."""
+"""Makes joint rigs from the shapes of expressions."""
 
 from .fitting import FitOptions, JointFit, Progress, fit_joints, fit_motions, fit_weights
 from .joint_rig import JointRig, find_reference, make_joint_rig

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The wanted positions at values between 0 and 1 of an expression, and the joints' errors there."""
+"""Computes where vertices should be at control values between 0 and 1, and the joints' errors."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ SHARES = (0.25, 0.5, 0.75)
 
 
 class Ways:
-    """Motions of joints at 1 and at SHARES, of the new face and of its source, for all meshes.
+    """Joint motions by single inputs at 1 and at SHARES, in the new face and in its source face.
 
     Attributes:
         rest: float64[joints, 3], neutral positions of all joints.
-        whole: float64[C, joints, 3, 4], motions with the input at 1.
-        made: share -> motions of the new face's joints.
-        before: share -> motions of the source's joints.
+        whole: float64[C, joints, 3, 4], motions of the new face's joints with input C at 1.
+        made: share -> motions of the new face's joints with the input at this value.
+        before: share -> motions of the source's joints with the input at this value.
         turning: bool[C], whether an input moves joints of the source.
         middles: row of an expression -> float64[3], the pivot of its motion.
     """
@@ -46,7 +46,11 @@ class Ways:
 
 
 class Between:
-    """The joints' errors at SHARES, measured from a line or from the arc about a pivot."""
+    """Measures a mesh's errors with an input at SHARES: its distance from the wanted positions.
+
+    The wanted positions are on straight lines, on arcs about a pivot, or on the arcs of the
+    source's joints.
+    """
 
     def __init__(self, ways: Ways, mesh: Mesh) -> None:
         self.ways = ways
@@ -54,7 +58,7 @@ class Between:
         self.weights = sk.dense_weights(mesh, len(ways.work.source.joint_names))
 
     def truth(self, row: int, wanted: Doubles, shares: Sequence[float]) -> list[Doubles]:
-        """The wanted displacements float64[V, 3] at each share.
+        """The wanted displacements float64[V, 3] at each control value in `shares`.
 
         Args:
             row: row of the expression.
@@ -66,7 +70,8 @@ class Between:
             if middle is None:
                 return [share * wanted for share in shares]
             return [arc(self.positions, wanted, middle, share) for share in shares]
-        # Joints of the source follow their own arc. Blend shapes beside them follow a line.
+        # Joints of the source move vertices on arcs, and its blend shapes on lines. So only the
+        # shape before skinning is scaled.
         goal = self.positions + wanted
         whole = self.ways.work.motions[row]
         shape = sk.before_skin(goal, self.weights, whole) - self.positions

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Solves the joint values of correctives, because turns of joints do not add up like blend shapes.
+"""Solves the joint values of correctives, because joint rotations do not add up like blend shapes.
 
-With all controls of a corrective at 1, the face of joints must have the form of the face of shapes.
-The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes hold the
-remaining displacements.
+With all controls of a corrective at 1, the face of joints must have the same shape as the face of
+shapes. The values that the joints add in this pose are solved by Gauss-Newton steps. Blend shapes
+store the remaining displacements.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from .work import MM, RigOptions, Work, listed_meshes
 _STEPS = 3  # number of Gauss-Newton steps
 _OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
 _MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
-# Largest number of joints in a step, and smallest share of a joint relative to the strongest one.
+# Largest number of joints in a Gauss-Newton step. A joint is left out if the weighted squared error
+# of its vertices is below _LEAST_SHARE of the largest such error of a joint.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
@@ -69,7 +70,7 @@ class _Side:
 
 
 class _Skin:
-    """A mesh of both faces."""
+    """A mesh with its weights and shapes in the face of shapes and in the face of joints."""
 
     def __init__(self, before: Dna, after: Dna, mesh: Mesh, made: Mesh, columns: int) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
@@ -91,7 +92,7 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3]: the face of joints with its blend shapes, before skinning."""
+        """float64[V, 3]: vertices in the face of joints with its blend shapes, before skinning."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
@@ -135,7 +136,8 @@ class Combinations:
         self.first = len(work.source.joint_names)
 
     def active(self, column: int) -> list[int]:
-        """The inputs at 1 in a corrective's pose: controls, smaller correctives, the corrective."""
+        """The inputs at 1 in a corrective's pose: its controls, the correctives of subsets of its
+        controls, and the corrective itself."""
         on = self.work.combined[column]
         smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
         return [*sorted(on), *smaller, column]
@@ -155,7 +157,8 @@ class Combinations:
         """Call a function for each corrective in threads. Returns the results in order.
 
         Args:
-            work: function of a corrective. When it runs, the smaller correctives are finished.
+            work: function of a corrective. When it runs, the correctives of a subset of its
+                controls are finished.
             tell: gets the finished fraction; an exception that it raises ends the work.
         """
         out: list[T] = []
@@ -170,7 +173,8 @@ class Combinations:
         return out
 
     def _waves(self) -> list[list[int]]:
-        """The correctives in their order, divided into runs of independent correctives."""
+        """The correctives in their order, divided into runs of correctives that do not depend on
+        each other."""
         out: list[list[int]] = []
         for column in self.order:
             on = self.work.combined[column]
@@ -208,7 +212,7 @@ class Combinations:
         self._leave(column, active, rows, joints)
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
-        """Set the values of joints to 0 that move no vertex by least_effect_mm or more."""
+        """Set to 0 the values of joints that move no vertex by least_effect_mm or more."""
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -222,7 +226,7 @@ class Combinations:
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
         """Choose the vertices and the new joints of a corrective's equations.
 
-        Returns: vertices with an error and some held vertices; indices of the joints.
+        Returns: vertices with an error, and some others, which must not move; the joints' indices.
         """
         motions = self.after.motions(self.after.worlds(active))
         parts, found, errors = [], [], []
@@ -270,7 +274,7 @@ class Combinations:
         return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
-        """float64[new joints, 6, correctives]: values that the correctives add, in `order`."""
+        """float64[new joints, 6, correctives]: joint values of correctives, sorted as `order`."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
     def finish(
@@ -279,7 +283,7 @@ class Combinations:
         """Add blend shapes for the joints' errors, and return the errors of the finest meshes.
 
         Args:
-            lods: number of levels of the source.
+            lods: number of LODs of the source.
             tell: gets the finished fraction of each block of vertices.
         """
         work = self.work
@@ -386,7 +390,8 @@ def _equations(
     arms = arms.copy()
     arms[..., 3] += arms[..., :3] @ middle
     places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
-    # The displacement by a unit shift and a unit turn, for each coordinate of a vertex' place.
+    # Displacement of a vertex by a unit shift or rotation of a joint. It is linear in the vertex'
+    # position: three rows for x, y and z, and a constant.
     moves = np.zeros((4, count, 6, 3))
     moves[3, :, :3] = turns.transpose(0, 2, 1)
     crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]

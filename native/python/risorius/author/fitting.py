@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The native fit of joints, weights and motions to expressions, and its options."""
+"""Calls the native fit of joints, skin weights and joint motions to the shapes of expressions."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ class FitOptions:
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric
     threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
-    # A joint takes no part in an expression if it moves no vertex by this distance, in the mesh'
-    # unit.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance, in the mesh' unit.
     least_effect: float = 0.0
-    # True keeps the round with the smallest largest error of the second half of the rounds. False
-    # keeps the best of the last four rounds.
+    # The result is the round with the smallest maximum error: among the second half of the rounds
+    # if True, among the last four rounds if False.
     bound: bool = False
 
 
 def bounded(options: FitOptions) -> FitOptions:
-    """The options with at least 200 rounds and `bound`, for a smaller largest error."""
+    """The options with at least 200 rounds and `bound` True, so that the largest error is
+    smaller."""
     return replace(options, rounds=max(options.rounds, 200), bound=True)
 
 
@@ -49,7 +50,7 @@ def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Double
     """Rotation vectors and shifts of the joints, both float64[E, J, 3], of rigid motions.
 
     Args:
-        motions: float64[E, J, 3, 4].
+        motions: float64[E, J, 3, 4], motion of each joint in each expression.
         positions: float64[J, 3], positions of the joints.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
@@ -68,7 +69,8 @@ def fit_joints(
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> JointFit:
-    """Fit new joints beside given joints: their positions and motions, and weights of all joints.
+    """Fit positions and motions of new joints in addition to given joints, and weights of all
+    joints.
 
     Args:
         neutral: float64[V, 3], neutral vertices; the face's middle is x = 0.
@@ -114,9 +116,10 @@ def fit_motions(
         given: float64[J, 3], positions of the given joints.
         motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
             all expressions.
-        weights: float64[V, J + new joints].
+        weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
-        at: index of the pivot of each new joint; None: the middle of its vertices.
+        at: index of the pivot of each new joint; None: the joint is placed in the middle of its
+            vertices.
         options: options of the fit; only emphasis, threads and least_effect are used.
 
     Raises:
@@ -145,7 +148,7 @@ def fit_weights(
     start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
-    """Fit weights of a mesh on joints with known motions, for example at a coarser level.
+    """Fit the skin weights of a mesh on joints with known motions, for example at a coarser LOD.
 
     Args:
         neutral: float64[V, 3], neutral vertices.
@@ -159,7 +162,7 @@ def fit_weights(
         options: options of the fit; only influences, smoothness, symmetric and threads are used.
 
     Raises:
-        DnaError: as fit_joints().
+        DnaError: a value is not finite, nothing moves, or an option is out of range.
     """
     return _native.fit_weights(
         _shapes(neutral, displacements, edges, importance),
@@ -205,7 +208,10 @@ def _weights(dense: Doubles) -> _native.FitWeights:
 
 
 def _rows(dense: Doubles) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
-    """Joints and weights [V, n] of dense rows [V, J]; n is the largest number per vertex."""
+    """Joints and weights [V, n] of dense weights [V, J], largest first, padded with weight 0.
+
+    n is the largest number of joints with a weight above 0 at one vertex.
+    """
     most = int((dense > 0).sum(axis=1).max(initial=0)) if dense.size else 0
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
     return joints.astype(np.uint32), np.take_along_axis(dense, joints, axis=1).astype(np.float32)

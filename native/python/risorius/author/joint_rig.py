@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Turns a face that moves by blend shapes into a face that moves by joints.
 
-Dna --columns, displacements--> fit --weights, joint groups--> Dna --errors--> blend shapes
+The native fit finds joints, weights and joint motions for the displacements by each control. Joint
+groups store the motions. Blend shapes correct the errors that the joints leave.
 """
 
 from __future__ import annotations
@@ -90,8 +91,8 @@ def make_joint_rig(
         dna: a face with blend shapes; it is not changed.
         options: options of the rig, such as the number of joints.
         progress: gets the finished fraction, 0 to 1; returns False to stop.
-        like: reference of a joint rig of the same topology. The face gets its joints, weights and
-            levels, and only the motions are fitted, which takes less time.
+        like: reference of a joint rig of the same topology. The face gets the joints, weights and
+            LODs of the reference, and only the motions are fitted, which takes less time.
 
     Raises:
         DnaError: a value is not finite, nothing moves, or progress returned False.
@@ -124,7 +125,9 @@ def make_joint_rig(
 
 
 def lighten(rig: JointRig, source: Dna) -> None:
-    """Remove the shortest deltas until a rig has at most as many as its input. Updates its errors.
+    """Remove the shortest blend shape deltas of a rig that has more deltas than its source.
+
+    The errors in `rig` are updated.
 
     Args:
         rig: the joint rig; it is changed.
@@ -138,7 +141,7 @@ def lighten(rig: JointRig, source: Dna) -> None:
 
 
 def _take_errors(rig: JointRig, found: Lightened) -> None:
-    """Add the errors by removed deltas to the errors of a rig."""
+    """Raise the stored errors of a rig to the errors that its removed deltas cause."""
     dna, channels = rig.dna, channels_of(rig.dna)
     for errors in rig.errors:
         for row, column in enumerate(rig.columns):
@@ -182,8 +185,8 @@ def find_reference(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
-        DnaError: as make_joint_rig().
-        ValueError: as make_joint_rig().
+        DnaError: see make_joint_rig().
+        ValueError: see make_joint_rig().
     """
     work, fit, made, _ = _made(dna, options or RigOptions(), progress, None, whole=False)
     return reference_of(work, fit, made)
@@ -197,7 +200,7 @@ def _made(
     *,
     whole: bool = True,
 ) -> tuple[Work, Joints, Made, dict[str, list[str]]]:
-    """Make the joints, their behaviour and the meshes of all levels.
+    """Make the joints, their behaviour and the meshes of all LODs.
 
     Args:
         dna: the face of shapes.
@@ -296,7 +299,8 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit joints and dense weights of the finest meshes. Sets parents and levels in `work`."""
+    """Fit joints and dense weights of the meshes of LOD 0. Sets parents, new, mirrored and heirs in
+    `work`."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)
@@ -310,12 +314,13 @@ def _new_joints(
 def _combine(
     work: Work, made: Made, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
-    """Add joint values and blend shapes for the correctives. Returns their errors."""
+    """Add joint values and blend shapes for the correctives. Returns the correctives' errors."""
     if not work.combined:
         return []
     found = Combinations(work, made.options, made.fewer)
     found.solve(lambda share: _asking(progress, _SOLVED * share)())
-    # One group for expressions and correctives, because all values of a joint must be in one group.
+    # Expressions and correctives share one joint group, because all values of a joint must be in
+    # one group.
     before = len(work.source.joint_names)
     columns = sk.column_deltas(work.dna, sk.column_count(work.source))[work.columns, before:, :6]
     values = np.concatenate([columns.transpose(1, 2, 0), found.values()], axis=2)
@@ -342,7 +347,7 @@ def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
 
 
 def _level_count(dna: Dna, options: LodOptions) -> int:
-    """The number of levels. A face with networks or solvers keeps its own number of levels."""
+    """The number of LODs. A face with networks or solvers keeps its own number of LODs."""
     own = max(1, dna.lod_count)
     fixed = len(dna.machine_learned_behavior.neural_networks) or len(dna.rbf_behavior.solvers)
     return own if fixed else max(own, options.count)
@@ -364,14 +369,15 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Choose the new joints of each level. Sets new, mirrored and heirs in `work`."""
+    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`."""
     used = given(work)
     count = len(fit.joints) - len(used)
     budgets = joint_budgets(o.lods, work.levels, count)
     own = np.arange(count) + len(work.source.joint_names)
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
-    # Shifts of the neck's joints count as expressions, see level_weights.
+    # Shifts of resting joints, such as the neck, count as further expressions, so that vertices
+    # keep the resting joint that they follow.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),
@@ -389,7 +395,8 @@ def _order_levels(
 
 
 def _mirrored_given(work: Work) -> dict[int, int]:
-    """Joint of the source -> joint at the mirrored place, or itself."""
+    """Joint of the source -> the joint at its mirrored place (x negated), or itself if there is
+    none."""
     near = 1e-3 * np.ptp(work.positions, axis=0).max()
     out = {}
     for joint, place in enumerate(work.positions):
@@ -465,7 +472,7 @@ def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[s
 
 
 def _add_joints(work: Work, fit: Joints, names: list[str]) -> dict[str, list[str]]:
-    """The new joints at the end of the Dna's; their names by region."""
+    """Append the new joints to the joints of the Dna. Returns region -> names of its new joints."""
     dna = work.dna
     positions = fit.joints[len(given(work)) :]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
@@ -498,7 +505,8 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
 
 
 def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
-    """float64[new joints, 3]: weighted middle of each joint's vertices, or the joint's position."""
+    """float64[new joints, 3]: weighted mean of the positions of each joint's vertices, or the
+    position of a joint without vertices."""
     rows = held**2
     total = rows.sum(axis=0)[:, None]
     middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)
@@ -554,11 +562,11 @@ def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGr
 
     Args:
         work: the face.
-        values: float64[new joints, 6, columns].
+        values: float64[new joints, 6, columns], translations and Euler angles by each input.
         columns: indices of the inputs.
     """
     count = len(values)
-    # Joints of the coarsest level come first, because a level uses the first rows of a group.
+    # Joints of the coarsest LOD come first, because a LOD uses the first rows of a joint group.
     last = np.array([sum(joint in level for level in work.new) for joint in range(count)])
     order = np.argsort(-last, kind="stable")
     rows = values[order].reshape(6 * count, -1)

@@ -20,7 +20,8 @@ from .work import Work, listed_meshes
 
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
 _LOOKED_AT = 2000  # number of checked vertices of the fine skin
-# Limits of a level. Largest distances from the fine skin, as fractions of the skin's size.
+# Limits of a LOD: root mean square and largest distance of its skin from the finest skin, as
+# fractions of the skin's size.
 _RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
 _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees
@@ -28,12 +29,13 @@ _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 
 
 @dataclass
 class LevelMeshes:
-    """Triangles of each coarser level, as layouts of the fine meshes.
+    """Triangles of each coarser LOD, as layouts of the finest meshes.
 
     Attributes:
-        count: number of levels, including levels of the source.
-        triangles: (level, mesh of the source) -> triangles; a level lacks missing meshes.
-        ended: reason why there are no more levels, or "".
+        count: number of LODs, including LODs of the source.
+        triangles: (LOD, mesh of the source) -> triangles; meshes that a LOD leaves out have no
+            entry.
+        ended: reason why there are no more LODs, or "".
     """
 
     count: int
@@ -49,17 +51,17 @@ def level_meshes(
     attributes: dict[int, Floats] | None = None,
     go_on: Callable[[], None] = lambda: None,
 ) -> LevelMeshes:
-    """Simplify the meshes of the finest level for each coarser level.
+    """Simplify the meshes of LOD 0 for each coarser LOD.
 
-    If the options give no vertex budgets, the levels end before the skin of a level looks broken:
-    it has too many slivers, edges folded by more than 120 degrees, or a large distance from the
-    fine skin. The neutral pose and the expressions with the largest motion are checked.
+    If the options give no vertex budgets, the LODs end before the skin of a LOD looks broken: it
+    has too many slivers, edges folded by more than 120 degrees, or a large distance from the skin
+    of LOD 0. The neutral pose and the expressions that move the skin most are checked.
 
     Args:
         work: the face.
         wanted: mesh of the source -> its displacements.
         options: the budgets.
-        levels: largest number of levels.
+        levels: largest number of LODs.
         attributes: mesh of the source -> attributes for the simplification; missing ones are added.
             None: they are forgotten.
         go_on: called before each mesh; raises an error to stop.
@@ -71,7 +73,7 @@ def level_meshes(
            for lod in range(had)]  # fmt: skip
     budgets = vertex_budgets(options, levels, own)
     fine = listed_meshes(source, 0)
-    # The skin is the mesh with the largest motion. Hair may have more vertices.
+    # The skin is the mesh that the expressions move most. Hair may have more vertices.
     skin = max(fine, key=lambda m: float(wanted[m].squares.sum()))
     out, check = LevelMeshes(min(levels, had)), _Skin(source.meshes[skin], wanted[skin])
     for lod in range(had, levels):
@@ -113,7 +115,8 @@ def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats
 
 
 class _Skin:
-    """The largest piece of the mesh with the largest motion, at rest and in some expressions."""
+    """The skin in the neutral pose and in some expressions: the largest connected piece of a
+    mesh."""
 
     def __init__(self, mesh: Mesh, wanted: Wanted) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
@@ -128,14 +131,14 @@ class _Skin:
         self.poses = [self.positions, *(self.positions + way for way in wanted.ways(most))]
         fine = self.places[fan_triangles(mesh)]
         self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
-        # The fine mesh may already have slivers and folds, for example at the rims of lids.
+        # A LOD may have as many slivers and folds as the finest mesh, which has some at lid rims.
         self.had = shapes_of(self.poses, self.fine)
 
     def wrong(self, triangles: Ints | None) -> str:
-        """The fault of a level's skin as text; "" if there is none.
+        """The fault of the skin of a LOD as text; "" if there is none.
 
         Args:
-            triangles: int64[n, 3] as layouts; None if the level has no skin.
+            triangles: int64[n, 3] as layouts; None if the LOD has no skin.
         """
         if triangles is None:
             return "no skin"
@@ -175,8 +178,8 @@ def shapes_of(poses: Sequence[Doubles], triangles: Ints) -> list[tuple[float, fl
     120 degrees.
 
     Args:
-        poses: float64[V, 3] each.
-        triangles: int64[n, 3].
+        poses: float64[V, 3] each, vertex positions.
+        triangles: int64[n, 3], vertex indices.
     """
     if not len(triangles):
         return [(0.0, 0.0) for _ in poses]

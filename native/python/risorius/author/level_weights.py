@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fits the weights of a mesh on the joints of a level. The joints' motions are already known."""
+"""Fits a mesh' skin weights on the joints of a LOD. The joints' motions are already known."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ from .work import (
     resting,
 )
 
-# Weight of a displacement at the value 0.5 relative to the value 1, for expressions along an arc.
+# Expressions that move vertices along an arc are also fitted at the value 0.5: the weight of their
+# displacements there. Displacements at the value 1 have the weight 1.
 _HALVES = 1.5
 
 
@@ -36,16 +37,16 @@ def level_weights(
     wanted: Doubles,
     start: Doubles,
 ) -> Doubles:
-    """float64[V, joints]: weights on the joints of a level.
+    """float64[V, joints]: skin weights on the joints of a LOD.
 
-    The fit gets two kinds of additional expressions. The first shifts each resting joint of the
-    neck with everything below it, so that vertices keep their resting joint. The second is the
-    state at 0.5 of expressions along an arc.
+    The fit gets two kinds of additional expressions. The first kind shifts a joint that no
+    expression moves, such as the neck, with all its children, so that vertices keep following it.
+    The second kind is the pose at the value 0.5 of expressions that move vertices along arcs.
 
     Args:
-        ways: motions of the face; the parents of new joints are chosen.
+        ways: motions of the face; the parents of new joints must be known.
         options: options of the fit.
-        lod: the level. Coarser levels use less smoothness, because their vertices are farther
+        lod: index of the LOD. Coarser LODs use less smoothness, because their vertices are farther
             apart.
         mesh: the mesh with its weights in the source.
         wanted: its displacements float64[E, V, 3].
@@ -58,7 +59,8 @@ def level_weights(
         return start
     joints = np.concatenate([used, len(work.source.joint_names) + work.new[lod]])
     asked = np.concatenate([wanted, shifted, halves])
-    # Smoothness is relative to all displacements. It is scaled to be relative to the expressions.
+    # The fit takes smoothness relative to all displacements. The factor makes it relative to the
+    # displacements by real expressions.
     even = options.smoothness * float((wanted**2).sum() / max((asked**2).sum(), 1e-30))
     fit = fit_weights(
         np.asarray(mesh.positions, np.float64),
@@ -74,10 +76,10 @@ def level_weights(
 
 
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
-    """Additional expressions that shift the resting joints, so that vertices keep theirs.
+    """Additional expressions that shift resting joints, so that vertices keep following them.
 
-    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the joints of the source that
-        take part.
+    Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
+        the source that the fit uses.
     """
     still, shares = resting(work), carried_shares(work, mesh)
     used = set(carriers(work)[len(work.source.joint_names) :].tolist())
@@ -92,9 +94,10 @@ def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
 
 
 def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
-    """Additional expressions: the state at 0.5 of expressions along an arc.
+    """Additional expressions: the pose at the value 0.5 of expressions along an arc.
 
-    Returns: displacements float64[n, V, 3] and motions float64[n, joints, 3, 4], both weighted.
+    Returns: displacements float64[n, V, 3] and motions float64[n, joints, 3, 4], both multiplied
+        by _HALVES.
     """
     between = Between(ways, mesh)
     rows = sorted({*ways.middles, *np.flatnonzero(ways.turning).tolist()})
@@ -127,12 +130,12 @@ def _heir(work: Work, joint: int, there: set[int]) -> int:
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
-    """Move the weights of joints that a level lacks to their heirs.
+    """Move the weights of joints that a LOD lacks to the joints that replace them.
 
     Args:
         work: the face.
-        start: float64[V, joints].
-        there: indices of the level's joints.
+        start: float64[V, joints], weights at the next finer LOD.
+        there: indices of the joints in the LOD.
     """
     rows = start.copy()
     for joint in np.flatnonzero(rows.any(axis=0)).tolist():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Chooses the joints and vertex counts of a joint rig's levels of detail.
 
-A coarser level has a subset of the finer level's joints with the same motions. So a joint group
-needs only fewer rows, and one clip plays at every level.
+A coarser LOD has a subset of the finer LOD's joints with the same motions. So a joint group needs
+only fewer rows, and one clip plays at every LOD.
 """
 
 from __future__ import annotations
@@ -19,27 +19,31 @@ from ..base.errors import ArgumentError
 from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
 
-# Fraction of LOD 0's joints at each level, about as in hand-made faces. It falls more slowly than
-# the number of vertices does.
+# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. It falls more slowly
+# than the number of vertices does.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
-# Names of small meshes (clear films, lashes, mouth); coarse levels leave them out.
+# Parts of the names of small meshes (clear films, lashes, mouth), which coarse LODs leave out.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
 
 @dataclass(frozen=True)
 class LodOptions:
-    """The number of levels and the budgets of each. Levels of the source are kept."""
+    """The number of LODs, and the numbers of joints and vertices of each LOD.
+
+    LODs that the source face already has are not simplified again.
+    """
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    # Vertices of each level; empty: 0.6 times the level before, and at most 60,000.
+    # Vertices of each LOD; empty: 0.6 times the LOD before, and at most 60,000.
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:
-        """Raise ValueError if a budget has not `count` numbers or grows from level to level."""
+        """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has not `count`
+        numbers or its numbers increase."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -55,7 +59,7 @@ class LodOptions:
 
 
 def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
-    """The number of new joints of each level.
+    """The number of new joints of each LOD.
 
     Args:
         options: budgets, if given.
@@ -73,8 +77,8 @@ class _Merging:
     """Removes joints one after the other; the most similar joint takes a removed joint's vertices.
 
     Attributes:
-        points: float64[V, 4], vertices with a 1.
-        weights: float64[V, J].
+        points: float64[V, 4], vertices in homogeneous coordinates.
+        weights: float64[V, J], skin weights of the joints that are still there.
         motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
         heirs: removed joint -> joint that took its vertices.
         there: bool[J], whether a joint is still there.
@@ -94,7 +98,8 @@ class _Merging:
             self._price(int(joint))
 
     def _price(self, joint: int) -> None:
-        """Compute the squared errors if each other joint takes a joint's vertices."""
+        """For each other joint, compute the squared error if that joint takes the vertices of
+        `joint`."""
         held = np.flatnonzero(self.weights[:, joint])
         rows = self.weights[held, joint, None] * self.points[held]
         values, axes = np.linalg.eigh(rows.T @ rows)
@@ -135,17 +140,17 @@ def joint_order(
 ) -> tuple[list[int], dict[int, int]]:
     """The new joints sorted by importance, the most important first; mirrored joints are adjacent.
 
-    The joint whose vertices another joint moves most similarly is removed repeatedly; the other
-    joint takes its vertices. The reverse order of removal is the result.
+    Repeatedly, the joint is removed whose vertices another joint can move with the least error, and
+    the other joint takes its vertices. The reverse order of removal is the result.
 
     Args:
-        positions: float64[V, 3].
-        weights: float64[V, J].
-        rotations: float64[E, J, 3, 3].
-        translations: float64[E, J, 3].
+        positions: float64[V, 3], neutral vertices.
+        weights: float64[V, J], skin weights.
+        rotations: float64[E, J, 3, 3], rotation of each joint in each expression.
+        translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.
-        fixed: number of first joints that all levels keep and that the result does not contain.
+        fixed: number of first joints that all LODs keep and that the result does not contain.
 
     Returns: the order, and joint -> joint that took its vertices.
     """
@@ -185,12 +190,12 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each level. The level after a large one has at most LARGE.
+    """The number of vertices of each LOD. A LOD that is made has at most LARGE vertices.
 
     Args:
         options: budgets, if given.
         levels: number of levels.
-        existing: numbers of vertices of the source's levels.
+        existing: numbers of vertices of the source's LODs.
     """
     out = list(existing)
     while len(out) < levels:
@@ -200,12 +205,12 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
 
 
 def mesh_budget(name: str, vertices: int, share: float) -> int:
-    """The number of vertices of a mesh at a level; 0 leaves the mesh out.
+    """The number of vertices of a mesh at a LOD; 0 leaves the mesh out.
 
     Args:
         name: name of the mesh.
-        vertices: number of vertices of the fine mesh.
-        share: number of vertices of the level relative to the fine level.
+        vertices: number of vertices of the mesh at LOD 0.
+        share: number of all vertices at the LOD, divided by the number at LOD 0.
     """
     wanted = round(share * vertices)
     if wanted >= _LEAST_VERTICES:
@@ -216,11 +221,11 @@ def mesh_budget(name: str, vertices: int, share: float) -> int:
 
 
 def level_name(name: str, lod: int) -> str:
-    """The name of a mesh at another level: head_lod0_mesh -> head_lod3_mesh.
+    """The name of a mesh at another LOD: head_lod0_mesh -> head_lod3_mesh.
 
     Args:
         name: name of the fine mesh.
-        lod: the level.
+        lod: index of the LOD.
     """
     if re.search(r"lod\d+", name):
         return re.sub(r"lod\d+", f"lod{lod}", name)
@@ -228,13 +233,13 @@ def level_name(name: str, lod: int) -> str:
 
 
 def extend_levels(dna: Dna, levels: int) -> None:
-    """Add levels of detail that list the same items as the last level.
+    """Add LODs that list the same items as the last LOD of the face.
 
-    New levels have no blend shapes. Callers replace the lists of meshes and joints.
+    New LODs have no blend shapes. Callers replace the lists of meshes and joints.
 
     Args:
         dna: the face to change.
-        levels: wanted number of levels; nothing changes if the face has as many.
+        levels: wanted number of LODs; nothing changes if the face has at least as many.
     """
     had = max(1, dna.lod_count)
     more = levels - had

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Removes the shortest blend shape deltas, so that a rig has at most as many as its input."""
+"""Removes the shortest deltas, so that a rig has at most as many as its source face."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ class Lightened:
 
 
 def count_deltas(meshes: Sequence[Mesh]) -> int:
-    """The number of deltas of these meshes' targets that are not 0."""
+    """The number of nonzero deltas in the blend shape targets of some meshes."""
     return sum(int((lengths > 0).sum()) for mesh in meshes for lengths in _lengths(mesh))
 
 
 def deltas_of(dna: Dna, lod: int = 0) -> int:
-    """The number of deltas of a level's meshes.
+    """The number of deltas in the meshes of a LOD.
 
     Args:
         dna: the face.
-        lod: the level.
+        lod: index of the LOD.
     """
     return count_deltas([dna.meshes[m] for m in listed_meshes(dna, lod)])
 
 
 def within_deltas(dna: Dna, source: Dna) -> Lightened:
-    """Limit the number of deltas to that of the source at each level of the source.
+    """Give each LOD at most as many deltas as the source has at that LOD.
 
-    The shortest deltas of all meshes and targets of a level are removed first, including those of
-    correctives. A delta is added before skinning, and a weighted mean of rotations makes no vector
+    The shortest deltas of all meshes and targets of a LOD, including correctives, are removed
+    first. A delta is added before skinning, and a weighted mean of rotations makes no vector
     longer. So the error of a vertex grows by at most the length of the removed delta.
 
     Args:
@@ -92,7 +92,7 @@ def _lengths(mesh: Mesh) -> list[Doubles]:
 
 
 def _limit(meshes: Sequence[Mesh], budget: int) -> float | None:
-    """The length of the longest delta to remove; None if the budget is kept."""
+    """The length of the longest delta to remove; None if there are at most `budget` deltas."""
     if count_deltas(meshes) <= budget:
         return None
     lengths = np.concatenate([part for mesh in meshes for part in _lengths(mesh)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the meshes of all levels of a joint rig: weights, blend shapes for errors, errors."""
+"""Makes the meshes of a joint rig: fits weights, adds corrective shapes, and measures errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Rows = Doubles | SparseWeights  # weights on all joints, of a large mesh as Spar
 
 
 class Made:
-    """Makes the meshes of all levels, one level after the other."""
+    """Makes the meshes of all LODs, one LOD after the other."""
 
     def __init__(
         self,
@@ -53,10 +53,10 @@ class Made:
         """Prepare an empty list of meshes.
 
         Args:
-            work: the face; its joints are made.
+            work: the face; it must already have the new joints.
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes, or of their simplified meshes.
-            coarse: triangles of the coarser levels.
+            coarse: triangles of the coarser LODs.
             like: reference to reuse, or None.
             whole: whether to make blend shapes and measure errors.
             fewer: the simplified meshes to which the joints were fitted, or None.
@@ -76,10 +76,10 @@ class Made:
         self._numbers: dict[int, int] = {}  # mesh of the source -> mesh here; levels share meshes
 
     def add_level(self, lod: int, wanted: dict[int, Wanted], needs: set[int]) -> None:
-        """Make the meshes of a level: meshes of the source, or simplified meshes of LOD 0.
+        """Make the meshes of a LOD: meshes of the source, or simplified meshes of LOD 0.
 
         Args:
-            lod: the level; levels are added in order.
+            lod: index of the LOD; LODs are added in order.
             wanted: mesh of the source -> its displacements.
             needs: meshes that get weights on new joints.
         """
@@ -121,7 +121,7 @@ class Made:
         return self.coarse.triangles.get((lod, m), none)
 
     def _start(self, mesh: Mesh) -> Doubles:
-        """Weights float64[V, joints] of the nearest vertices of the finest level."""
+        """Weights float64[V, joints] of the nearest vertices of the meshes of LOD 0."""
         source = self.work.source
         fine = np.concatenate([np.asarray(source.meshes[m].positions) for m in self.weights])
         rows = np.concatenate([w[np.arange(len(w))] for w in self.weights.values()])
@@ -137,7 +137,7 @@ class Made:
         """Add a mesh whose weights are fitted.
 
         Args:
-            lod: the level.
+            lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
             wanted: its displacements.
@@ -196,7 +196,7 @@ class Made:
         """Add a simplified mesh of the finest level.
 
         Args:
-            lod: the level.
+            lod: index of the LOD.
             mesh: the simplified mesh with its weights in the source.
             name: name of the mesh.
             wanted: displacements of the finest mesh.

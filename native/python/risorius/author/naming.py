@@ -68,10 +68,11 @@ def joint_names(
 
 
 def _side(x: float) -> str:
-    """The side of a joint without a mirrored joint.
+    """The side of a joint that has no mirrored joint: L, R, or C for the middle.
 
     Args:
-        x: its place to the character's left, as a fraction of the face's width.
+        x: position of the joint, positive to the character's left, as a fraction of the face's
+            width.
     """
     if abs(x) < 1e-3:
         return "C"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Chooses the parents of new joints: neck or head by the skin that they move, or the jaw.
+"""Chooses the parent of each new joint: the jaw, or the neck or head joint of its vertices.
 
-A joint under the jaw follows the jaw's arc. An expression added to an open jaw then turns with the
-jaw, like a blend shape, which is added before skinning.
+A child joint of the jaw follows the jaw's arc. An expression added to an open jaw then turns with
+the jaw, like a blend shape, which is added before skinning.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ def choose_parents(
         held += held[mirrored]  # all resting joints are in the middle, so pairs get the same parent
     out = np.where(held.any(axis=1), still[held.argmax(axis=1)], work.head)
     if jaw is not None:
-        # Joints under the neck stay there: the throat moves with the jaw, but turns with the neck.
+        # Joints whose parent is the neck keep this parent: jaw controls move the throat, but the
+        # throat turns with the neck.
         own = out == carriers(work)[jaw]
         out[own & _follow(work, meshes, fit, rows, mirrored, jaw)] = jaw
     return [int(joint) for joint in out]
@@ -96,13 +97,13 @@ def second_joints(
     weights: dict[int, Doubles],
     room: int,
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
-    """Duplicate joints whose vertices follow two joints of neck and head.
+    """Duplicate joints whose vertices follow two resting joints, such as neck and head.
 
-    The second joint has the same motions and the other parent. So the vertices follow a neck that
-    is turned by hand as in the source.
+    The second joint has the same motions, but the other resting joint as parent. So the vertices
+    move as in the source if an animator rotates the neck.
 
     Args:
-        work: the face; the parents of new joints are chosen.
+        work: the face; the parents of new joints must be known.
         meshes: indices of the fitted meshes.
         fit: the joints.
         weights: mesh -> float64[V, joints].

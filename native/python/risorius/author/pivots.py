@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Finds the points about which lids and jaws turn, and computes arcs about them.
 
-A blend shape moves a vertex along a line, but a lid slides around the eyeball. Joints in the middle
+A blend shape moves a vertex along a line, but a lid slides around the eyeball. Joints at the centre
 of the eye move lids along arcs. The points come from existing joints or from the expressions.
 """
 
@@ -39,12 +39,12 @@ def find_pivots(
     *,
     jaw: bool,
 ) -> list[Pivot]:
-    """Find the middles of the eyes, as pivots of the lids, and the hinge of the jaw.
+    """Find the centre of each eye, as the pivot of its lids, and the hinge of the jaw.
 
     Args:
         names: names of the E expressions.
         positions: float64[V, 3], neutral vertices.
-        displacements: float64[E, V, 3].
+        displacements: float64[E, V, 3], displacements with each expression at 1.
         joint_names: names of the existing joints.
         joints: float64[J, 3], their positions.
         jaw: whether an existing joint opens the mouth; then no hinge is needed.
@@ -77,7 +77,8 @@ def _side(joint: str) -> str:
 
 
 def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The middle of the sphere on which the open and the shut lid lie; None if they do not."""
+    """The centre of the sphere on which the open and the shut lid lie; None if there is no such
+    sphere."""
     length = np.linalg.norm(displacement, axis=1)
     edge = length > 0.5 * length.max()
     if np.count_nonzero(edge) < 6:
@@ -95,7 +96,8 @@ def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The fixed point of the jaw's rotation nearest to the jaw; None if the jaw only shifts."""
+    """The point on the jaw's rotation axis that is nearest to the jaw; None if the jaw only
+    shifts."""
     length = np.linalg.norm(displacement, axis=1)
     held = length > 0.7 * length.max()
     before, after = positions[held], positions[held] + displacement[held]
@@ -108,7 +110,7 @@ def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def arc(positions: Doubles, displacement: Doubles, middle: Doubles, share: float) -> Doubles:
-    """float64[V, 3]: displacements on arcs about a point; the distance changes linearly.
+    """float64[V, 3]: displacements on arcs about a point; the radius changes linearly with `share`.
 
     Args:
         positions: float64[V, 3], neutral vertices.

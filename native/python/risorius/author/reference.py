@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Joints, weights and levels of a joint rig, which other faces of the same topology reuse.
+"""Stores joints, weights and LODs of a joint rig for other faces of the same topology.
 
-The joints are fitted once. For another person, only their motions are fitted. All these people
-have the same joints, so that they can be mixed.
+The joints are fitted once. For another person, only the motions of these joints are fitted. All
+these people have the same joints, so that they can be mixed.
 """
 
 from __future__ import annotations
@@ -165,9 +165,9 @@ def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
     LARGE vertices.
 
     Args:
-        work: the face; its levels are chosen.
+        work: the face; the joints of its LODs are already chosen.
         fit: the fitted joints.
-        made: the meshes of all levels.
+        made: the meshes of all LODs.
     """
     dna = work.dna
     first, before = len(given(work)), len(work.source.joint_names)
@@ -206,7 +206,7 @@ def refit(
     """Fit the motions of a reference's joints to another face.
 
     Args:
-        work: the other face; gets the reference's levels and parents.
+        work: the other face; gets the LODs and the joint parents of the reference.
         reference: the reference; check() has accepted the face.
         shaped: indices of the meshes to fit.
         wanted: mesh -> its displacements.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options, errors and the face, which all steps from a face of shapes to a face of joints share."""
+"""Defines the options, errors and intermediate data that all steps of making a joint rig share."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .pivots import Pivot
 from .wanted import Wanted
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Error of a vertex that follows another neck joint than in the source. A turned head moves vertices
-# of different neck joints about this far apart.
+# Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than
+# in the source gets this error, because a rotated head separates such vertices about this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
-# Tolerance relative to the head's height: 0.16 mm of 240 mm. Default of the command line, of
-# Blender and of the sample people.
+# Tolerance relative to the head's height: 0.16 mm for a head of 240 mm. Default of the command
+# line, of Blender and of the sample people.
 TOLERANCE = 1 / 1500
 _RIGID_MM = 0.02  # a mesh needs no new joints if the existing joints' error is smaller
 
@@ -43,16 +43,18 @@ class RigOptions:
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
     shapes: bool = True  # False: joints only, no blend shapes
-    # Whether the rig has at most as many blend shape deltas as its input. If necessary, the
+    # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint takes no part in an expression if it moves no vertex by this distance.
+    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
     # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
     # turn with their own joint.
     kept: tuple[str, ...] = ()
-    # Whether errors at control values between 0 and 1 are measured: a tenth of the total time.
+    # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
+    # total time.
     between: bool = True
     # Joints are fitted to meshes of about this number of vertices together: larger meshes are
     # simplified for the fit. Then weights are carried to all vertices, and blend shapes are made
@@ -72,8 +74,8 @@ class MeshErrors:
     joints_largest: Doubles  # [E] largest error of the joints alone, mm
     largest: Doubles  # [E] largest error with blend shapes, mm
     worst_vertex: Ints  # [E] vertex with the largest error of the joints alone
-    # [E] largest error in mm of the joints alone with the control at 0.25, 0.5 and 0.75, measured
-    # from the line or the arc
+    # [E] largest error in mm of the joints alone with the control at 0.25, 0.5 and 0.75, relative
+    # to the wanted positions on a line or an arc
     between_largest: Doubles
     lod: int = 0
 
@@ -102,7 +104,7 @@ class Joints:
 
 @dataclass
 class Work:
-    """The new face, and quantities that are computed once."""
+    """The source face, the face that is made, and quantities that several steps use."""
 
     source: Dna
     dna: Dna  # the face that is made
@@ -167,8 +169,8 @@ def require_sizes(dna: Dna) -> None:
         dna: the face.
 
     Raises:
-        ArgumentError: the face has no mesh, all vertices are in one point, or coordinates are not
-            finite or larger than FARTHEST, so that their squares could overflow.
+        ArgumentError: the face has no mesh, all vertices are in one point, or a coordinate is
+            infinite, NaN, or so large (above FARTHEST) that its square could overflow.
     """
     if not dna.meshes:
         raise ArgumentError("a face with meshes was expected")
@@ -216,7 +218,7 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint with the largest weights on moved vertices."""
+    """The resting joint with the largest sum of its weights times the motion of the vertices."""
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -243,15 +245,16 @@ def needs_joints(work: Work, wanted: Wanted) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But vertices must keep their joint, because a neck
-    may be turned by hand.
+    The fit cannot distinguish resting joints. But vertices must keep following the same one,
+    because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: for each joint, itself if it rests, or the nearest resting joint above it.
+    """int64[joints]: for each joint, its own index if it rests, otherwise the index of the nearest
+    resting joint above it.
 
     Args:
         work: the face. New joints are included if their parents are chosen.
@@ -270,9 +273,10 @@ def carriers(work: Work) -> Ints:
 
 
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V, resting]: each vertex' weights, summed by carrying resting joint (carriers()).
+    """float64[V, resting]: the fraction of a vertex' weights that each resting joint carries.
 
-    Rows have the sum 1.
+    It is the sum of the weights on the joints whose carriers() is the resting joint. Rows have the
+    sum 1.
 
     Args:
         work: the face.
@@ -292,10 +296,11 @@ def carried_shift(work: Work) -> float:
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
 
-    These count as additional expressions, so that vertices keep their joint of neck and head.
+    The fits use these shifts as additional expressions, so that vertices keep following the same
+    joint of neck and head.
 
     Args:
-        work: the face; the parents of new joints are chosen.
+        work: the face; the parents of new joints must be known.
         joints: n resting joints.
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
@@ -345,11 +350,11 @@ def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
 
 
 def listed_meshes(dna: Dna, lod: int) -> list[int]:
-    """Indices of the meshes of a level; all meshes if the file does not list the level.
+    """Indices of the meshes of a LOD; all meshes if the file does not list the LOD.
 
     Args:
         dna: the face.
-        lod: the level.
+        lod: index of the LOD.
     """
     mapping = dna.lod_mesh_mapping
     return [int(m) for m in mapping[lod]] if lod < len(mapping) else list(range(len(dna.meshes)))

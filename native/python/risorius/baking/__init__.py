@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Plays a clip on a face and writes the poses as .npz or .csv."""
+"""Evaluates a clip on a face, and writes the poses as .npz or .csv."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Evaluates a clip on a character and writes the result."""
+"""Evaluates a clip on a character and writes the poses to files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEFAULT_PARTS = PARTS[:3]
 
 
 class Sink(Protocol):
-    """Receives frames in their order."""
+    """Receives the evaluated frames of a clip, chunk by chunk in order of time."""
 
     def add(self, chunk: Chunk) -> None: ...
     def finish(self) -> None: ...
@@ -43,15 +43,16 @@ def bake(
     Args:
         clip: clip that is already resampled and cut, see `prepared`.
         face, lod: the character, and the LOD from 0.
-        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to compute only the facts.
-            Hidden files of killed processes in these folders stay, see fileio.sweep.
-        parts: parts of the poses to write, from PARTS.
-        compress: True: the .npz is smaller, and takes several times longer.
+        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
+            Temporary files that killed processes left in the folders of these paths remain.
+        parts: pose parts to write, some of PARTS.
+        compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.
 
     Returns:
-        The facts of Measure, and "evaluation_seconds", the time inside the evaluator.
+        The facts of Measure, such as the largest joint motion, and "evaluation_seconds", the time
+        inside the evaluator.
 
     Raises:
         ValueError: the character lacks this LOD.

@@ -22,9 +22,11 @@ class Performance:
     """A clip prepared for a character.
 
     Attributes:
-        clip: curves of raw controls; the character may lack some.
-        mapping: name of the mapping that was used; "" if the file's names are controls.
-        unmapped: curves of the file that are not controls and that the mapping does not know.
+        clip: curves of raw controls; the character may lack some of these controls.
+        mapping: name of the mapping that was used; "" if the file's curves are named like raw
+            controls, so that no mapping is needed.
+        unmapped: names of the file's curves that are no raw controls and that the mapping does not
+            know.
     """
 
     clip: risorius.Clip
@@ -37,8 +39,10 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
 
     Args:
         path: a .rzc file, or a file that risorius.importing reads.
-        face: its raw controls are used directly, and its table converts GUI controls.
-        mapping: name of a built-in mapping, or a TOML file; None: the best fit, or none for .rzc.
+        face: the character; curves of its raw controls are used directly, and curves of its GUI
+            controls are converted to raw controls.
+        mapping: name of a built-in mapping, or path of a TOML file; None: the mapping that fits
+            best; a .rzc file is then not mapped.
 
     Raises:
         OSError, ValueError: the file is no animation, or no mapping fits it; the error names the
@@ -58,7 +62,8 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         others = tuple(name for name in found.clip.names if name not in own)
         return Performance(found.clip.selected(own), "", others)
     clip, report = found.apply(mapping, rig=face.rig)
-    # A mapping contains controls of faces; a rig may have others, such as the neck's rotation.
+    # The mapping drops the curves that it does not know. Curves of raw controls, such as the neck's
+    # rotation, are added to the mapped clip.
     own = [name for name in own if name in report.unmapped and name not in clip]
     if own:
         curves = np.concatenate([clip.curves, found.clip.selected(own).curves])

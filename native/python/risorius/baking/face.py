@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A character prepared for baking, and clips prepared for it."""
+"""Loads a character for baking, adapts clips to it, and evaluates their frames in chunks."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ FIELDS = {
 }
 """The users' names for parts of a Pose -> its fields."""
 _LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
-# Bytes of poses per chunk, because processing is several times faster inside the processor's cache.
+# Bytes of poses per chunk. A chunk fits into the processor's cache, where work is several times
+# faster.
 _CHUNK_BYTES = 8 << 20
 
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character, and unique names for all parts of its poses."""
+    """A compiled character, and unique names of its joints, channels, maps and controls."""
 
     name: str
     rig: risorius.Rig
@@ -56,12 +57,15 @@ class Face:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of the numbers of a joint: translation, rotation, scale."""
+        """Short names of a joint's components: translation (tx, ty, tz), rotation and scale."""
         turn = ("qx", "qy", "qz", "qw") if self.rig.rotation == "quaternion" else ("rx", "ry", "rz")
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """The rest values of a part: float32[joints, columns], for other parts float32[count]."""
+        """The rest values of a part of the pose, one of PARTS.
+
+        The part "joints" has float32[joints, columns]; the other parts have float32[count].
+        """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
             return np.tile(joint, (self.rig.joint_count, 1))
@@ -108,7 +112,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index; repeated names get the index.
+    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
+    a name that an earlier element has, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()
@@ -130,7 +135,7 @@ def prepared(
 
     Args:
         clip: any clip.
-        face: the character, for with_head_turns.
+        face: the character whose neck and head joints receive the rotations.
         rate: resample to this number of frames per second; None: do not resample.
         frames: first and end (exclusive), counted from 0 after resampling; frames beyond the clip's
             end are ignored.
@@ -157,16 +162,16 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES. The joints of the neck or the head
-    get no curves if the clip has no angles of the neck or the head. A joint gets none either if
-    the clip already has a curve of one of its raw controls.
+    The rotations are computed from the clip's curves of ANGLES. Neck joints get no curves
+    if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
+    gets no curves if the clip already has a curve of one of its raw controls.
 
     Args:
         clip: a clip with or without curves of ANGLES.
         face: the character.
 
     Returns:
-        The clip with additional curves for each such joint, one per component of its quaternion.
+        The clip with additional curves: one per quaternion component of each rotated joint.
     """
     raw = face.rig.raw_control_names
     given = dict(zip(clip.names, clip.curves, strict=True))
@@ -192,10 +197,7 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of the clip's curves that move nothing.
-
-    The face has no such raw control.
-    """
+    """The names of curves of `clip` that have no effect, because `face` has no such raw control."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))
@@ -203,7 +205,7 @@ def missing(clip: risorius.Clip, face: Face) -> list[str]:
 
 
 def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
-    """The poses of all frames, in chunks whose size depends only on the character.
+    """The poses of all frames, in chunks whose size depends on the character and `threads`.
 
     Controls without a curve are at rest. Each frame equals Rig.evaluate of its controls, bit for
     bit.

@@ -13,7 +13,7 @@ from .face import Chunk, Face, Floats, missing
 
 
 class Measure:
-    """Finds the largest joint motion and the active correctives, chunk by chunk."""
+    """Finds a clip's largest joint translation and active correctives, chunk by chunk."""
 
     def __init__(self, clip: risorius.Clip, face: Face) -> None:
         self.clip, self.face = clip, face
@@ -73,7 +73,7 @@ class Measure:
 
 
 def _ranges(names: list[str], curves: Floats) -> dict[str, tuple[float, float]]:
-    """Smallest and largest finite number of each curve, 0 if it has none."""
+    """Smallest and largest finite number of each curve; 0 and 0 if no number is finite."""
     finite = np.where(np.isfinite(curves), curves, np.float32(np.nan))
     low = np.nan_to_num(np.fmin.reduce(finite, axis=1))
     high = np.nan_to_num(np.fmax.reduce(finite, axis=1))

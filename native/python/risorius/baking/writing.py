@@ -24,10 +24,10 @@ _SPOOL_BYTES = 32 << 20
 
 
 class NpzWriter:
-    """Writes an .npz: the largest array directly, the others after it.
+    """Writes an .npz of poses chunk by chunk.
 
-    A zip archive is written one member at a time. So the largest array is written at once, and the
-    others are kept in memory or, if large, in temporary files.
+    A zip archive is written one member at a time. So only the largest array is written directly.
+    The others wait in memory or, if large, in temporary files, and are written after it.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class NpzWriter:
         self._parts = sorted(parts, key=lambda part: -face.rest(part).size)
         self._waiting: dict[str, IO[bytes]] = {}
         for part in self._parts[1:]:
-            # The stack closes the file, even after an exception.
+            # The exit stack closes the temporary file, even after an exception.
             spool = tempfile.SpooledTemporaryFile(_SPOOL_BYTES)  # noqa: SIM115
             self._waiting[part] = self._stack.enter_context(spool)
         self._shapes = {part: (frames, *face.rest(part).shape) for part in self._parts}
@@ -70,7 +70,7 @@ class NpzWriter:
             self._stack.close()
 
     def _member(self, part: str) -> IO[bytes]:
-        """Open the member for the array of a part, and write its header."""
+        """Open the zip member for the array of a part, and write the header of the array."""
         member = self._open(FIELDS[part])
         about = {"descr": "<f4", "fortran_order": False, "shape": self._shapes[part]}
         np.lib.format.write_array_header_1_0(member, about)  # type: ignore[no-untyped-call]
@@ -95,7 +95,7 @@ class NpzWriter:
                 raise
 
     def finish(self) -> None:
-        """Write the other parts, and the arrays that do not depend on frames."""
+        """Write the parts that waited in temporary files, then the arrays without frames."""
         if self._first is not None:
             self._first.close()
             self._first = None
@@ -153,7 +153,7 @@ def about(
 
 
 def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> dict[str, Any]:
-    """Find the numbers of each part that leave their rest value in some frame.
+    """Find the components of each pose part that leave their rest value in some frame.
 
     Args:
         face: the character, from `load_face`.
@@ -161,7 +161,7 @@ def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> di
         parts: parts to examine, from PARTS.
 
     Returns:
-        Part -> int64[moving], flat indices of these numbers.
+        Part -> int64[moving], flat indices of these components.
     """
     rests = {part: face.rest(part) for part in parts}
     moving = {part: np.zeros(rest.shape, bool) for part, rest in rests.items()}
@@ -172,7 +172,7 @@ def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> di
 
 
 class CsvWriter:
-    """Writes a row per frame: its time and the moving numbers.
+    """Writes a row per frame: the frame's time and the components that `find_moving` returned.
 
     Args:
         file: binary file, open for writing.
@@ -206,12 +206,12 @@ class CsvWriter:
             yield f"{float(self._times[chunk.first + i])!r}{self._row % tuple(row)}"
 
     def finish(self) -> None:
-        """Detach the file after everything is written."""
+        """Detach the text writer from the binary file, which stays open."""
         self._text.detach()
 
 
 def _headings(face: Face, part: str, indices: npt.NDArray[np.intp]) -> list[str]:
-    """E.g. joint:FACIAL_C_Jaw.rx, shape:jaw_open, map:wrinkle, control:CTRL_expressions.jawOpen."""
+    """Column headings, e.g. joint:FACIAL_C_Jaw.rx, shape:jaw_open, map:wrinkle, control:jawOpen."""
     names = face.names[part]
     if part != "joints":
         return [f"{part[:-1]}:{names[i]}" for i in indices]

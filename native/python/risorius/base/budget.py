@@ -73,12 +73,12 @@ class Budget:
 
 
 def _amount(count: float) -> str:
-    """The amount as text; limited, because a file may contain integers beyond float."""
+    """The amount as text, capped at 2**80, because larger integers of a file may overflow float."""
     return f"{min(count, 1 << 80) if isinstance(count, int) else count:,.0f}"
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
-    """`left` after `count` is taken. Raises: BudgetError: less than `count` is left."""
+    """What remains of `left` after `count` is taken. Raises: BudgetError: `left` is too small."""
     if not count <= left:  # True for NaN too
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "

@@ -48,7 +48,8 @@ class OneEuro:
         cutoff: cutoff frequency at rest in Hz; may be changed between frames.
         beta: growth of the cutoff: Hz per (unit per second) of speed.
         speed_cutoff: cutoff frequency for the speed in Hz.
-        longest_gap: seconds; after a longer gap, or a step back in time, the filter restarts.
+        longest_gap: seconds between two frames; after a longer gap, or a step back in time, the
+            filter restarts.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ _SHOWN = 40  # most characters of a value in an error message
 class GivenError(ArgumentError):
     """A value of the wrong type or range; the sentence names the expected value.
 
-    It names no file and no field; the reader adds them.
+    The sentence names no file and no field; the code that reads the file adds them.
     """
 
     code = "given"

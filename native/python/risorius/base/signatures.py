@@ -38,7 +38,8 @@ _WORD = Kind("word", "a document (Word)", "save it as plain text")
 _OFFICE = Kind("office", "a document of an office program", "save it as CSV or as plain text")
 _ZIP = Kind("zip", "an archive (ZIP)", "unpack it first")
 _UNREAL = Kind("unreal", "an asset of Unreal", "export it there, as FBX, JSON or DNA")
-# First bytes, their offset, and the kind of the file. None of them is text in UTF-8 or UTF-16.
+# Bytes that identify a file, their offset in it, and its kind. No text file in UTF-8 or UTF-16 has
+# such bytes there.
 _BYTES = (
     (b"WAVE", 8, SOUND),
     (b"AIFF", 8, SOUND),
@@ -151,10 +152,10 @@ def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
 
 
 def named(error: RisoriusError, source: str | os.PathLike[str] | bytes) -> RisoriusError:
-    """An error about a file; if its bytes show another kind of file, the error names this kind.
+    """Add to a parse error the kind of file that was given, e.g. "it is a web page", if known.
 
     Args:
-        error: error of the native module; its text ends with its place in brackets.
+        error: error of the native module; its text may end with the faulty field in brackets.
         source: path or bytes of the file.
     """
     kind = kind_of(ends_of(source))

@@ -18,7 +18,7 @@ _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}"
 
 
 class TomlError(RisoriusError):
-    """Invalid or too large TOML; the text has the line if it is known."""
+    """Invalid or too large TOML; the error's text names the line if it is known."""
 
     code = "toml"
 
@@ -57,7 +57,7 @@ def text_of(path: str | os.PathLike[str]) -> str:
     """The text of a TOML file, with or without a byte order mark.
 
     Raises:
-        TomlError: the file is not UTF-8; its name is not in the text.
+        TomlError: the file is not UTF-8; the error's text does not name the file.
         ReadingError: the file is larger than MOST_BYTES, or a device.
         OSError: the file cannot be read.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plays many clips on many characters: evaluates, bakes and summarises them.
+"""Evaluates many clips on many characters, writes the poses, and summarises the results.
 
 JOBS.toml --read_jobs--> jobs --pool or cluster--> outcomes --> files, journal, summary
 """

@@ -22,13 +22,14 @@ class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
     Every worker must find the files under the same paths and have this version of Risorius. If a
-    worker dies, its job goes to another one; Dask gives it up after more than
-    `distributed.scheduler.allowed-failures` (3) deaths. Dask may blame other jobs of a dead worker
-    as well. So a job that was given up is tried once more alone.
+    worker dies, another worker runs its job; Dask gives the job up after more than
+    `distributed.scheduler.allowed-failures` (3) dead workers. Dask also counts the death against
+    other jobs of that worker. So each job that Dask gave up is tried once more, alone.
 
     Args:
         address: e.g. tcp://10.0.0.5:8786.
-        work: function that runs a job; workers must be able to import it, or a partial of one.
+        work: function that runs a job: one that the workers can import, or a functools.partial of
+            such a function.
 
     Raises:
         PoolError: the package `distributed` is missing, or no scheduler answers.
@@ -39,7 +40,7 @@ class Cluster:
             self._dask: Any = importlib.import_module("distributed")
         except ImportError as error:
             raise PoolError(
-                "--scheduler needs the package distributed: pip install 'risorius[cluster]'"
+                "--scheduler needs the package distributed: pip install distributed"
             ) from error
         self._work, self.address = work, address
         # Dask logs lost connections with tracebacks; we report them in one sentence.
@@ -85,7 +86,7 @@ class Cluster:
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs, with a few more submitted than the workers can run."""
+        """Run jobs. A few more are submitted than the workers can run, so that no worker waits."""
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:

@@ -98,7 +98,7 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """The value of a key; `default` replaces a missing value, None makes it required."""
+        """The value of a key; a missing key gives `default`, or an error if `default` is None."""
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -125,7 +125,7 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """The chosen ones of `choices`, in the order of `choices`."""
+        """The elements of `choices` that the table names, in the order of `choices`."""
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -143,7 +143,7 @@ def _all_of(value: Any, kind: type) -> bool:
 
 
 def read_jobs(source: Path) -> Plan:
-    """Read a JOBS.toml and find its files.
+    """Read a JOBS.toml and find the clips and characters that it names.
 
     Raises:
         JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing, or
@@ -239,7 +239,10 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files that match the patterns, sorted by path. Raises: JobsError: one has no match."""
+    """The files that match the patterns in `key`. Raises: JobsError: a pattern has no match.
+
+    The files are sorted by path.
+    """
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):
         root = _root(base, pattern)
@@ -264,7 +267,7 @@ def _glob(base: Path, pattern: str) -> list[Path]:
 
 
 def _root(base: Path, pattern: str) -> Path:
-    """The folder of a pattern, up to its first part with a wildcard."""
+    """The folder of a pattern: the path before the first path part that has a wildcard."""
     root = base
     for part in Path(pattern).parts[:-1]:
         if glob.has_magic(part):
@@ -274,7 +277,10 @@ def _root(base: Path, pattern: str) -> Path:
 
 
 def _check_pattern(table: _Table, pattern: str) -> None:
-    """Accept only plain field names, because a format string could access attributes of objects."""
+    """Check the pattern of job names: only plain fields, such as {clip}, are allowed.
+
+    Other format strings could access attributes of objects.
+    """
     expected = f"a pattern of {', '.join(f'{{{field}}}' for field in FIELDS)} was expected, "
     try:
         pieces = list(string.Formatter().parse(pattern))
@@ -286,7 +292,7 @@ def _check_pattern(table: _Table, pattern: str) -> None:
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
-    """The name of a job. Names of files and folders are made safe and without separators."""
+    """The name of a job. The clip and character names become valid file names on every system."""
     return pattern.format(
         clip=file_name(clip.path.stem),
         character=file_name(character.path.stem),
@@ -301,7 +307,7 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. Empty parts of the name are dropped."""
+    """A path below the output folder. Empty path parts, as in "a//b", are dropped."""
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:

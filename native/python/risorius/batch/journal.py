@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """The line of a finished job: stamp and files to compare, and its place in the journal."""
+    """A finished job: hash of inputs; output files; offset and length in bytes of its line."""
 
     stamp: str
     files: list[list[Any]]
@@ -31,8 +31,8 @@ class Journal:
     """A file of JSON lines next to the outputs.
 
     A job counts as finished if its inputs have not changed and its files still have the recorded
-    size and time. The facts are read from the file when needed, because the control ranges of
-    thousands of jobs would take too much memory.
+    size and time. The measured facts of a job are read from the file when needed, because the
+    control ranges of thousands of jobs would take too much memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -138,7 +138,10 @@ def _line(record: dict[str, Any]) -> bytes:
 
 
 def _files(job: Job) -> list[list[Any]]:
-    """Kind, size and modification time of each output. Raises: OSError: an output is missing."""
+    """Kind ("npz", "csv" or "rzc"), size and modification time of each output file of a job.
+
+    Raises: OSError: an output file is missing.
+    """
     out: list[list[Any]] = []
     for kind, path in job.outputs:
         about = path.stat()

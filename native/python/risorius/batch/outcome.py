@@ -15,7 +15,7 @@ class Outcome:
         name: name of the job.
         error: the reason of the failure; "" if it succeeded.
         stamp: hash of the job's inputs, see stamp().
-        facts: facts of Measure, and the seconds for reading, evaluating and writing.
+        facts: results of baking.Measure, and the seconds for reading, evaluating and writing.
         attempts: number of workers that ran the job.
     """
 

@@ -85,7 +85,10 @@ class _Worker:
             self.connection.send(job)
 
     def end(self) -> str:
-        """Wait for the end of a dead process. Returns its signal or exit code as text."""
+        """Collect the exit status of a process that has died, and close the connection to it.
+
+        Returns: the signal or exit code as text.
+        """
         self.process.join()
         self.connection.close()
         code = self.process.exitcode or 0
@@ -97,7 +100,7 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Waiting jobs by face and clip, so that a worker can keep its files for its next job."""
+    """Waiting jobs, grouped so that a worker's next job can reuse its loaded face and clip."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}
@@ -111,7 +114,10 @@ class _Queue:
         self._lengths[_face_of(job)] += 1
 
     def take(self, last: Job | None) -> Job | None:
-        """Remove and return the next job for a worker, if possible of its last face and clip."""
+        """Remove and return a worker's next job, or None if no job waits.
+
+        Jobs with the same face as `last` come first, and among them jobs with its clip.
+        """
         face = _face_of(last) if last else None
         if face is None or not self._lengths[face]:
             face, length = max(self._lengths.items(), key=lambda item: item[1])
@@ -131,7 +137,8 @@ class Pool:
     """Runs jobs in processes of this machine.
 
     Args:
-        work: function that runs a job; it can be imported, or is a partial of one that can.
+        work: function that runs a job: one that can be imported, or a functools.partial of such a
+            function.
         workers: number of processes.
         attempts: number of workers that a job may kill before it counts as failed.
     """

@@ -61,7 +61,7 @@ def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
     Args:
         plan: all jobs.
         journal: journal of earlier runs.
-        report: report that receives the finished jobs.
+        report: report to which the jobs that an earlier run finished are added.
     """
     out = []
     for job in plan.jobs:

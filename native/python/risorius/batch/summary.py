@@ -54,7 +54,7 @@ def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal:
 
 
 def write(plan: Plan, table: Callable[[], Rows]) -> None:
-    """Write the summary in each requested form, row by row.
+    """Write the summary in each requested file format, row by row.
 
     Args:
         plan: plan with the paths of the summary.

@@ -29,7 +29,7 @@ _Value = TypeVar("_Value")
 
 
 class Kept(Generic[_Value]):
-    """A cache of the last few objects made from files; keys depend on the files' content.
+    """A cache of the last few objects made from files; cache keys depend on the files' content.
 
     Thread-safe, because a cluster's worker runs several jobs at the same time. An object that two
     jobs need at the same time is made once.
@@ -41,7 +41,7 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; if the cache lacks it, it is made while other threads wait.
+        """The value of a key; a value that the cache lacks is made while other threads wait.
 
         Args:
             key: key of the value; hashable.

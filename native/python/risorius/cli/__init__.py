@@ -42,10 +42,10 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command. Returns the exit code.
 
-    Args: arguments  words of the command line; None for those of the process.
+    Args: arguments  words of the command line; None: the words with which the program was started.
     """
     for stream in (sys.stdout, sys.stderr):
-        # Names may contain text that a terminal cannot show.
+        # Characters that the terminal's encoding lacks are printed as escapes, not as an error.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     # The calculation modules check the range of values themselves; NumPy's warnings would name a
@@ -80,13 +80,13 @@ def _say(text: str, code: int) -> int:
 
 
 def _drop_output() -> None:
-    """Discard buffered output, so that no second error follows when the interpreter ends."""
+    """Discard buffered output, because flushing it at exit would fail and print a second error."""
     with contextlib.suppress(OSError, ValueError):  # sys.stdout may have no file descriptor
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that raises CommandLineError for invalid option values, for `main`."""
+    """A parser that raises CommandLineError for invalid option values; `main` prints the error."""
 
     def error(self, message: str) -> NoReturn:
         if message.startswith("argument "):
@@ -126,7 +126,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     for command in commands:
         command.add_parser(subparsers)
     args, rest = parser.parse_known_args(arguments)
-    # argparse ends a list of operands at the first option, as in FILE --json NAME=1.
+    # argparse ends a list of operands at the first option, so NAME=1 after --json is added here.
     operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
     if any(text.startswith("-") for text in rest) or (rest and operands is None):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")

@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Finding:
-    """A finding for the error that stopped reading, without the file's name."""
+    """A finding for the error that stopped reading; its text does not repeat the file's name."""
     text = str(error).removeprefix(f"{name}: ")
     where, offset = getattr(error, "where", ""), getattr(error, "offset", None)
     text = text.removesuffix(f" (byte {offset})").removesuffix(f" [{where}]")
@@ -58,7 +58,7 @@ def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """Check a DNA file. Returns its definition, or None after an error, and the findings."""
+    """Check a DNA file. Returns its Dna, or None after an error, and the findings."""
     try:
         found = risorius.check(name)
         if any(finding.is_error for finding in found):
@@ -70,7 +70,7 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
-    """Warnings about raw controls for rotations of joints that no GUI control or solver sets."""
+    """Warnings about raw controls that rotate joints but that no GUI control or solver sets."""
     where = "definition.raw_control_names"
     return [
         risorius.Finding(False, "invalid_value", where, None, text)
@@ -118,7 +118,7 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each valid file whether it can be mixed with the first valid one."""
+    """Add to each valid file's results whether its face can be mixed with the first valid one."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

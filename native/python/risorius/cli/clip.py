@@ -60,7 +60,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_meaning(parser: argparse.ArgumentParser) -> None:
-    """Add the options that define the meaning of the values of IN."""
+    """Add the options for the values of the input file: mapping, rig, ranges and units."""
     parser.add_argument("--mapping", metavar="M", help=_MAPPING)
     parser.add_argument(
         "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
@@ -92,7 +92,7 @@ def _add_meaning(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_steps(parser: argparse.ArgumentParser) -> None:
-    """Add the options that change the clip, in the order of their application, and the report."""
+    """Add --report and the options that change the clip, in the order of their application."""
     parser.add_argument(
         "--neutral",
         metavar="A[:B]",
@@ -197,7 +197,7 @@ def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def load(args: argparse.Namespace) -> importing.Imported:
-    """Read IN; the curves of a .rzc file are raw controls already."""
+    """Read the input file. The curves of a .rzc file are raw controls and need no mapping."""
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(

@@ -144,12 +144,12 @@ def _writable(minor: int) -> int:
 
 
 def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
-    """The version to write without an option; it is printed if it differs from the source's.
+    """The DNA version to write if no option gives one; a change of version is printed.
 
     Args:
         source: the file that was read.
         result: the face to write.
-        turned: True: axes or units were changed.
+        turned: True: the face was converted to other axes, units or rotation conventions.
     """
     minor = _writable(result.version)
     signed = result.rotation_sequence != "xyz" or -1 in result.rotation_signs
@@ -194,7 +194,7 @@ def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
 
     Args:
         dna: the face.
-        indent: spaces per level, 0 or more; or None.
+        indent: number of spaces per nesting level, 0 or more; or None.
     """
     text = dna.to_json()
     if indent is not None and indent != 1:

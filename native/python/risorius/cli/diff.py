@@ -18,7 +18,7 @@ _LINES = 8  # most lines per field without --all
 def same_but_for(a: str, b: str) -> Difference | None:
     """The first byte that differs in two DNA files with equal content, or None.
 
-    Such bytes are in parts that no layer reads.
+    Files with equal content can differ only in bytes that Risorius does not read.
 
     Args:
         a, b: names of the files.

@@ -151,7 +151,10 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """Parse --threshold: one number, or MM,DEGREES,SCALE.
+    """Parse --threshold: the largest effect of a joint matrix coefficient that counts as small.
+
+    One number holds for all kinds of joint attributes. Three numbers hold for translation in mm,
+    rotation in degrees and scale in per cent.
 
     Raises:
         CommandLineError: not one or three numbers from 0.
@@ -181,8 +184,8 @@ def complain(args: argparse.Namespace) -> None:
 def read_regions(name: str) -> edit.Regions:
     """Read the joint names or indices of each region from JSON or TOML.
 
-    Forms: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a single key "regions", or without
-    names [["FACIAL_L_Eye", ...], ...].
+    The file contains {"eye": ["FACIAL_L_Eye", ...], ...}, or this table as the value of a key
+    "regions", or a list of regions without names: [["FACIAL_L_Eye", ...], ...].
 
     Raises:
         InputError: not JSON or TOML, or a different structure.
@@ -416,6 +419,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """A control's name without prefix; of a corrective's controls, the first four."""
+    """A control's name without prefix; for a corrective, the names of its first four controls."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

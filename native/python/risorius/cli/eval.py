@@ -74,7 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
-    """Parse NAME=VALUE texts; stderr shows the full names of abbreviated ones.
+    """Parse NAME=VALUE texts; full names of abbreviated controls are printed to stderr.
 
     Args:
         texts: the texts as typed; for a repeated name the last value is used.
@@ -111,7 +111,7 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """Convert GUI controls to raw controls, float32[raw controls].
+    """Convert values of GUI controls to values of raw controls, float32[raw controls].
 
     Raw controls that no GUI control drives keep their initial value.
 
@@ -132,8 +132,8 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
 
     Args:
         values: float32[n].
-        names: names of the values; values without a name are called "control" and their number.
-        first: control number of the first value.
+        names: names of the values; a value without a name is called "control" and its index.
+        first: index of the control that has the first value.
     """
     return [
         {
@@ -199,7 +199,7 @@ def page(facts: dict[str, Any]) -> str:
         f"\njoints, as difference from the neutral pose ({facts['translation_unit']}, "
         f"{facts['rotation_unit']}; sx sy sz are added to 1)"
     )
-    # Rounding errors of float32 sums are not shown; --json has every digit.
+    # Motions as small as the rounding of float32 sums are not printed; --json has all digits.
     joints = [row for row in facts["joints"] if any(_moved(row[a]) for a in ATTRIBUTES)]
     if not joints:
         return "\n".join([*out, "  none"])
@@ -211,7 +211,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Refuse options of poses with a clip, and options of clips without -o.
+    """Refuse options for printing one pose if -o is given, and options for clips if -o is missing.
 
     Raises: CommandLineError.
     """
@@ -235,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
 def run_pose(args: argparse.Namespace) -> int:
     """Print the pose for the control values of the command line.
 
-    Raises: CommandLineError: the arguments do not fit the file.
+    Raises: CommandLineError: the face lacks the LOD or a control, or a value is no number.
     """
     dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)

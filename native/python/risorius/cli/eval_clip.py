@@ -74,9 +74,9 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Sort the names of parts in the order of PARTS.
+    """Check the names of the pose parts that are to be written, and sort them as in PARTS.
 
-    Raises: ValueError: a part is unknown or repeated, or there is none.
+    Raises: ValueError: a part is unknown or repeated, or no part is named.
     """
     for text in texts:
         if text not in PARTS:

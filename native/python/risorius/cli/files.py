@@ -235,7 +235,7 @@ def read(name: str, kind: str) -> risorius.Dna:
     try:
         return risorius.load(read_bytes(name) if name == "-" else name)
     except risorius.DnaError as error:
-        # the error of load(path) contains the name of the file
+        # The error already contains the name of a file, but not of the standard input.
         raise InputError(f"{label(name)}: {error}" if name == "-" else str(error)) from error
 
 

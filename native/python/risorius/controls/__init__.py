@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Names of a face's controls: regions, sides, ARKit units, names of other programs."""
+"""Translates names of controls: regions, sides, ARKit units, and names in other programs."""

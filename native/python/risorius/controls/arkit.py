@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The 52 ARKit units as raw controls, and their orders in protocols; read from arkit.toml."""
+"""Reads the raw controls of the 52 ARKit units, and their order in protocols, from arkit.toml."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def mapping() -> dict[str, dict[str, float]]:
 
 @cache
 def shares() -> dict[str, str]:
-    """Raw control that is a share of another control -> that control.
+    """Raw control whose value is a fraction of another control -> the other control.
 
     See `shares.share_of`.
     """

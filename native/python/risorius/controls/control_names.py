@@ -36,10 +36,11 @@ def last_part(name: str) -> str:
 def find_controls(text: str, names: Sequence[str]) -> Meaning:
     """Find the controls that a typed name, or a part of a name, means.
 
-    Kinds of candidates, in this order: the name itself; the part after its last dot; an ARKit unit,
-    if the file has its controls; any part of a name, then of an ARKit unit, in any case; a name of
-    another program. Two names that differ only in their side (..L and ..R, ..Left and ..Right) are
-    one meaning. The first kind with a match decides, and must have exactly one meaning.
+    The text is compared with, in this order: full names; the parts of names after the last dot;
+    ARKit units whose controls the file has; any part of a name, then of an ARKit unit; names in
+    other programs. Letter case counts for full names only. Two names that differ only in their
+    side (..L and ..R, ..Left and ..Right) are one meaning. The first comparison with a match
+    decides, and must give exactly one meaning.
 
     Args:
         text: text that a user typed.
@@ -64,7 +65,7 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
 
 def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, float]]]:
-    """The meanings of each kind of match, the best kind first."""
+    """Yields, for each kind of match, the meanings that match the text; the best kind is first."""
     known = set(names)
     units = {u: row for u, row in arkit.mapping().items() if known.issuperset(row)}
     wanted = text.lower()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face regions of controls, from the beginnings of their names in regions.toml."""
+"""Finds the face region of a control from the beginning of its name, listed in regions.toml."""
 
 from __future__ import annotations
 

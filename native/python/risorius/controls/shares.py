@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Converts between an amount and a share of another control, such as jawOpen.
+"""Converts a control's value to a fraction of another control's value, and back.
 
-Example: lips that stay together while the jaw opens.
+Example: mouthClose, which keeps the lips together, is a fraction of jawOpen.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
-# Below this jaw opening the share is the amount divided by LEAST; otherwise noise of a face at rest
-# would make the share jump between 0 and 1. The error is at most a quarter of LEAST, 0.2 mm between
-# the lips.
+# Smaller values of the other control (such as jawOpen) count as LEAST in the division; otherwise
+# noise of a face at rest would make the fraction jump between 0 and 1. The error is at most a
+# quarter of LEAST, 0.2 mm between the lips.
 LEAST = 0.02
 
 

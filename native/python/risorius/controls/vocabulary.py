@@ -8,12 +8,11 @@ that they may have), `matching = "exact"` if letter case counts, `controls` (nam
 controls), `same` (names with one meaning) and `names`. The meaning of a name is
 
 - a raw control without prefix, or a list of them. "*" stands for both sides and "**" for the four
-lip
-  quarters. In a name, "*" stands for a side, L or Left, which its meaning then has too;
+  lip quarters. If the name contains "*", it stands for a side, L or Left, in name and meaning;
 - "=jawOpen": an ARKit unit;
-- "@aa": an expression of the library; its controls in a list may belong to other names already;
-- a table of shares of controls or units: a shape of the whole face, with its expression's name;
-- []: nothing that controls of a face do.
+- "@aa": an expression of the library. In a list, it applies if other names have the controls;
+- a table {control, unit or "@expression" = weight}: a shape of the whole face;
+- []: a name without meaning, such as Neutral.
 """
 
 from __future__ import annotations
@@ -63,9 +62,7 @@ class Meaning:
 
 @cache
 def loose_name(name: str) -> str:
-    """A name in lower case without separators, with its side as
-
-    l or |r at the end.
+    """A name in lower case without separators; its side becomes |l or |r at the end.
 
     eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left give the same name.
     """
@@ -85,7 +82,7 @@ class Vocabulary:
     """The names that a program or protocol uses.
 
     Attributes:
-        name, title, description: key of the vocabulary, and texts for display.
+        name, title, description: identifier of the vocabulary, and texts for display.
         meanings: name in its usual spelling -> Meaning.
         is_loose: True: letter case, "_" and the difference of Left and L at the end are ignored.
     """
@@ -147,8 +144,8 @@ class Vocabulary:
 def parts_of(name: str) -> list[str]:
     """Forms of a name to look up: as given, and without the name of a mesh or figure before it.
 
-    That name ends at the last dot, colon or bar, or at the first double underscore. The number of a
-    copy is removed first.
+    The name of a mesh or figure ends at the last dot, colon or bar, or at the first double
+    underscore. Blender's number of a copy, such as .001, is removed first.
     """
     name = _COPY.sub("", name)
     after = re.split(r"[.:|]", name)[-1] if not name.startswith("CTRL_") else name
@@ -192,7 +189,7 @@ def _found(name: str, order: Sequence[str], *, loosely: bool) -> Meaning | None:
 
 
 def known(given: Iterable[str]) -> dict[str, int]:
-    """Vocabulary -> number of the given names that it contains; without vocabularies with none."""
+    """Vocabulary -> number of the given names that it contains, if it contains any."""
     given = list(given)
     counts = {v.name: sum(v.spelled(n) is not None for n in given) for v in _all().values()}
     return {name: count for name, count in counts.items() if count}
@@ -221,7 +218,7 @@ def _all() -> dict[str, Vocabulary]:
 
 
 def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A row unchanged, or one row for each side if its name contains a *."""
+    """A row of a vocabulary table, or one row for each side if the name contains a *."""
     if "*" not in name:
         yield name, value
         return
@@ -258,7 +255,8 @@ def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
 
 
 def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
-    """The controls of one part of a meaning; its units are added to `units`."""
+    """Control -> weight for one entry of a meaning. ARKit units of the entry are added to
+    `units`."""
     if key.startswith("@"):
         return {}
     if not key.startswith("="):

@@ -52,8 +52,8 @@ _SYSTEM = {
 def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[Difference]:
     """All differences of two faces; an empty list means that both are equal.
 
-    If axes or units differ, B is converted to A's, up to rounding. If B cannot be converted, this
-    is reported and the numbers are compared unconverted.
+    If axes or units differ, B is converted to the axes and units of A, with rounding errors. If B
+    cannot be converted, this is reported and the numbers are compared unconverted.
 
     Args:
         a: the face before.
@@ -78,7 +78,7 @@ def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[
 def _in_system(
     a: risorius.Dna, b: risorius.Dna, report: Report
 ) -> tuple[risorius.Dna, Report, bool]:
-    """B in A's axes and units, its report, and whether the comparison is exact."""
+    """B converted to A's axes and units, the report, and whether the comparison is bit for bit."""
     target = {
         argument: getattr(a, name)
         for argument, name in _SYSTEM.items()
@@ -98,7 +98,7 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether both files are equal, to find differences that the modules of the layers missed."""
+    """Whether both faces give equal bytes; else there may be differences that no module found."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

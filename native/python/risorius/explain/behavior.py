@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Explains active controls, correctives, networks, twist and swing setups, channels and maps."""
+"""Explains active controls, correctives, networks, twist and swing setups, blend shape channels and
+animated maps."""
 
 from __future__ import annotations
 
@@ -58,7 +59,7 @@ def explain_raw(
 
     Args:
         dna: the face.
-        raw: float64[raw controls].
+        raw: float64[raw controls], values in the pose.
         rest: float64[raw controls], values at rest.
         gui: float64[GUI controls]; None if the raw controls were set directly.
         names: names of the controls.
@@ -89,7 +90,8 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads are at rest there.
+    """Controls that something reads at a LOD; correctives that nothing reads are at rest at this
+    LOD.
 
     Args:
         dna: the face.
@@ -117,7 +119,8 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives, inactive ones that lack only one factor, and ones that nothing reads.
+    """Active correctives, inactive ones of which only one control is 0, and ones that nothing
+    reads.
 
     Args:
         dna: the face.

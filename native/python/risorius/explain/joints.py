@@ -15,7 +15,7 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Key of a contribution: index of a control, or name of a source that combines several controls.
+# Source of a contribution: index of a control, or name of a setup that combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""
@@ -26,9 +26,10 @@ def contributions(
 ) -> Contributions:
     """Compute the contribution of each control to each joint; they sum to the joint's pose.
 
-    Rows of joint groups are sums over controls. Products of quaternions are not: there a control's
-    contribution is the change of the Euler angles when its quaternion is multiplied, in the order
-    of the columns. A twist, a swing, or a quaternion of a network is one contribution.
+    Most joint values are sums over controls. But the rotation of a joint with quaternions is a
+    product, so a control's contribution is the change of the Euler angles when its quaternion is
+    multiplied, in the order of the columns. A twist, a swing, or a quaternion of a network is one
+    contribution.
 
     Args:
         dna: the face.
@@ -56,7 +57,7 @@ def contributions(
 
 
 def _replace_rotation(out: Contributions, joint: int, parts: dict[Key, Doubles]) -> None:
-    """Replace all contributions to the rotation of a joint by these parts."""
+    """Replace all contributions to the rotation of a joint by the contributions in `parts`."""
     mine = out.setdefault(joint, {})
     for v in mine.values():
         v[3:6] = 0

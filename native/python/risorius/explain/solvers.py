@@ -19,7 +19,7 @@ _METHODS = ("euclidean", "quaternion", "swing angle", "twist angle")
 def explain_solvers(
     dna: risorius.Dna, rig: risorius.Rig, controls: Doubles, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """The solvers of a LOD with their poses; the pose with the greatest weight is first.
+    """The solvers of a LOD, each with its poses; the pose with the greatest weight is first.
 
     Args:
         dna: the face.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: named poses of the standard raw controls in data files that users can edit.
+"""Reads expressions (named poses of the standard raw controls) from files that users can edit.
 
-The files in this folder contain six emotions, fifteen visemes and more. Any file of the same form
+The files in this folder contain six emotions, fifteen visemes and more. Any file of the same format
 can be loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the
-four lip quarters. A file may state the version of its form: `format = 1`.
+four lip quarters. A file may state the version of its format: `format = 1`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Expression:
 
 
 class Lack(NamedTuple):
-    """The controls of an expression that a rig lacks."""
+    """The controls that an expression uses and that a rig lacks."""
 
     missing: tuple[str, ...]
     """Controls that the rig lacks."""
@@ -70,8 +70,9 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
             in the order of FILES.
 
     Raises:
-        ValueError: the text has the file, the expression, the found and the expected value.
-        OSError.
+        ValueError: an invalid file; the message names the file, the expression, the value found and
+            the value expected.
+        OSError: a file cannot be read.
     """
     if path is None:
         return dict(_own(EDITION))
@@ -87,7 +88,7 @@ def of_text(text: str) -> dict[str, Expression]:
     """Read expressions from the text of a file.
 
     Raises:
-        ValueError: see load.
+        ValueError: the text is invalid; the message says where.
     """
     return _parsed(toml.parse(text), "an expression")
 
@@ -100,7 +101,7 @@ def get(name: str, edition: int = EDITION) -> Expression:
         edition: 1 for the older, milder expressions; otherwise the current ones.
 
     Raises:
-        ValueError: unknown name; the text lists some names.
+        ValueError: unknown name; the message lists some names.
     """
     own = _own(1 if edition == 1 else EDITION)
     if name not in own:
@@ -149,7 +150,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
 
 
 def text_of(expression: Expression) -> str:
-    """The text of a TOML file with one expression, for load, with the version of its form.
+    """The text of a TOML file with one expression and the version of the format, for load().
 
     Raises:
         ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
@@ -180,7 +181,8 @@ def text_of(expression: Expression) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A string as TOML: JSON escapes the same characters except DEL."""
+    """A TOML string. The JSON encoder escapes the same characters, except DEL, which is
+    replaced."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -194,7 +196,7 @@ def _own(edition: int = EDITION) -> dict[str, Expression]:
 
 
 def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expression]:
-    """Join the expressions of files; of equal names, the later file's expression is used."""
+    """Join the expressions of files. For a name in several files, the last file is used."""
     out: dict[str, Expression] = {}
     file_of: dict[str, str] = {}
     for file, expressions in found.items():

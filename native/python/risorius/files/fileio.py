@@ -34,9 +34,9 @@ _Path = str | os.PathLike[str]
 def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
     """Yield a file to write; it receives its name when it is complete and on disk.
 
-    An existing file stays until then, or for good after an exception. A link stays a link, and the
-    permissions of an existing file stay. Until the file is complete, it has a hidden name in the
-    same folder. Hidden files of killed processes are removed by the next write in that folder.
+    Only then an existing file is replaced; after an exception it stays. A link stays a link, and
+    the permissions of an existing file stay. Until the file is complete, it has a hidden name in
+    the same folder. Hidden files of killed processes are removed by the next write in that folder.
     Devices and pipes receive the bytes directly.
 
     Args:
@@ -103,7 +103,7 @@ def write_text(path: _Path, text: str) -> None:
 
 
 def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
-    """Write several files that belong together; all are complete before one gets its name.
+    """Write several files that belong together; none gets its name before all are complete.
 
     Args:
         files: path -> bytes; the first file receives its name last. Missing folders are made, and
@@ -129,12 +129,12 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
 
 @contextlib.contextmanager
 def staging(path: _Path) -> Iterator[Path]:
-    """Yield a path with the same file name in a hidden folder, for writers of other programs.
+    """Yield a path with the same file name in a hidden folder, for a library that writes by path.
 
     When the block ends, all files in the hidden folder are moved to the folder of `path`, with
-    their subfolders, and the file itself last. Existing files stay until then, or for good after an
-    exception or a kill. The hidden folder of a killed process is removed by the next write in that
-    folder. Paths of devices and pipes are yielded unchanged.
+    their subfolders, and the file itself last. Only then existing files are replaced; after an
+    exception or a kill they stay. The hidden folder of a killed process is removed by the next
+    write in that folder. Paths of devices and pipes are yielded unchanged.
 
     Args:
         path: path of a file in an existing folder.

@@ -100,7 +100,10 @@ def _padded(plane: Floats, step: int) -> Floats:
 
 
 def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
-    """The quantised frequencies in the order of the file, int[units, side * side, 64]."""
+    """int64[units, side * side, 64]: quantised DCT coefficients of each block, in zigzag order.
+
+    A unit of the file is a square of `side` by `side` blocks of 8 by 8 pixels.
+    """
     rows, columns = (size // (8 * side) for size in plane.shape)
     cut = plane.reshape(rows, side, 8, columns, side, 8).transpose(0, 3, 1, 4, 2, 5)
     waves = _COSINES @ cut @ _COSINES.T
@@ -109,7 +112,7 @@ def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
 
 
 def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
-    """The encoded scan, and its Huffman tables as (place, table)."""
+    """The encoded scan, and its Huffman tables as (class and number in one byte, table)."""
     per = [unit.shape[1] for unit in units]
     tokens = []
     for number, unit in enumerate(units):
@@ -131,11 +134,14 @@ def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
 
 
 def _tokens(blocks: Ints, order: Ints, colour: int) -> tuple[Ints, ...]:
-    """For each token: key (its place in the scan), table, symbol, and extra bits.
+    """The tokens of a scan: Huffman-coded symbols that are each followed by extra bits.
+
+    Returns, per token: number that sorts it into the scan, number of its Huffman table, symbol,
+    extra bits, number of extra bits.
 
     Args:
-        blocks: int[n, 64], quantised frequencies.
-        order: place of each block in the scan.
+        blocks: int64[n, 64], quantised DCT coefficients in zigzag order.
+        order: int64[n], index of each block in the scan.
         colour: 0 for brightness, 1 for colour; the tables are 2 * colour and 2 * colour + 1.
     """
     steady = np.diff(blocks[:, 0], prepend=0)
@@ -175,8 +181,8 @@ def _extra(values: Ints, sizes: Ints) -> Ints:
 
 
 def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
-    """Huffman lengths and codes by symbol, and the table as the file stores it."""
-    # The extra symbol 256 receives the code of only ones, which the standard reserves.
+    """Code lengths and Huffman codes by symbol, and the table as the file stores it."""
+    # The standard forbids a code of only ones, so the unused symbol 256 takes it.
     heap = [(int(n), i, [i]) for i, n in enumerate(counts) if n] + [(0, 256, [256])]
     long = np.zeros(257, np.int64)
     heapq.heapify(heap)

@@ -30,7 +30,7 @@ class LockedError(RisoriusError):
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of an existing folder during the context.
 
-    The lock belongs to the operating system and ends with the process in any case. A file
+    The lock belongs to the operating system, which ends it even if the process is killed. A file
     `.risorius.lock` contains the name of the holder.
 
     Raises:
@@ -44,7 +44,8 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # A process that waits for the lock must open a new file of this name; see _open.
+        # The file is removed before the lock ends, so that `_open` of a waiting process notices
+        # it. Windows cannot remove an open file, so there the file is closed first.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
@@ -105,7 +106,8 @@ else:
         except OSError as error:
             if error.errno not in _UNKNOWN:
                 raise
-            # A file system without locks: the process number in the file decides.
+            # This file system has no locks. The lock counts as held if the process named in the
+            # file may still run.
             holder = _holder(handle)
             if _may_live(holder):
                 raise LockedError(_refusal(folder, holder)) from None
@@ -130,7 +132,7 @@ def _about_this_process() -> bytes:
 
 
 def _holder(handle: int) -> dict[str, object]:
-    """The holder's data in the file; empty if the file is empty or unreadable."""
+    """The lock file's data about the process that holds the lock; empty if unreadable."""
     os.lseek(handle, 0, os.SEEK_SET)
     try:
         found = json.loads(os.read(handle, 4096))

@@ -46,15 +46,15 @@ _TRIED = 2000  # pairs of a group: of a larger number, about this many are tried
 
 @dataclass(frozen=True)
 class Combination:
-    """A corrective morph target for two or three targets that are on together, or one half on.
+    """A corrective morph target for two or three active targets, or for one target at half weight.
 
     The driver adds it to the linear sum of its targets.
 
     Attributes:
         name: name of its morph target.
         of: names of the targets that drive it.
-        weight: formula of its weight: PRODUCT, HALF, BELOW or SHARE, or CUBIC to SHUT of refining.
-        error_mm: the largest deviation of the linear sum from the rig without it, in mm.
+        weight: formula of its weight, one of the constants PRODUCT to SHUT of this file.
+        error_mm: largest deviation of the linear sum from the rig in mm, without this combination.
     """
 
     name: str
@@ -67,7 +67,8 @@ class Sums:
     """Compares linear sums of morph targets with the rig.
 
     Attributes:
-        tried: group -> (number of pairs compared, number of pairs in the group).
+        tried: group of targets -> (number of pairs of targets that were compared, number of pairs
+            in the group).
     """
 
     def __init__(self, points: Points, rig: Rig, targets: Sequence[Target]) -> None:
@@ -96,7 +97,7 @@ class Sums:
         return found.astype(np.float32)
 
     def errors(self, group: str) -> list[Combination]:
-        """Combinations for the pairs of a group and its single targets, largest deviation first.
+        """Combinations for pairs of targets and for single targets, largest deviation first.
 
         Args:
             group: name of the group of targets.
@@ -118,16 +119,16 @@ class Sums:
         return sorted(out, key=lambda one: -one.error_mm)
 
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
-        """The largest deviation of a linear sum from the rig, in mm.
+        """The largest deviation of a linear sum of targets from the rig, in mm.
 
         Args:
-            of: names of its targets.
+            of: names of the targets.
             kind: formula of the weight, such as PRODUCT."""
         missing = self._missing(kind, of)
         return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))
 
     def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
-        """float64[P, 3]: rig minus linear sum, with targets on so that the weight is largest."""
+        """float64[P, 3]: rig minus linear sum in metres, at the pose with the largest weight."""
         top = next((t for t in map(self._targets.__getitem__, of) if t.needs), None)
         if top is not None:
             return self._missing_on_top(kind, top, of)
@@ -141,7 +142,13 @@ class Sums:
         return self._points.at(np.clip(raw, -1.0, 1.0)) - linear
 
     def _missing_on_top(self, kind: str, top: Target, of: tuple[str, ...]) -> Doubles:
-        """_missing for a target on top of another: its raw controls take a share of the other's."""
+        """`_missing` for a target such as mouthClose, which takes back a share of another target.
+
+        Args:
+            kind: formula of the weight.
+            top: the target that acts on top of another.
+            of: names of the targets that drive the combination.
+        """
         below, on, share = top.base, np.float32(1.0), 0.5
         if kind == BELOW:
             below = self._rest + np.float32(0.5) * (top.base - self._rest)

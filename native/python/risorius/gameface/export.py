@@ -42,7 +42,7 @@ _COMBINATIONS = 256  # limit of combination targets if the user gives no limit o
 
 @dataclass
 class Made:
-    """The exported files and what to tell the user.
+    """The exported files, and notes for the user.
 
     Attributes:
         files: file name -> bytes, the .glb first.
@@ -56,11 +56,11 @@ class Made:
 
 
 def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
-    """Exports a face as glTF; with wishes.within, adds the JSON and script of its combinations.
+    """Exports a face as glTF; if wishes.within is set, also the JSON and script of combinations.
 
     Args:
         dna: the whole face, with geometry.
-        rig: compiled from it, with rotations as Euler angles.
+        rig: rig compiled from `dna`, with rotations as Euler angles.
         file: path of the face: textures are in its folder, and errors name it.
         out: file name of the .glb; the names of the other files derive from it.
         wishes: export options.
@@ -134,7 +134,7 @@ def _within(
             f"{_megabytes(written)}: ask for fewer shapes{more}"
         )
     size = wishes.textures
-    # a coarser LOD may leave room for larger textures
+    # The textures were reduced before the LOD. The coarser LOD may leave room for larger textures.
     while wish.lod != wishes.lod and size > wish.textures:
         larger = replace(wish, textures=size)
         again = maker.make(larger)
@@ -145,7 +145,7 @@ def _within(
 
 
 def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
-    """Options that make the file smaller, each on top of the one before; the most visible last."""
+    """Options that make the file smaller step by step; the most visible reductions come last."""
     wish = wishes
     if not (wish.sparse or wish.meshopt):
         wish = replace(wish, sparse=True)
@@ -178,7 +178,7 @@ def _megabytes(written: Written) -> str:
 
 
 class _Maker:
-    """Makes the file of a face repeatedly, and keeps results that the options do not change."""
+    """Makes the file of a face once per set of options; reuses results that stay the same."""
 
     def __init__(self, dna: Dna, rig: Rig, file: Path, targets: Sequence[Target]) -> None:
         self._dna, self._rig, self._targets = dna, rig, targets
@@ -247,7 +247,7 @@ class _Maker:
             self._refine(wishes, room - len(self.made))
 
     def _refine(self, wishes: Wishes, room: int) -> None:
-        """Adds combinations that correct the deviations left by pairs at typical poses of faces."""
+        """Adds combinations for deviations that the pairs' combinations leave at typical poses."""
         mine = [t for t in self._targets if t.group == "arkit"]
         names = [t.name for t in mine]
         poses = faces.typical(names, POSES)
@@ -259,7 +259,10 @@ class _Maker:
         self.made = self.made + [one for one, _ in self._refined]
 
     def _add_chains(self) -> None:
-        """Joints in hair that is long at the finest level, as coarse levels join cards."""
+        """Adds chains of joints to long hair.
+
+        The length of hair cards is measured at LOD 0, because coarser LODs merge cards.
+        """
         parts, long = self._points.parts, list[int]()
         up = axes_of(self._dna)
         for number, part in enumerate(parts):
@@ -278,7 +281,7 @@ class _Maker:
             parts[number] = replace(parts[number], joints=hair.joints, weights=hair.weights)
 
     def _find_skeleton(self, wishes: Wishes) -> tuple[Skeleton, Doubles]:
-        """The joints, and metres that the face moves to its body."""
+        """The joints, and float64[3]: metres by which the face moves to meet its body."""
         move = np.zeros(3)
         if wishes.body and self._body is None:
             names = {*self._dna.mesh_names, *map(base_name, self._dna.mesh_names)}
@@ -326,7 +329,10 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group that captures drive: the first requested one; in a VRM not vrm, if possible."""
+    """The group of targets for face capture: the first requested group.
+
+    In a VRM export, the group vrm is passed over unless it is the only requested group.
+    """
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 
 

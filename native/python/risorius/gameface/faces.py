@@ -12,7 +12,8 @@ Doubles = npt.NDArray[np.float64]
 
 _STEEP = 1.3  # exponent of the random weights: low weights are more frequent
 _ONE_SIDED = 0.25  # share of the poses with one side weaker than the other
-# Unit without its side -> share of the poses in which it is on. At most one unit of a row is on.
+# Unit without its side -> share of the poses in which it is on. A pose has at most
+# one active unit of each row.
 _PAIRS = (
     {"eyeBlink": 0.75},
     {"eyeLookDown": 0.55, "eyeLookUp": 0.2},
@@ -76,6 +77,11 @@ def typical(names: Sequence[str], count: int, seed: int = 1) -> Doubles:
 
 
 def of_frames(names: Sequence[str], frames: Sequence[Mapping[str, float]]) -> Doubles:
-    """Frames as float64[frames, names]. Args: names: of targets; frames: unit -> weight."""
+    """float64[frames, names]: weights of ARKit units in captured frames, clipped to 0 to 1.
+
+    Args:
+        names: names of the units.
+        frames: unit -> weight of each frame; missing units are 0.
+    """
     rows = [[frame.get(name, 0.0) for name in names] for frame in frames]
     return np.clip(np.array(rows, np.float64).reshape(-1, len(names)), 0.0, 1.0)

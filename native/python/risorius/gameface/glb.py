@@ -27,8 +27,8 @@ class Glb:
     Attributes:
         table: the JSON; callers append nodes and meshes to its lists.
         packs: whether vertices and triangles are packed with meshoptimizer.
-        sparse: whether an accessor of mostly zero rows stores only its other rows.
-        pictures: name of a picture of the face -> its texture.
+        sparse: whether an accessor whose rows are mostly zero stores only the nonzero rows.
+        pictures: name of a picture file of the face -> number of the texture made from it.
     """
 
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:
@@ -52,7 +52,9 @@ class Glb:
         return self._accessor(about)
 
     def changes(self, values: Numbers, *, normalized: bool = False, bounds: bool = False) -> int:
-        """Adds an accessor of a morph target; rows of zeros alone take no bytes.
+        """Adds an accessor of a morph target, and returns its number.
+
+        If all values are 0, no bytes are stored; zero rows take no bytes in a sparse accessor.
 
         Args:
             values, normalized, bounds: as for `vertices`.
@@ -87,7 +89,7 @@ class Glb:
         return self._accessor({**about, "bufferView": view})
 
     def plain(self, values: Numbers) -> int:
-        """An accessor of bytes as they are. Args: values: [n, k], as of vertices."""
+        """Adds an accessor without padding and compression. Args: values: as for `vertices`."""
         about = self._about(values, False, False)
         return self._accessor({**about, "bufferView": self.view(values.tobytes())})
 
@@ -122,7 +124,7 @@ class Glb:
         """Adds an extension to the lists of the JSON.
 
         Args:
-            extension: its name.
+            extension: name of the extension.
             required: whether a program without it cannot read the file.
         """
         for key in ("extensionsUsed", "extensionsRequired")[: 1 + required]:

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Measures VRM values of a face: angles of the gaze, and presets that do not mix with a feeling."""
+"""Measures values of VRM expressions on a face.
+
+These are the angles of the gaze, and the presets that must fade out during a feeling because the
+sum of both morph targets would deform the face.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +47,12 @@ def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manne
 
 
 def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
-    """Mean rotation of the eyeballs in degrees; 0 for a face without eyes."""
+    """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
+
+    Args:
+        points: vertices of the LOD, at rest.
+        delta: float32[P, 3], the displacement of the vertices by the target, in metres.
+    """
     found = list[float]()
     for part in points.parts:
         rows = np.unique(part.rows)

@@ -20,7 +20,7 @@ from .naming import safe
 Pixels = npt.NDArray[np.uint8]
 
 LARGEST = 8192
-# media types that are stored unchanged if the pixels cannot be read
+# media types of pictures that are stored unchanged if their pixels cannot be read
 _AS_THEY_ARE = ("image/png", "image/jpeg")
 _QUALITY = {"color": 85, "normal": 88, "roughness": 75}
 # Colour and roughness of materials without a texture.
@@ -37,7 +37,7 @@ _CUT = 0.35  # opacity below which hair is cut away
 
 
 class Materials:
-    """Makes the materials of meshes; each picture is read once and packed once per size."""
+    """Makes the materials of meshes; a picture is read once, and compressed once per size."""
 
     def __init__(self, dna: Dna, file: Path) -> None:
         """Args: dna: its metadata names the textures; file: path of the DNA file."""
@@ -52,8 +52,8 @@ class Materials:
 
         Args:
             mesh: name of the mesh in the DNA file.
-            glb: the file that receives it.
-            known: material name -> number in this file; a known material is used again.
+            glb: the file that receives the material.
+            known: material name -> number in `glb`; a known material is not added again.
             longest: largest number of pixels of a picture's longer side.
         """
         base, kind = base_name(mesh), kind_of(mesh)
@@ -96,7 +96,7 @@ class Materials:
         """Whether a material has a texture, so that its meshes need texture coordinates.
 
         Args:
-            glb: the file that has it.
+            glb: the file with the material.
             number: number from `add`.
         """
         material = glb.table["materials"][number]
@@ -105,7 +105,7 @@ class Materials:
         )
 
     def _picture(self, name: str, role: str, longest: int, glb: Glb, alpha: str = "") -> int | None:
-        """The number of the texture made from a picture file, None without a picture."""
+        """The number of the texture made from a picture file; None if the file is unusable."""
         if not name:
             return None
         key = (name, role, longest)

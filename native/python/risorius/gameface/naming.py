@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of meshes and targets that every client and game engine accepts."""
+"""Names of meshes and targets that every glTF viewer and game engine accepts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def safe(name: str) -> str:
 
 
 def unlike(name: str, taken: set[str]) -> str:
-    """A name that is not taken, if necessary with a number; upper and lower case are the same.
+    """A name that is not taken, if necessary with a number; upper and lower case count as equal.
 
     Args:
         name: the preferred name.

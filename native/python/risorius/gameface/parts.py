@@ -34,15 +34,15 @@ class Part:
     """A mesh in glTF's layout: one vertex per pair of position and texture coordinate.
 
     Attributes:
-        name: name in the file, made safe for paths.
-        mesh: its name in the DNA file.
+        name: name of the mesh in the glTF, made safe for paths.
+        mesh: name of the mesh in the DNA file.
         kind: material kind from web.kinds.
-        rows: int64[V], row of each vertex in the points of Points.
+        rows: int64[V], index of each vertex's position in the arrays of `Points`.
         uv: float64[V, 2], v from the top as in glTF.
         normals: float64[V, 3] at the rest pose.
         triangles: int64[T, 3].
-        joints, weights: int64 and float64[V, INFLUENCES], joints of the skeleton and their weights
-            in steps of 1 / 255.
+        joints, weights: int64[V, INFLUENCES], float64[V, INFLUENCES], joints of the exported
+            skeleton and their weights in steps of 1 / 255.
     """
 
     name: str
@@ -73,11 +73,11 @@ class Points:
 
         Args:
             dna: face with geometry.
-            rig: compiled from it.
+            rig: rig compiled from `dna`.
             lod: number of the LOD.
             skeleton: joints of the exported file.
             axes: from axes_of.
-            move: float64[3], metres that the face moves to the body that it hangs on.
+            move: float64[3], metres by which the face is moved to meet its body; None: no body.
         """
         surface = Surface(dna, rig, lod)
         meshes = [m for m in surface.mesh_indices if len(dna.meshes[m].positions)]
@@ -103,7 +103,7 @@ class Points:
             raw: float32[R], values of the raw controls.
 
         Raises:
-            GameFaceError: a position is not finite or farther than 10 km.
+            GameFaceError: a position is not finite, or is more than 10 km from the origin.
         """
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
@@ -120,8 +120,8 @@ class Points:
         if len(mesh.texture_coordinates):
             textures = mesh.layout_texture_coordinates.astype(np.int64)
         key = places * (int(textures.max(initial=0)) + 1) + textures
-        # In the order of the triangles, neighbouring vertices are close in memory, which packs
-        # better.
+        # Vertices are sorted by their first triangle. So neighbours are close in memory, which
+        # compresses better.
         _, first, turn = np.unique(key[layouts.ravel()], return_index=True, return_inverse=True)
         order = np.argsort(first, kind="stable")
         rank = np.empty(len(order), np.int64)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Fits more combinations to the errors that pairs leave at typical poses of faces.
+"""Fits more combinations to the errors that combinations of two targets leave at typical poses.
 
-The target of a pair is exact if both targets are fully on. At other poses errors remain, such as
-lids that are half shut and look half down, or three targets on together. Functions of the weights
-that are 0 at the exact poses get targets of their own, chosen greedily in least squares.
+The combination of two targets is exact if both are fully on. At other poses errors remain, such as
+lids that are half shut and look half down, or three targets on together. Additional morph targets
+correct them. The weight of each is a function of other weights that is 0 at the exact poses. Of
+many such functions, the ones that reduce the error most in least squares are chosen greedily.
 """
 
 from __future__ import annotations
@@ -47,10 +48,11 @@ _LEAST = 2e-6  # metres: shorter displacements are set to 0
 
 
 class Refiner:
-    """Corrects the errors that linear sums and pairs leave at given poses.
+    """Corrects the errors that linear sums and combinations of pairs leave at given poses.
 
     Attributes:
-        before, after: float64[n], error of the farthest vertex in mm on every fifth pose.
+        before, after: float64[n], the largest vertex error in mm at every fifth pose, without and
+            with the new combinations.
     """
 
     def __init__(
@@ -63,7 +65,7 @@ class Refiner:
             points: vertices of the LOD.
             rig: the face's rig.
             sums: linear sums of its targets.
-            targets: targets of the group that captures drive.
+            targets: targets of the group arkit, which face capture drives.
             made: the combinations of pairs.
         """
         self._points, self._targets, self._made = points, list(targets), list(made)
@@ -90,7 +92,7 @@ class Refiner:
         return list(zip(chosen, deltas, strict=True))
 
     def _left(self, weights: Doubles) -> Doubles:
-        """float64[P, 3]: the error of linear sums and pairs at a pose, in metres."""
+        """float64[P, 3]: the error of the linear sum with its pair combinations at a pose, in m."""
         out = self._points.at(pose_of(self._targets, self._rest, weights)) - self._points.rest
         for weight, delta in zip(weights, self._deltas, strict=True):
             if weight:
@@ -131,7 +133,7 @@ class Refiner:
     def _choose(
         self, wanted: Sequence[Combination], poses: Doubles, most: int
     ) -> list[Combination]:
-        """Chooses greedily: each next combination removes most of the remaining error."""
+        """Chooses greedily: each step adds the combination that most reduces the error left."""
         left = self._main_directions(poses)
         own = self._weights(wanted, poses)
         at_first, whole = float(np.square(left).sum()), np.linalg.norm(own, axis=0)
@@ -150,7 +152,10 @@ class Refiner:
         return out
 
     def _main_directions(self, poses: Doubles) -> Doubles:
-        """float64[poses, _MAIN]: principal components of the errors at the _LOUDEST vertices."""
+        """float64[poses, _MAIN]: coordinates of each pose's error along its principal components.
+
+        Only the _LOUDEST vertices with the largest errors are used.
+        """
         loud = np.zeros(len(self._points.rest))
         for pose in poses[:: max(1, len(poses) // 100)]:
             np.maximum(loud, np.square(self._left(pose)).sum(axis=1), out=loud)
@@ -201,5 +206,5 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
 
 
 def _farthest(delta: Doubles) -> float:
-    """Length of the largest displacement, metres to millimetres."""
+    """Length of the largest displacement in mm. Args: delta: float64[P, 3], metres."""
     return 1000.0 * float(np.sqrt(np.square(delta).sum(axis=1).max(initial=0.0)))

@@ -18,7 +18,7 @@ def frames_of(path: Path) -> list[dict[str, float]]:
     """Frames of a capture, each as unit -> weight.
 
     Args:
-        path: path of a Live Link Face file, or another one whose curves are ARKit units.
+        path: path of a Live Link Face file, or of another file whose curves are ARKit units.
 
     Raises:
         GameFaceError: no curve is an ARKit unit.

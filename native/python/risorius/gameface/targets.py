@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The morph targets that clients expect by name, and the rig's pose for each of them."""
+"""The morph targets that apps for glTF faces expect by name, and the rig's pose for each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Target:
     """A morph target, and the pose of the rig that it shows.
 
     Attributes:
-        name: spelled as the client expects.
+        name: name of the target, spelled as the app for glTF faces expects.
         group: one of GROUPS.
         raw: float32[R], raw controls of the pose.
         base: float32[R], raw controls of the pose from which displacements are measured.
@@ -43,7 +43,7 @@ class Target:
 
 
 def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Target], list[str]]:
-    """The targets of the requested groups, and a note for each thing that the rig lacks.
+    """The targets of the requested groups, and a note for each control that the rig lacks.
 
     Args:
         rig: the compiled face.
@@ -65,7 +65,10 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every client reads and no other target has; Unreal ignores upper case."""
+    """A name that every glTF viewer accepts and that differs from all others, even in lower case.
+
+    Unreal does not distinguish upper and lower case.
+    """
     free = safe(name)
     if free != name:
         notes.append(f"{name}: no client reads such a name: the target is {free}")
@@ -132,7 +135,7 @@ class _Finder:
 
 
 def _whole_of(unit: str) -> str:
-    """The ARKit unit that this one partly takes back, "" for none."""
+    """The ARKit unit that `unit` partly undoes, as mouthClose does jawOpen; "" for none."""
     shares = arkit.shares()
     whole = {shares[control] for control in arkit.mapping()[unit] if control in shares}
     return next((u for u, row in arkit.mapping().items() if whole & row.keys()), "")

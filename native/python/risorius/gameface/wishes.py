@@ -19,21 +19,23 @@ class Wishes:
         shapes: groups of targets, some of GROUPS.
         lod: number of the LOD.
         skeleton: whether to write joints of root, neck, head, jaw and eyes.
-        sparse, quantize, meshopt: storage of accessors, see Glb and the two glTF extensions.
+        sparse: whether morph targets store only the vertices that move.
+        quantize: whether values of vertices are stored as integers of 8 or 16 bits.
+        meshopt: whether vertices and triangles are compressed with meshoptimizer.
         normals: whether targets change normals too.
         textures: largest number of pixels of a picture's longer side.
         mb: size limit of the file in MB, None for no limit.
-        most: largest number of targets that the client takes, None for no limit.
-        within: allowed deviation of sums of two targets in mm; combinations correct larger ones.
-            None: no combinations.
+        most: largest number of targets that the app showing the file accepts, None for no limit.
+        within: allowed deviation of sums of two targets from the rig, in mm; larger deviations are
+            corrected by combinations. None: no combinations.
         frames: typical captured frames, ARKit unit -> weight: combinations are fitted to them too.
         humanoid: one of avatar.humanoid.KINDS, which adds missing bones; "": none.
         vrm: version "1.0" or "0.x"; "": plain glTF.
         licence: licence fields of a VRM, checked by avatar.licence.
-        body: a character in glTF or VRM that the face is hung on; None: the face alone.
-        body_scale: metres of a unit of the body; None: found by its height.
-        without: names of meshes of the body, or of the face, that are left out.
-        springs: long hair of a VRM swings.
+        body: glTF or VRM of a character on whose body the face is put; None: the face alone.
+        body_scale: metres per unit of the body's file; None: found by the body's height.
+        without: names of meshes of the body or the face that are left out.
+        springs: whether long hair of a VRM swings.
     """
 
     shapes: Sequence[str] = ("arkit", "visemes")

@@ -33,7 +33,7 @@ _LEAST_TURN = 1e-3  # smaller changes of a normal's components, about 0.06°, ar
 
 
 class Change(NamedTuple):
-    """A morph target: its name, its group in the statistics, float32[P, 3] in metres."""
+    """A morph target: name, group in the statistics, float32[P, 3]: displacements in metres."""
 
     name: str
     group: str
@@ -45,8 +45,8 @@ class Written:
     """The written file and its statistics.
 
     Attributes:
-    data: bytes of the file.
-    groups: group -> (number of targets, number of vertices that they move, bytes).
+        data: bytes of the file.
+        groups: group of targets -> (number of targets, number of vertices that they move, bytes).
     """
 
     data: bytes
@@ -72,7 +72,7 @@ def write(
         changes: morph targets in the order of the file.
         wishes: export options.
         manner: measured VRM values of the face.
-        body: that the skeleton hangs on; None: the face alone.
+        body: the body on which the skeleton is put; None: the face alone.
         chains: joints of the skeleton that swing.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
@@ -107,7 +107,7 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = self._joints(nodes) if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
+        # TalkingHead looks for meshes below the armature, other apps at the root of the scene.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
@@ -168,7 +168,7 @@ class _Writer:
             self.glb.uses(springs.EXTENSION, required=False)
 
     def _springs(self) -> springs.Springs:
-        """Chains of long hair."""
+        """The swinging chains of long hair, with a sphere in the head that they do not enter."""
         own, chains = self.skeleton, self.chains
         if not chains.joints:
             return springs.Springs()
@@ -204,7 +204,10 @@ class _Writer:
         table["nodes"].append({"name": "Soles", "mesh": len(table["meshes"]) - 1, "skin": 0})
 
     def _first_person(self, part: Part) -> str:
-        """Whether the wearer sees a mesh: "auto" hides only the part that follows the head."""
+        """Whether the avatar's wearer sees a mesh: VRM's "thirdPersonOnly", "auto" or "both".
+
+        A mesh is hidden if all its vertices follow the head; "auto" hides only such vertices.
+        """
         own = self.skeleton
         is_head = np.zeros(max(len(own.names), INFLUENCES), np.bool_)
         for joint in range(len(own.names)):
@@ -214,7 +217,11 @@ class _Writer:
         return "thirdPersonOnly" if on.all() else "auto" if on.any() else "both"
 
     def _joints(self, nodes: list[dict[str, Any]]) -> list[int]:
-        """The numbers of the nodes that stand above no other."""
+        """Write the nodes and the skin of the joints. Returns the numbers of nodes without parent.
+
+        Args:
+            nodes: list that receives the nodes.
+        """
         own, body = self.skeleton, self.body
         roots = [0]
         if body:
@@ -237,7 +244,7 @@ class _Writer:
                 nodes[above].setdefault("children", []).append(self.node_of[i])
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
         back = np.swapaxes(own.turns, 1, 2)
-        # glTF ignores the node of a skinned mesh, so the scale is here
+        # glTF ignores the transform of a skinned mesh's node, so these matrices scale the mesh.
         inverse[:, :3, :3] = back * self.step
         inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
         skin = {"joints": self.node_of, "inverseBindMatrices": self.glb.matrices(inverse)}
@@ -245,7 +252,7 @@ class _Writer:
         return roots
 
     def _put_body(self, roots: list[int], names: set[str]) -> Put:
-        """The meshes of the body beside those of the face."""
+        """Add the meshes of the body, if there is one, to the meshes of the face."""
         if not self.body:
             return Put()
         called = [unlike(mesh.name, names) for mesh in self.body.meshes]
@@ -283,7 +290,8 @@ class _Writer:
         return {"primitives": [primitive], "extras": {"targetNames": names}}
 
     def _turns(self, part: Part) -> bool:
-        # Hair cards keep the normals of the skin below, which their polygons cannot give.
+        # Hair cards have the normals of the skin below, and these cannot be computed from
+        # the displaced polygons of the cards.
         return self.wishes.normals and part.kind not in ("hair", "lashes")
 
     def _target(self, part: Part, delta: Floats, neutral: Doubles | None) -> dict[str, int]:
@@ -304,7 +312,7 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Metres as float32, or as int16 steps if positions are quantized."""
+        """Positions in metres as float32, or as int16 multiples of `step` if they are quantized."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")

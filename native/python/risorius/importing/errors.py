@@ -22,8 +22,8 @@ class AnimationFileError(RisoriusError):
         column: int | str | None = None,
         unknown: Sequence[str] = (),
     ) -> None:
-        """Args: name: of the file; message: one clause; line: from 1; column: from 1, or its
-        header; unknown: curves that no mapping knows, if that is the error."""
+        """Args: name: name of the file; message: one clause; line: from 1; column: from 1, or its
+        header; unknown: curves that no mapping knows, if this is the reason of the error."""
         self.name = name
         self.unknown = tuple(unknown)
         self.line = line

@@ -22,7 +22,7 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Ticks per second in key times; files of FBX 8000 and later use TICKS_8000.
+# Ticks per second in keyframe times; files of FBX 8000 and later use TICKS_8000.
 TICKS = 46186158000
 TICKS_8000 = 141120000
 # GlobalSettings.TimeMode -> frames per second.
@@ -37,9 +37,9 @@ _BULK = frozenset(("Geometry", "Video", "Texture", "Material", "Pose", "Implemen
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-# Memory in bytes per record, per value of a record and per key of a curve, rounded up.
+# Memory in bytes per record, per value of a record and per keyframe of a curve, rounded up.
 _NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
-# Bits of KeyAttrFlags: interpolation and tangents of a key.
+# Bits of KeyAttrFlags: interpolation and tangents of a keyframe.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
 
 
@@ -225,7 +225,7 @@ class Scene:
     _keys: dict[int, Keys] = field(default_factory=dict)
 
     def keys(self, curve: int) -> Keys:
-        """The keys of a curve, unpacked at first use. Args: curve: id of the AnimationCurve."""
+        """A curve's keyframes, unpacked at first use. Args: curve: id of the AnimationCurve."""
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]
@@ -307,7 +307,7 @@ def read_scene(parser: Parser) -> Scene:
 
 
 def properties(node: Node | None) -> dict[str, list[Any]]:
-    """Name -> values of the properties in Properties70, without those left at their default."""
+    """Name -> values of the properties in Properties70; the file omits properties at default."""
     table = node.first("Properties70") if node is not None else None
     rows = [p for p in (table.inner if table else []) if len(p.values) > 4]
     return {str(p.values[0]): p.values[4:] for p in rows}
@@ -341,7 +341,7 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
 def _curves(
     scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
 ) -> dict[str, Keys]:
-    """Name -> keys of the curves that a stack animates; all curves if `stack` is 0."""
+    """Name -> keyframes of the curves that a stack animates; all curves if `stack` is 0."""
     out: dict[str, Keys] = {}
     bones = 0
     for identity, parts in components.items():
@@ -372,7 +372,7 @@ def _curves(
 
 
 def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
-    """Id of a curve node -> (component: d|X, d|Y ..., id of a curve) for its curves."""
+    """Id of an AnimationCurveNode -> (component such as "d|X", id of the curve) per curve."""
     out: dict[int, list[tuple[str, int]]] = defaultdict(list)
     for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
@@ -383,7 +383,7 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """(object, property) of each connection to a property of an object."""
+    """(object, property) for each of `links` that ends at a property of an object."""
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -394,7 +394,7 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(name of a curve, its keys) for an animated property; empty for a bone's transform."""
+    """(name of a curve, its keyframes) for an animated property; empty for a bone's transform."""
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -417,7 +417,7 @@ def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
 
 
 def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
-    """Reads the keys of an AnimationCurve.
+    """Reads the keyframes of an AnimationCurve.
 
     Raises:
         AnimationFileError: numbers of times and values differ, or times do not ascend.
@@ -450,15 +450,16 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """int64[count]: flags of each key; float64[count, 2]: slopes after it and before the next key.
+    """int64[count] and float64[count, 2]: the flags of each keyframe, and two slopes.
 
-    The file stores both once for each run of keys that have them in common.
+    They are the slope after the keyframe and the slope before the next one. The file stores them
+    once for each run of consecutive keyframes with the same flags and slopes.
     """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
     good = 0 < flags.size <= count and flags.size == runs.size
-    # No run may be longer than the curve, because the sum of the runs would overflow.
+    # Each run is checked on its own, because the sum of very large runs could overflow.
     if not good or (runs < 0).any() or (runs > count).any() or runs.sum() != count:
         return np.full(count, 4, np.int64), np.zeros((count, 2))
     table = np.zeros((flags.size, 4))
@@ -470,7 +471,16 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
 def _auto(
     times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Sets slopes of automatic tangents: parallel to the neighbours, flat at an extreme."""
+    """Sets the slopes of keyframes with automatic tangents.
+
+    The line through the two neighbouring keyframes has this slope; it is 0 at a clamped extreme.
+
+    Args:
+        times, values: float64[keys], seconds and values of the keys.
+        flags: int64[keys], KeyAttrFlags.
+        leave, arrive: float64[keys], slopes after and before each keyframe; they stay for other
+            tangents.
+    """
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():
         return leave, arrive

@@ -26,7 +26,7 @@ from .source import Take, keep_ascending, make_clip, read_bytes
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"glTF"
-# Samples per second of smooth curves.
+# Samples per second into which smooth and stepped curves are converted.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = (5126,)
@@ -66,7 +66,7 @@ class Document:
 
         Args:
             kind: a list at the top of the JSON, e.g. "accessors".
-            index: position in it, as in the file; may be of any type.
+            index: position in that list, as in the file; may be of any type.
             place: place of the index, for errors.
 
         Raises:
@@ -89,7 +89,7 @@ class Document:
             default: the number if the key is missing.
 
         Raises:
-            AnimationFileError: another value.
+            AnimationFileError: not such a number.
         """
         value = table.get(key, default)
         try:
@@ -302,14 +302,16 @@ class Document:
         return self.linked(uri, place)
 
     def linked(self, uri: object, place: str) -> bytes:
-        """The bytes that a uri stands for: its own in base64, or a file in the glTF's folder.
+        """The bytes that a uri contains in base64, or the bytes of the file that it names.
+
+        The file must be in the folder of the glTF.
 
         Args:
-            uri: of a buffer or a picture, as in the file; may be of any type.
+            uri: uri of a buffer or a picture, as in the file; may be of any type.
             place: place of the uri, for errors.
 
         Raises:
-            AnimationFileError: not a uri, not base64, a file elsewhere, or one that is missing.
+            AnimationFileError: not a uri, not base64, or no file in this folder.
             BudgetError: more bytes than a file of this size may hold.
         """
         if not isinstance(uri, str):
@@ -320,11 +322,12 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A glTF may name files in its own folder, but not elsewhere on the disk.
+        # Only files in the glTF's folder are read, because a uri could name any file on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file, found=True)
-        # A short JSON may refer to a large buffer many times, so each buffer counts.
+        # Each reference takes its bytes from the budget, because a short JSON may refer to one
+        # large file many times.
         self.budget.hold(len(data), place)
         return data
 
@@ -340,7 +343,7 @@ class Document:
             place: the table's name in errors.
 
         Raises:
-            AnimationFileError: another value, or another length.
+            AnimationFileError: not a list of finite numbers, or a list of another length.
         """
         value = table.get(key, list(default))
         try:
@@ -355,14 +358,14 @@ class Document:
         return np.array(found, np.float64)
 
     def transform(self, node: Mapping[str, Any], place: str) -> Doubles:
-        """float64[4, 4] from a node to the node above it.
+        """float64[4, 4], the matrix from a node to its parent.
 
         Args:
-            node: its table.
-            place: its name in errors.
+            node: table of the node.
+            place: name of the node for errors.
 
         Raises:
-            AnimationFileError: its matrix, rotation, scale or translation is no list of numbers.
+            AnimationFileError: a matrix, rotation, scale or translation is no list of numbers.
         """
         if "matrix" in node:
             return self.finite(node, "matrix", [0.0] * 16, place).reshape(4, 4).T
@@ -396,7 +399,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: not a GLB of version 2, or cut short; with the byte.
+        AnimationFileError: not a GLB of version 2, or a truncated file.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)
@@ -474,7 +477,8 @@ def read(document: Document, take: str | None = None) -> Take:
 
     Args:
         document: from `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first that animates any of these.
+        take: name or number of an animation; None: the first one that animates morph targets
+            or such properties.
 
     Raises:
         AnimationFileError: no such animation, or missing parts of it.
@@ -550,7 +554,7 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """Names of the curves of a channel; empty for location, rotation or scale of a node."""
+    """Names of the curves of an animation channel; empty for a node's location, rotation, scale."""
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)
@@ -572,7 +576,8 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Animated extras may be properties of a rig; colours, positions and so on are no face curves.
+    # Custom properties of a rig are in "extras". Other animated properties, such as colours, are
+    # no curves of a face.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 
@@ -596,7 +601,7 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """The keys of each curve of a channel's sampler, in the order of `names`."""
+    """The keyframes of each curve of an animation channel, in the order of `names`."""
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

@@ -41,7 +41,7 @@ class Reader:
         return AnimationFileError(self.name, f"{place}: {message}" if place else message)
 
     def number(self, value: object, place: str) -> float:
-        """Reads a finite number within float32, which may be a text, as some software writes.
+        """Reads a finite number in the range of float32; "0.5" as a string is accepted too.
 
         Args:
             value: a value of the JSON.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves whose keys have times of their own, and resampling of curves to common times."""
+"""Curves with keyframes at different times, and resampling of curves to common times."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ VALUE_BYTES = 20
 
 @dataclass
 class Keys:
-    """The keys of one curve, with their interpolation.
+    """The keyframes (keys) of one curve, with their interpolation.
 
     Attributes:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
         kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
-        leave: float64[keys], slope after each key per second; empty unless a key is CUBIC.
-        arrive: float64[keys], slope before each key per second.
+        leave: float64[keys], slope just after each key, per second; empty unless a key is CUBIC.
+        arrive: float64[keys], slope just before each key, per second; empty as `leave`.
     """
 
     times: Doubles
@@ -71,22 +71,22 @@ class Keys:
 def on_one_clock(
     curves: Sequence[Keys], rate: float | None, budget: Budget
 ) -> tuple[Doubles, Doubles]:
-    """Resamples all curves at the union of their key times.
+    """Resamples all curves at the union of their keyframe times.
 
     Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
     second.
 
     Args:
-        rate: samples per second, or None for no samples between keys.
+        rate: samples per second, or None for no samples between keyframes.
         budget: budget of the file.
 
     Returns:
         float64[frames], seconds, and float64[curves, frames].
 
     Raises:
-        BudgetError: too many curves with keys at different times, or keys too far apart.
+        BudgetError: too many curves with different keyframe times, or keyframes too far apart.
     """
-    # Curves with equal times normally share one array.
+    # Each array of times is used once, because curves with equal times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))
@@ -97,7 +97,7 @@ def on_one_clock(
         _take(len(curves), (times[-1] - times[0]) * rate, times, budget)
         count = int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1
         times = np.union1d(times, times[0] + np.arange(count) / rate)
-    # Key times closer than a microsecond differ by rounding only, and become one time.
+    # Keyframe times closer than a microsecond differ by rounding only, and become one time.
     times = times[np.concatenate([[True], np.diff(times) > 1e-6])]
     _take(len(curves), times.size, times, budget)
     rows = np.empty((len(curves), times.size))

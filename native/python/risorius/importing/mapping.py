@@ -33,7 +33,8 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Curves that are not controls of the rig: angles of head, neck and eyes in radians.
+# Curves with angles of the head and neck in radians; ANGLES also has the eyes' angles. These curves
+# rotate bones and are not controls of the rig.
 HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
 ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
@@ -44,8 +45,9 @@ VOWELS = "AIUEO"
 _WITH_UNITS = (ARKIT, "vrm")
 _OLD_BASES = {"arkit units": "vocabulary arkit", "vrm expressions": "vocabulary vrm"}
 _PATTERN_STEPS = 50  # budget steps per comparison of a pattern with a name
-# Median seconds between frames above which a clip is keyed; step of the frames added between its
-# keys, in seconds; largest number of frames added per gap.
+# A clip is taken as keyframed, not captured, if the median time between its frames is above _KEYED
+# seconds. Then frames are added between its keyframes, every _STEP seconds, at most _MOST_STEPS per
+# gap.
 _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 
 
@@ -58,8 +60,8 @@ class Adjustment:
     """Changes the curve of a control to offset + gain * curve(value).
 
     Attributes:
-        points: (value, result) by ascending value, linear between, constant outside; empty:
-            identity.
+        points: points (value, result) of `curve` by ascending value; linear between them, constant
+            outside. Empty: curve(value) is the value itself.
     """
 
     gain: float = 1.0
@@ -75,16 +77,16 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class Mapping:
-    """The rows of a mapping from curve names to controls, without abbreviations.
+    """A mapping from curve names to controls, in which all names are written in full.
 
     Attributes:
         name: name of the file, without suffix.
         description: a sentence.
         rows: curve of the source -> {control: weight}. * in a name matches any text; * in its
             controls is replaced by that text. An empty row ignores the curve.
-        shares: control -> the control of which it takes back a share: the value that the rows give
-            it is divided by the other control's value (controls.shares.share_of). It is left
-            unchanged if no curve moves the other one.
+        shares: control A -> control B of which A takes back a share: the value that the rows give A
+            is divided by the value of B (controls.shares.share_of). A is left unchanged if no curve
+            moves B.
         controls: pattern of control names -> adjustment; the last match counts.
         strip: prefixes of curve names that are ignored.
         vocabulary: name in controls.vocabulary; its other spellings are accepted too.
@@ -131,8 +133,11 @@ class Mapping:
         return find
 
     def _spellings(self, name: str) -> Iterator[str]:
-        """The spellings under which a name is looked up: itself, without known prefixes, without a
-        mesh's name, as in the vocabulary."""
+        """The spellings under which a name is searched.
+
+        These are the name itself, the name without known prefixes, the name without a mesh's name
+        before it, and the vocabulary's spelling.
+        """
         yield name
         for start in self.strip:
             if name.lower().startswith(start.lower()) and len(name) > len(start):
@@ -155,7 +160,7 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """A clip after a mapping: curve -> controls, and the names that were not used."""
+    """A mapped clip, the controls that each source curve moves, and the curves not used."""
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -222,7 +227,10 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
 def _divided(
     mapping: Mapping, clip: Clip, sums: dict[str, Doubles], budget: Budget
 ) -> tuple[Clip, dict[str, Doubles]]:
-    """Divides controls that are shares by the other control; the clip may get more frames."""
+    """Divides each control of `mapping.shares` by the control of which it takes back a share.
+
+    The clip gets more frames if its keyframes are far apart, see `_between`.
+    """
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
     times = _between(clip.frame_times()) if any(sums[c].any() for c, _ in shares) else None
@@ -237,14 +245,16 @@ def _divided(
 
 
 def _between(times: Doubles) -> Doubles | None:
-    """Adds times between keys that are far apart. A quotient of linear curves is not linear, and
-    lips that are shut at both keys would part between them.
+    """The times of a clip with keyframes that are far apart, and additional times between them.
+
+    A quotient of linear curves is not linear between keyframes. Without more frames, lips that are
+    shut at two keyframes would part between them.
 
     Args:
         times: float64[frames], seconds.
 
     Returns:
-        None if nothing is added, because the frames of a capture are close enough.
+        float64[more frames], seconds; None if the frames are close enough, as in a capture.
     """
     steps = np.diff(times)
     if len(steps) == 0 or np.median(steps) <= _KEYED:
@@ -388,9 +398,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping whose rows are the base of another.
+    """The mapping that the key `base` of a TOML table names; the table's rows are added to it.
 
-    "vocabulary NAME" is one of controls.vocabulary; those of ARKit and VRM include the ARKit units.
+    "vocabulary NAME" means the names of a vocabulary of controls.vocabulary. For ARKit and VRM the
+    ARKit units are included.
     """
     base = _text(table, "base", where)
     if not base:
@@ -410,7 +421,7 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 
 
 def row_of(said: Meaning) -> Row:
-    """Control -> weight of a name in a vocabulary; an expression is replaced by its controls."""
+    """Control -> weight for a name of a vocabulary; an expression is replaced by its controls."""
     if said.controls or not said.expression:
         return dict(said.controls)
     return dict(expressions.get(said.expression).weights)
@@ -452,11 +463,11 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 
 
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
-    """Control -> weight of a row, without abbreviations.
+    """Control -> weight of a row, with names of controls in full.
 
-    "@PP" is the weighted pose of the expression PP. A name ending in * stands for both sides, in **
-    for the four lip quarters, unless the row itself is a pattern. A name without a dot gets the
-    prefix.
+    "@PP" means the controls of the expression PP. A control ending in * means the controls of both
+    sides, one ending in ** the controls of the four lip quarters, unless the row's key contains a
+    *. A name without a dot gets the prefix.
     """
     if isinstance(value, str):
         value = {"@" + value: 1.0}
@@ -495,9 +506,10 @@ def _expression(name: str, at: str, where: str) -> Table[str, float]:
 
 
 def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
-    """Control -> control of which it is a share, with full names; "" removes one from the base.
+    """Control -> the control of which it takes back a share, with names in full.
 
-    A control may not be a share of a share, because the order of division would matter.
+    "" instead of a control removes an entry of the base mapping. A share of a share is an error,
+    because the result would depend on the order of the divisions.
     """
     out: dict[str, str] = {}
     for key, value in table.items():
@@ -561,11 +573,11 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows most of these curves; None if no mapping knows any.
+    """The built-in mapping that knows the most curves in `names`; None if no mapping knows any.
 
-    Ties go to the mapping that knows more of all columns, then to the one with fewer rows, which is
-    more specific. Single letters are no evidence, because several vocabularies use them as mouth
-    shapes; but the vowels A, I, U, E, O together mean VRM.
+    Ties go to the mapping that knows more names in `columns`, then to the one with fewer rows,
+    which is more specific. Single letters are no evidence, because several vocabularies use them as
+    mouth shapes; but the vowels A, I, U, E, O together mean VRM.
 
     Args:
         names: curves that are not constantly 0.
@@ -595,7 +607,7 @@ def _is_letter(curve: str) -> bool:
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """Names of the mappings that know single-letter curves; empty unless all curves are letters."""
+    """Names of the mappings that know any of `names`; empty unless all are single letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

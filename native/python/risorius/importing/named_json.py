@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads JSON of named curves in the layouts of various software: by frame, by curve, or as keys."""
+"""Reads JSON of named curves in the layouts of various software: by frame, curve or keyframe."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 
 
 def matrix(reader: Reader, document: object) -> Take | None:
-    """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
+    """Reads {names: [...], frames: [[...], ...]}; Audio2Face calls these facsNames, weightMat.
 
     A frame may be a table with the values under "weights" and a time. Returns None if the document
     has another layout.
@@ -197,7 +197,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
 
 
 def neurosync(reader: Reader, document: object) -> Take | None:
-    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
+    """Reads {"blendshapes": [[61 or 68 values], ...]}, which the NeuroSync service returns.
 
     Returns None if the document has another layout.
 
@@ -232,7 +232,7 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}; the values may be in a table under "weights".
+    """Reads a list of frames {time, name: value, ...}; "weights" may be a table of the values.
 
     Returns None if the document has another layout.
 
@@ -254,7 +254,8 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Keyed curves and rows of a curve table are lists of tables, too.
+    # Tables with a curve's name are keyed curves or rows of a curve table, which other functions
+    # read.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -305,8 +306,9 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None if the
-    document has another layout.
+    """Reads Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...].
+
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -330,7 +332,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 
 
 def keyed_curves(reader: Reader, document: object) -> Take | None:
-    """Reads curves with keys {Time, Value}, anywhere in the document.
+    """Reads curves with keyframes {Time, Value}, anywhere in the document.
 
     An Unreal animation's FloatCurves have this layout: [{CurveName, FloatCurve: {Keys: [...]}}].
     Returns None if there are no such curves.
@@ -340,7 +342,7 @@ def keyed_curves(reader: Reader, document: object) -> Take | None:
         document: parsed JSON; times are seconds.
 
     Raises:
-        AnimationFileError: a key without a time or a value.
+        AnimationFileError: a keyframe without a time or a value.
     """
     found: dict[str, Keys] = {}
     is_cubic = False
@@ -370,7 +372,7 @@ def _key_number(reader: Reader, row: Mapping[str, object], key: str, place: str)
 
 
 def _find_curves(value: object, depth: int) -> list[tuple[str, list[Any]]]:
-    """(name, keys) of all curves at any depth of a value, up to `depth`."""
+    """(name, keyframes) of all curves that are nested in a JSON value, `depth` levels at most."""
     if depth == 0:
         return []
     if isinstance(value, list):
@@ -394,7 +396,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
+    """Reads {name: [values], ...}, which may be under "curves", with a rate or a list of times.
 
     Returns None if the document has another layout.
 

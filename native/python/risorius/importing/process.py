@@ -21,7 +21,8 @@ from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
 
-# Smallest range from the neutral value to 1; a smaller one would only amplify noise.
+# Smallest divisor 1 - n, where n is the neutral value of a control; a smaller divisor would only
+# amplify noise.
 LEAST_RANGE = 0.05
 # Angles that change their sign when a face is mirrored.
 _MIRRORED_ANGLES = ("yaw", "roll")
@@ -96,9 +97,10 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """Makes a face's neutral values 0: subtracts them, and rescales the rest so that 1 stays 1.
 
     A control with the neutral value n becomes (value - n) / (1 - n), clamped to 0 unless the
-    control was negative in the capture. Angles of head and eyes are only subtracted. A control that
-    is a share of another (lips of an open jaw) is calibrated as an amount, because a neutral face
-    with shut lips may have any share.
+    control was negative in the capture. Angles of head and eyes are only subtracted. Some
+    controls are a share of another control, such as the share of the jaw's opening that the lips
+    close. They are calibrated as share times the other control, because a neutral face with shut
+    lips may have any share.
 
     Args:
         clip: a capture that contains a neutral face.
@@ -161,7 +163,7 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
 def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:
     size = 2 * half + 1
     base = np.vander(np.arange(-half, half + 1) / half, order + 1, increasing=True)
-    # [at, from]: maps the values of a window to the fitted polynomial's values
+    # fit[i, j]: weight of the window's value j in the fitted polynomial's value at position i
     fit = base @ np.linalg.pinv(base)
     out = np.empty_like(curves)
     windows = np.lib.stride_tricks.sliding_window_view(curves, size, axis=1)
@@ -235,7 +237,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Mirrors a clip: partners swap their curves, and sideways angles change their sign."""
+    """Mirrors a clip: left and right controls swap their curves; yaw and roll change their sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)

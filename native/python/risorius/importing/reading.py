@@ -43,7 +43,8 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
-# Kinds whose curves are Risorius' own controls, or keyed by an animator: any value is intended.
+# Kinds of files whose curves are Risorius' own controls or were keyframed by an animator. Every
+# value in them is intended, so that none is refused as implausible.
 _OWN_KINDS = ("clip", "rzc", "curves")
 
 
@@ -74,8 +75,8 @@ class Imported:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
             the start of the sound.
         kind: one of KINDS.
-        mapping: name of the built-in mapping of this kind of file, else the one that knows most
-            curves; "" if none knows any.
+        mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
+            the most curves; "" if none knows any.
         source: the file's name.
         notes: sentences for the user about dropped or assumed data.
     """
@@ -99,7 +100,8 @@ class Imported:
         """Converts to a clip of raw controls, and reports the use of each curve.
 
         Args:
-            mapping: name of a built-in one, path of a TOML file, or a Mapping; None: self.mapping.
+            mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None:
+                self.mapping.
             rig_names: raw controls of the rig, `Rig.raw_control_names`; other controls are dropped
                 and reported. None: all are kept.
             rig: needed for a mapping of GUI controls, because the rig has their table.
@@ -165,8 +167,10 @@ class Imported:
 
 
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
-    """Keeps the requested angles of head and eyes; drops head angles that are all 0, which would
-    hold the head still."""
+    """Keeps the requested angles of head and eyes.
+
+    Head angles that are all 0 are dropped, because their curves would only keep the head still.
+    """
     clip = done.clip
     drop = set()
     for name in clip.names:
@@ -254,7 +258,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # such as an overflow caused by a number in the file
+    # for example, a number in the file causes an overflow
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
@@ -267,7 +271,7 @@ def read(
 
 
 def _moving(clip: Clip) -> list[str]:
-    """The curves that are not constantly 0, or all curves if each is."""
+    """Names of the curves that are not constantly 0; all names if every curve is constantly 0."""
     moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
     return moving or list(clip.names)
 
@@ -375,7 +379,7 @@ def import_curves(
 
     Args:
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
-            values), linear between keys.
+            values), linear between keyframes.
         source: name of the curves in the report.
         rig_names, mapping, rig, rotations: see `Imported.apply`.
 

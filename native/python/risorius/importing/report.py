@@ -14,17 +14,17 @@ class Report:
     """The use of each curve of a file.
 
     Attributes:
-    source: name of the file, or of another source of the curves.
-    kind: kind of file, one of `importing.KINDS`.
-    mapping: name of the mapping used.
-    mapped: curve of the source -> controls it moves.
-    unmapped: curves of the source that the mapping does not know.
-    ignored: curves of the source that the mapping ignores on purpose.
-    not_in_rig: controls of the mapping that the rig lacks; dropped.
-    always_zero: curves of the source that are 0 in every frame.
-    bones: curves of the clip that turn bones of head and eyes instead of rig controls.
-    absent: rows of the mapping without a curve in the source.
-    notes: sentences about reading and processing.
+        source: name of the file, or of another source of the curves.
+        kind: kind of file, one of `importing.KINDS`.
+        mapping: name of the mapping used.
+        mapped: curve of the source -> controls that it moves.
+        unmapped: curves of the source that the mapping does not know.
+        ignored: curves of the source that the mapping ignores on purpose.
+        not_in_rig: controls of the mapping that the rig lacks and that are therefore dropped.
+        always_zero: curves of the source that are 0 in every frame.
+        bones: curves of the clip that rotate the bones of head and eyes and are no rig controls.
+        absent: rows of the mapping without a curve in the source.
+        notes: sentences about reading and processing.
     """
 
     source: str

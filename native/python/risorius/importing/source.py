@@ -21,7 +21,7 @@ Doubles = npt.NDArray[np.float64]
 
 # Larger than any recorded take; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Times further apart than at this rate (per second) are times of keys, not of frames.
+# Frames per second: times that are further apart are times of keyframes, not of captured frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
 # largest fraction of frames that may be dropped because their time does not ascend
@@ -68,7 +68,7 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
 
 
 def refuse_other_kinds(data: bytes, name: str) -> None:
-    """Raises an error that names the kind of a file if its first bytes show another kind.
+    """Raises an error that names the kind of a file if its first bytes show no animation file.
 
     Args:
         data: the file, or its first bytes.
@@ -108,7 +108,7 @@ def decode(data: bytes, name: str) -> str:
 
 def frame_rate(times: Doubles) -> float:
     """Frames per second of frame times: a usual rate if one is within 1 %, else the measured one;
-    USUAL_RATE for keys that are far apart."""
+    USUAL_RATE for keyframes that are far apart."""
     if times.size < 2:
         return USUAL_RATE
     step = float(np.median(np.diff(times)))

@@ -44,7 +44,8 @@ LIVE_LINK_FACE = (
 # Columns with the number of blend shapes, which are not curves.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
-# largest allowed ratio of cells after conversion to rows before, for a table by time and name
+# A table with a row per time and name is converted to a column per name only if this gives at most
+# this number of cells per row of the file; otherwise most cells would be empty.
 _SPARSEST = 4
 _HOLES_BY_NAME = 3  # up to this number of curves with missing values, notes name each one
 
@@ -154,7 +155,8 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
-    # NumPy writes the header as a comment.
+    # NumPy writes the header as a comment, so a comment with as many cells as the first row of
+    # numbers is the header.
     named = next(csv.reader([comment], delimiter=delimiter), [])
     if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
         rows.insert(0, named)
@@ -165,8 +167,10 @@ def read_table(text: str, name: str) -> Table:
 
 
 def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
-    """Empties lines of comments; returns the lines, the delimiter if a line states it, and the last
-    comment above the header."""
+    """Replaces comments by empty lines.
+
+    Returns: the lines, the delimiter if a line states it, and the last comment above the header.
+    """
     delimiter = comment = ""
     is_top = True
     for i, line in enumerate(lines):
@@ -206,7 +210,7 @@ def _check(table: Table, line: int) -> None:
             )
         seen[header] = column
     if len(table.rows) > 1 and len(table.rows[-1]) < len(table.header):
-        # The writing program was interrupted; the last number may be cut, too.
+        # The program that wrote the file was interrupted. The row's last number may be incomplete.
         table.notes.append(f"the last row (line {table.lines[-1]}) is cut short and left out")
         del table.rows[-1], table.lines[-1]
     for row, at in zip(table.rows, table.lines, strict=True):
@@ -233,7 +237,7 @@ def _is_missing(cell: str) -> bool:
 
 
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
-    """Drops rows without a time, unless rows are counted instead of times.
+    """Drops rows without a time, unless the times come from the row numbers.
 
     Raises:
         AnimationFileError: more than MOST_LOST of the rows have no time.
@@ -291,7 +295,10 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
-    """Seconds of the timecodes in a column; of row numbers if the caller counts rows."""
+    """Seconds of the timecodes in a column.
+
+    If the option `counts_rows` is set, the times come from the row numbers instead.
+    """
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
     codes = [
@@ -336,7 +343,7 @@ def _note_count(table: Table, found: int, notes: list[str]) -> None:
 
 
 def _note_dropped(times: Doubles, notes: list[str]) -> None:
-    """Notes the number of missing rows, which phones under load drop."""
+    """Adds a note on gaps in the times: a phone under load does not record every frame."""
     if times.size < 3:
         return
     steps = np.diff(times)
@@ -461,7 +468,7 @@ def _by_curve(table: Table, at: int) -> tuple[Table, int]:
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
-    """The only column that contains Rhubarb's mouth shapes alone, or None."""
+    """Index of the column that contains only mouth shapes of Rhubarb; None if not exactly one."""
     found = [
         i
         for i in range(len(table.header))

@@ -21,16 +21,18 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves; files time cues to a hundredth of a second or to a frame.
+# Frames per second of the curves. It is fine enough, because files give the times of mouth shapes
+# to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
-# Frames per second of a Moho .dat file, which does not state its rate: that of film.
+# Frames per second assumed for a Moho .dat file without a rate: the rate of film.
 DAT_RATE = 24.0
 # seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
-# Weight of each shape against its neighbours, because a mouth that never closes for an M is
-# noticed, and a shortened D is not. 1: neighbours reach to its middle at most; 0: to its end.
+# Limit of the transitions into the time of each mouth shape. 1: a transition ends in the middle of
+# the shape's time at the latest; 0: it may last until the other end of that time. Viewers notice if
+# the mouth never closes for an M, but not if a D is shortened.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
@@ -78,7 +80,8 @@ def flowing_curves(
     for i in range(1, len(cues)):
         border = cues[i].start
         half = min(0.5 * blend, reach[i - 1], reach[i])
-        # A transition ends with the next cue at the latest; later borders are applied on top.
+        # Frames after the end of cue i + 1 are left out, because the next transition has replaced
+        # this shape by then.
         beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
         first, last = np.searchsorted(times, [border - half, beyond])
         at = times[first:last]
@@ -118,7 +121,7 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times, each lasting until the next; a rest before the first."""
+    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first."""
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -230,10 +233,10 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
 
 
 def _refuse_declarations(text: str, name: str) -> None:
-    """Refuses a document type, which could define entities that grow exponentially.
+    """Refuses XML with a document type, which could define entities that grow exponentially.
 
     Raises:
-        AnimationFileError: there is one. ExpatError: not XML.
+        AnimationFileError: the text has a document type. ExpatError: not XML.
     """
 
     def refuse(*_: object) -> None:
@@ -478,7 +481,7 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
 
 
 def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
-    """The function that reads a text that is neither JSON nor a table, or None.
+    """The viseme reader for a text; None if the text is JSON, a table or of another kind.
 
     Args:
         text: content of the file.
@@ -489,7 +492,8 @@ def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
         return read_rhubarb_xml
     if head.startswith("lipsync version"):
         return read_pgo
-    # If the caller says rhubarb, the error names the invalid line; a text with a header is a table.
+    # If the caller chooses rhubarb, an invalid text that begins with a digit is still read, so
+    # that the error names the invalid line. A text with a header is a table.
     if is_rhubarb_tsv(text) or (kind == "rhubarb" and head[:1].isdigit()):
         return read_rhubarb_tsv
     return None

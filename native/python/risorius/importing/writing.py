@@ -56,7 +56,7 @@ def json_text(clip: Clip) -> str:
         "events": [event._asdict() for event in clip.events],
         "metadata": clip.metadata,
     }
-    # Not by json, which would write all digits of a double; a float32 needs fewer.
+    # The json module would write all digits of a float64; a float32 needs fewer.
     rows = [
         f"{json.dumps(name)}: [{', '.join(map(_shortest, curve))}]"
         for name, curve in zip(clip.names, clip.curves, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Selects the correctives that a face can lose: those that move its vertices least."""
+"""Selects the correctives to remove from a face: the ones that move its vertices least."""
 
 from __future__ import annotations
 
@@ -93,7 +93,13 @@ class _Spread:
         self.shapes = {column: shape[::step] for column, shape in shapes.items()}
 
     def squares(self, motions: Doubles, inputs: Doubles, values: Doubles) -> Doubles:
-        """float64[n]: sum of squared displacements for each motion and the shape of its input."""
+        """float64[n]: sum of squared vertex displacements in each of n poses.
+
+        Args:
+            motions: motions of the joints in each pose, minus the identity.
+            inputs: input whose blend shape each pose adds.
+            values: value of this input in each pose.
+        """
         out = np.zeros(len(motions))
         for at, motion in enumerate(motions):
             way = self.skin.moved(motion + np.eye(3, 4))
@@ -105,7 +111,7 @@ class _Spread:
 
 
 def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int]:
-    """Rows of the correctives to remove, from 0, ascending: those with the least contribution.
+    """Rows of the correctives with the least contribution, to be removed; from 0, ascending.
 
     A corrective that a remaining corrective reads is never removed.
 

@@ -79,7 +79,7 @@ def mirrored_joints(dna: Dna) -> Ints:
 
 
 class Leaving:
-    """Removes joints one after the other; other joints, its heirs, take over its vertices."""
+    """Removes joints one after the other. Other joints, its heirs, take over a joint's vertices."""
 
     def __init__(
         self,
@@ -115,8 +115,8 @@ class Leaving:
             fixed: joints that must stay.
             parents: int64[J]; a joint stays until all of its children are removed.
             pairs: int64[J], the mirrored joint; both are removed together.
-            levels: bool[J, levels], the LODs that list a joint; its heirs must be listed in these
-                too.
+            levels: bool[J, LODs], the LODs that list a joint; its heirs must be listed in these
+                LODs too.
         """
         self.levels = levels
         can = np.ones(len(parents), bool)
@@ -216,7 +216,7 @@ def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
 
 
 def joint_table(dna: Dna) -> Doubles:
-    """bool[J, levels]: the joints that each LOD lists; True for all if the file has no list.
+    """bool[J, LODs]: the joints that each LOD lists; True for all if the file has no list.
 
     Args:
         dna: the face.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes a finished face lighter: fewer joints, correctives and levels of detail.
 
-Order of the steps: levels, correctives, joints with refitted weights, blend shapes.
+Order of the steps: LODs, correctives, joints with refitted weights, blend shapes.
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ Progress = Callable[[float], bool | None]
 _ROUNDS = 4  # largest number of rounds of choosing joints and refitting weights
 _BETTER = 0.97  # a further round follows if the error is below this fraction of the last one
 _FIGHT = 1.0  # exponent by which the importance of a pose grows with its error
-# Memory limit of the tables of joint motions: bytes, and bytes per byte of the face.
+# Memory limit of intermediate tables in bytes: a constant, plus a factor times the face's size.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 
 @dataclass
 class Size:
-    """Numbers of parts of a face, its file size, and the duration of an evaluation."""
+    """Counts of joints, meshes and other items of a face, its file size, and its evaluation
+    time."""
 
     joints: int
     correctives: int
@@ -58,7 +59,7 @@ class Size:
 
     @classmethod
     def of(cls, dna: Dna, file_bytes: int, rig: Rig) -> Size:
-        """Counts the parts of a face and measures its speed.
+        """Counts the joints, meshes and other items of a face, and measures its evaluation time.
 
         Args:
             dna: the face.
@@ -92,7 +93,7 @@ class ExpressionError:
 
 @dataclass
 class LightenReport:
-    """The sizes before and after `lighten`, the removed parts, and the remaining errors."""
+    """The sizes before and after `lighten`, the removed joints and correctives, and the errors."""
 
     before: Size
     after: Size
@@ -237,7 +238,8 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A function that reports progress from `begin` to `end`. Raises: DnaError: it was stopped."""
+    """A function that reports progress from `begin` to `end`. It raises DnaError if the caller
+    stops the work."""
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:
@@ -332,7 +334,7 @@ class _Thinning:
         self.rest = sk.world_matrices(dna, np.zeros((len(self.parents), 9)))[:, :3, 3] - middle
 
     def choose(self, joints: int, counts: Doubles) -> tuple[list[int], Leaving]:
-        """Chooses joints to remove; the returned object has the weights that others take over.
+        """Chooses joints to remove. The returned object has the vertex weights of the other joints.
 
         Args:
             joints: number of joints to keep.
@@ -384,7 +386,7 @@ class _Thinning:
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of one mesh after its removed joints' heirs took over."""
+    """float64[V, J]: weights of one mesh after other joints took over removed joints' vertices."""
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))
@@ -397,8 +399,8 @@ def _products(
 ) -> Doubles:
     """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
-    A joint that no pose moves gets the product of a small shift of its descendants, so that still
-    joints differ.
+    For each joint that no pose moves, a small shift of its descendants is added as a pose, because
+    otherwise all resting joints would seem to be interchangeable.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))

@@ -50,7 +50,7 @@ def errors(
     before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
 ) -> tuple[Doubles, Doubles]:
     """The largest and the root mean square distance between the vertices of two faces, each
-    float64[poses, levels], in the file's unit.
+    float64[poses, LODs], in the file's unit.
 
     Args:
         before: one face.

@@ -25,7 +25,7 @@ class Pose:
 
     Attributes:
         name: name of the control, or of a corrective's controls joined by +.
-        raw: float32[R].
+        raw: float32[R], values of all raw controls.
         input: index in the control vector of the raw control or corrective that the pose tests.
         controls: number of controls in the pose; a joint's rotation counts as one.
     """
@@ -145,7 +145,7 @@ def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
 def motion_rows(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
 ) -> Iterator[Doubles]:
-    """The motions of joints in poses, a block of poses at a time; 0 at rest.
+    """The motions of joints in poses minus the identity, so 0 at rest; a block of poses at a time.
 
     Args:
         dna: the face.

@@ -24,8 +24,8 @@ class Refit:
     def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
         """Args:
         products: float64[J, 4, J, 4] at the LOD, see joints.Leaving.
-        places: float64[J, 3], rest positions of the joints relative to the face's middle.
-        parents: int64[J].
+        places: float64[J, 3], rest positions of the joints relative to the face's centre.
+        parents: int64[J], parent of each joint.
         kept: indices of the remaining joints that the LOD lists, ascending.
         """
         self.products = np.ascontiguousarray(products.transpose(0, 2, 1, 3))
@@ -38,8 +38,8 @@ class Refit:
 
         Args:
             mesh: the mesh with its old weights.
-            points: float64[V, 3], vertices relative to the face's middle.
-            rows: float64[V, J], weights after other joints took over.
+            points: float64[V, 3], vertices relative to the face's centre.
+            rows: float64[V, J], weights after other joints took over vertices of removed joints.
         """
         had = sk.dense_weights(mesh, len(self.places))
         stays = np.zeros(len(self.places), bool)
@@ -59,7 +59,7 @@ class Refit:
     def _some(
         self, points: Doubles, had: Doubles, rows: Doubles, most: int
     ) -> tuple[Ints, Doubles]:
-        """Joints and weights, both [n, k], of n vertices."""
+        """The refitted joints and weights of n vertices, both [n, k]."""
         own = np.argsort(-had, axis=1, kind="stable")[:, : int((had > 0).sum(axis=1).max())]
         held = np.take_along_axis(had, own, axis=1)
         tried = self._tried(points, rows)
@@ -77,7 +77,7 @@ class Refit:
         twice = same.any(axis=2)  # True for a joint that is already in the vertex's list
         start[twice] = 0
         start /= np.maximum(start.sum(axis=1, keepdims=True), 1e-30)
-        # Makes the repeated entry so costly that its weight becomes 0.
+        # A joint may be listed twice. The second entry is made so costly that its weight becomes 0.
         at = np.arange(tried.shape[1])
         diagonal = np.einsum("vkk->vk", gram)
         gram[:, at, at] += np.where(twice, 1e3 * diagonal.max(axis=1, keepdims=True) + 1e-12, 0)
@@ -87,7 +87,11 @@ class Refit:
         return tried, found
 
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
-        """int64[n, k]: joints that took over, nearest joints, and the parent of the first one."""
+        """int64[n, k]: joints that a vertex may follow, with repetitions.
+
+        They are the joints that took over the vertex, the parent of the first one, and the nearest
+        joints.
+        """
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
         apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)

@@ -29,8 +29,8 @@ _ANGLES = [f"{part}.{turn}" for part in ("head", "eyeL", "eyeR") for turn in _TU
 NAMES = (*arkit.order("live_link_face_packet"), *_ANGLES)
 _SHAPES = 52
 # Signs found in a recording of the app: pitch is positive for an eye that looks down, yaw for an
-# eye that looks to its own right. The app's axes therefore point out of the back of the head, to
-# the head's own left and up; the head's rotation uses the same axes.
+# eye that looks to the person's right. The app's axes therefore point out of the back of the head,
+# to the person's left and up; the head's rotation uses the same axes.
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(NAMES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
@@ -46,7 +46,7 @@ def decode(data: bytes) -> Packet:
 
     Raises:
         NoFace: the packet has no values.
-        LiveError: not a packet of Live Link Face; the message names the difference.
+        LiveError: not a packet of Live Link Face; the message names the expected and found value.
     """
     if not data:
         raise LiveError("an empty packet")

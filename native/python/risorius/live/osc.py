@@ -101,7 +101,7 @@ class Decoder:
     """Combines the messages of each sender into faces.
 
     Args:
-        wanted: whether a sender's address has priority for a place and keeps it.
+        wanted: whether the sender at an address always gets one of the limited places.
     """
 
     def __init__(self, wanted: Callable[[str], bool] = lambda _sender: False) -> None:
@@ -140,7 +140,7 @@ class Decoder:
         return done
 
     def pending(self) -> bool:
-        """Whether a face is incomplete whose end only silence can mark."""
+        """Whether a sender without Apply messages has an incomplete face, which silence ends."""
         return any(face.fresh and not face.applies for face in self._faces)
 
     def flush(self) -> list[Packet]:
@@ -164,7 +164,7 @@ class _Face:
         self.quaternion = False
 
     def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
-        """Processes a message. Returns: the face that ends before it, or with it, or None."""
+        """Processes a message. Returns: the face that this message completes, or None."""
         if address == "/VMC/Ext/Blend/Apply":
             self.applies = True
             return self.finish()
@@ -206,7 +206,7 @@ class _Face:
 
 
 def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
-    """The first `count` values as floats, if all are plausible for a face."""
+    """The first `count` values as floats. Raises: LiveError: too few, or not values of a face."""
     if len(values) < count:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
@@ -259,14 +259,16 @@ def _bone(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
 def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     face.quaternion = True
     x, y, z, w = _unit(_numbers(values, 4))
-    # ARKit's axes are own left, up, ahead; changing left to right negates y and z.
+    # ARKit's axes point to the head's own left, up and ahead, and `_angles` expects own right
+    # instead of left. This negates y and z.
     yaw, pitch, roll = _angles((x, -y, -z, w))
     return "HRQ", {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
 
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    # the sender repeats the quaternion's rotation here, without a defined order of angles
+    # If the sender also sends quaternions, these angles are the same rotation in an undefined
+    # order, and are ignored.
     if face.quaternion:
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}
@@ -288,7 +290,7 @@ def _unit(q: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _angles(q: Iterable[float]) -> tuple[float, float, float]:
-    """Yaw, pitch, roll in radians of a quaternion x, y, z, w in the axes own right, up, ahead."""
+    """Yaw, pitch, roll in radians of a quaternion x, y, z, w; axes: own right, up, ahead."""
     x, y, z, w = q
     right = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
     up = np.array([2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)])

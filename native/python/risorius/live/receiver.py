@@ -32,7 +32,8 @@ _SILENCE = 0.004  # seconds without a packet that end a face if its sender does 
 _WINDOW = 0.05  # seconds of a window over which packets are counted
 _MOST_PACKETS = {"livelink": 100, "osc": 1000}  # limit per window, far above the rate of phones
 _BUSIEST = 0.02  # seconds per window that reading may take, because large packets take long
-# seconds: a packet older by less came late; older by more, the sender's clock was set back
+# Seconds: a packet that is at most this much older than the last one came late and is dropped. If
+# it is older by more, the sender's clock was set back, and the packet is used.
 _BACK = 1.0
 _AHEAD = 2.0  # seconds that a sender's clock may get ahead of this machine's
 _DRIFT = 0.001  # additional lead per second since its first face, because clocks differ in speed
@@ -101,7 +102,13 @@ class _Subject:
         return self.latest
 
     def _own_time(self, sent: float | None, arrival: float) -> float | None:
-        """The time of a frame without jumps, from the sender's time or else the arrival."""
+        """The time of a frame: the sender's time with jumps of its clock removed.
+
+        If the packet has no sender's time, the time is the time of arrival.
+
+        Returns:
+            Seconds; None if the packet came late.
+        """
         last = self.latest
         if sent is None:
             return arrival if last is None else max(arrival, last.time)
@@ -125,10 +132,10 @@ class _Subject:
         return self._sent + self._offset
 
     def _lead(self, time: float, arrival: float) -> float:
-        """Seconds by which the sender's clock is ahead of this machine's beyond the tolerance.
+        """Seconds by which the sender's clock gained on this machine's clock beyond the tolerance.
 
-        The lead counts from the first frame, because tolerances from frame to frame would add up
-        and make a recording longer than it took.
+        The gain is measured from the first frame. A tolerance for each frame would add up and make
+        a recording longer than the real time.
         """
         passed = arrival - self._began[1]
         return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
@@ -203,7 +210,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the first one heard that still has a place."""
+        """The latest frame of a subject; for "", of the subject with the oldest place."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -219,11 +226,14 @@ class Receiver:
         self._reserved = frozenset(subjects)
 
     def _kept(self, label: str) -> bool:
-        """Whether a subject keeps its place; a recording would jump if its clock restarted."""
+        """Whether a subject cannot lose its place: it is reserved or being recorded.
+
+        A recording would jump in time if its subject lost the place and got a new one.
+        """
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Records a subject until `finish`; for "", the subject heard first.
+        """Records a subject until `finish`; for "", the subject whose packets arrive first.
 
         Args:
             limit: largest number of frames; the default is half an hour at 60 per second.
@@ -288,8 +298,9 @@ class Receiver:
             self._take_in(data, sender[0], now)
             seen, spent = seen + 1, spent + perf_counter() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
-                # Further packets stay in the system's buffer and are dropped when it is full, so
-                # that a flood takes no time from the viewport.
+                # The thread sleeps until the present time window of _WINDOW seconds ends, so that a
+                # flood of packets does not slow the viewport. Meanwhile the system drops packets
+                # when its buffer is full.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - perf_counter()))
         self._keep(self._decoder.flush(), perf_counter())

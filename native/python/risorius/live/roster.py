@@ -30,7 +30,7 @@ class _Place(Generic[Item]):
     Attributes:
         item: the caller's record of the sender.
         address: network address of the sender.
-        heard: times of its last messages, in seconds.
+        heard: times of the sender's last messages, in seconds.
         streamed: whether it ever sent _STREAM messages within a second.
     """
 
@@ -80,7 +80,7 @@ class Roster(Generic[Key, Item]):
         return place.item
 
     def move(self, key: Key, same: Callable[[Key], bool], now: float, address: str) -> None:
-        """Moves a sender's place to the new key under which it is heard.
+        """Moves the place of a sender whose messages arrive under a new key to that key.
 
         Args:
             key: the new key; nothing changes if the key has a place.

@@ -22,7 +22,8 @@ HEAD = ("head.yaw", "head.pitch", "head.roll")
 _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # radians of an eye's rotation at which a look control is 1
-# Hz: cutoff at rest with almost no smoothing; with full smoothing it is 5 % of this.
+# Cutoff frequency of the filter at rest in Hz, with almost no smoothing; full smoothing uses 5 %
+# of it.
 _STILL = 12.0
 _LONGEST_GAP = 0.5  # seconds without a frame after which the filter restarts
 Row = dict[str, float]
@@ -99,12 +100,12 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
 
 
 def _row(said: Meaning, mapping: Mapping) -> Row:
-    """{control: weight} of a vocabulary's name; the mapping converts its ARKit units."""
+    """{control: weight} for a vocabulary's name; the mapping converts ARKit units to controls."""
     return _through(dict(said.units), mapping) if said.units else row_of(said)
 
 
 def _through(row: Row, mapping: Mapping) -> Row:
-    """Replaces each unit of a row by its controls in the mapping."""
+    """Replaces each ARKit unit of a row by the controls that it moves in the mapping."""
     result: Row = {}
     for unit, weight in row.items():
         for control, share in mapping.rows.get(unit, {}).items():
@@ -113,7 +114,10 @@ def _through(row: Row, mapping: Mapping) -> Row:
 
 
 def _look(name: str, mapping: Mapping) -> Row:
-    """{look control: weight} of an eye's angle: one for its positive part, one for its negative."""
+    """{control: weight} for an eye's angle in radians.
+
+    Positive angles move one look unit, such as eyeLookUpLeft, negative ones the opposite unit.
+    """
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):
         ahead, back = f"eyeLookUp{side}", f"eyeLookDown{side}"
@@ -190,7 +194,7 @@ class Shaper:
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
-        """Uses a frame as the face at rest; None removes it."""
+        """Uses a frame as the face at rest, whose values are subtracted; None: no subtraction."""
         self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))

@@ -163,7 +163,7 @@ def alike(one: object, other: object) -> bool:
 
 
 def turned_groups(dna: Dna) -> list[int]:
-    """Numbers of the joint groups that move a joint with quaternion rotation.
+    """Indices of the joint groups that move a joint with quaternion rotation.
 
     Args:
         dna: a face.

@@ -20,9 +20,9 @@ Part = tuple[int, JointGroup]  # (index of a parent face, one of its joint group
 def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     """The joint groups of a mix.
 
-    If all parents have groups with equal rows and columns, so has the mix. Otherwise groups that
-    share a joint are merged into one group with all their rows and columns, or into several if one
-    would have far more coefficients.
+    If all parents have joint groups with equal rows and columns, the mix has these groups too.
+    Otherwise joint groups that share a joint are merged into one group with all their rows and
+    columns, or into several if one would have far more coefficients.
 
     Args:
         parents: compatible faces.
@@ -34,7 +34,8 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     lists = [[_lists(g) for g in own] for own in groups]
     if all(own == lists[0] for own in lists[1:]):
         return [_mean(row, share) for row in zip(*groups, strict=True)]
-    # For joints with quaternion rotation the order of columns matters; all parents have the same.
+    # The order of columns matters for joints with quaternion rotation. All parents have the same
+    # order.
     turned = [turned_groups(p) for p in parents]
     out = [
         _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)
@@ -76,7 +77,8 @@ def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
 
 
 def _together(parts: Sequence[Part]) -> list[list[Part]]:
-    """Collects groups that share joints, directly or indirectly, by ascending first joint."""
+    """Collects joint groups that share joints, directly or indirectly, sorted by their first
+    joint."""
     above: dict[int, int] = {}  # joint -> a smaller or equal joint of the same set (union-find)
 
     def root(joint: int) -> int:
@@ -104,7 +106,8 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Merges groups into one, or into one for each set of rows with the same source groups."""
+    """Merges joint groups into one, or into one for each set of rows with the same source
+    groups."""
     levels_of: dict[int, int] = {}  # row -> number of LODs that evaluate it
     of_row: dict[int, list[int]] = {}  # row -> indices of the source groups that have it
     used: list[_Source] = []
@@ -148,7 +151,8 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """Merges rows into one group with all columns of the sources; empty without columns."""
+    """Merges rows into one joint group with all columns of the sources; [] if there is no
+    column."""
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

@@ -23,7 +23,7 @@ _STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
-    """Numbers of the meshes that only this person has: trailing hair and beard meshes, by name.
+    """Indices of the hair and beard meshes, found by name at the end of the list of meshes.
 
     Args:
         dna: a face.
@@ -87,7 +87,7 @@ def give_hair(out: Dna, leading: Dna) -> None:
 
 
 def _skin(dna: Dna, listed: list[int]) -> int | None:
-    """Number of the mesh under the hair among the listed ones: the head, else the largest."""
+    """Index of the mesh under the hair, one of `listed`: the head, or else the largest mesh."""
     own = set(hair_meshes(dna))
     there = [m for m in listed if m not in own]
     heads = [m for m in there if "head" in dna.mesh_names[m].lower()]
@@ -118,8 +118,8 @@ def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Int
     """int64[n, count]: indices of the points of `others` nearest to each point, in any order.
 
     Args:
-        points: float64[n, 3].
-        others: float64[m, 3].
+        points: float64[n, 3], points whose neighbours are searched for.
+        others: float64[m, 3], the possible neighbours.
         count: number of neighbours, from 1 to m.
         budget: budget of the face.
 

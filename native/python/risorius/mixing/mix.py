@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Mixes faces: numeric values become weighted means, names and lists stay.
+"""Mixes faces: numeric values become weighted means; names and lists are not changed.
 
 Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
 weights of its vertices. A region from another face is scaled to the size of the mixed face and
-moved to the region's position there, so that a tall face's brow fits a small face.
+moved to the region's position in the mixed face, so that a tall face's brow fits a small face.
 """
 
 from __future__ import annotations
@@ -28,23 +28,25 @@ from .share import Share, mean_of
 
 @dataclass
 class Mix:
-    """The shares of the parents for the whole face, with exceptions for some regions.
+    """The share (fraction) of each parent in the whole face, with exceptions for some regions.
 
-    Parents listed for a region have their share there; the others divide the rest by `shares`.
+    In a region, the listed parents get their listed shares. The rest is divided among all parents,
+    including the listed ones, in proportion to `shares`.
     """
 
     shares: Sequence[float]  # [P], for the whole face; normalised to sum 1
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the shares of the whole face, with sum 1. Raises: ValueError: as `table`."""
+        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: as
+        `table`."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
             raise ArgumentError("shares from 0 on were expected, one of them above 0")
         return np.asarray(whole / whole.sum())
 
     def table(self) -> Doubles:
-        """float64[regions, P]: the shares in each region; rows sum to 1.
+        """float64[regions, P]: the parents' shares in each region; rows sum to 1.
 
         Raises:
             ValueError: an invalid share, shares that are all 0, or above 1 in a region.
@@ -113,7 +115,8 @@ def mix_faces(
 
 
 class Places:
-    """Computes the shares of vertices and joints from the shares of their regions."""
+    """Computes the parents' weights for vertices and joints from the parents' shares in the
+    regions."""
 
     def __init__(self, parents: Sequence[Dna], mix: Mix, masks: Masks) -> None:
         self.table = mix.table()
@@ -125,14 +128,15 @@ class Places:
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        # Masks sum to 1 only up to rounding.
+        # Rounding errors of masks may make the difference negative, so it is clipped.
         face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
-        # Size and position of a region are measured at its rim, so that it fits its neighbours.
+        # Size and position of a region are measured at its rim, so that the region fits the regions
+        # beside it.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
-        # these surround the face: their scale is measured at their rim
+        # Neck and skull surround the face, so their scale is measured at their rim.
         for outer in ("neck", "skull"):
             at = REGIONS.index(outer)
             for own, p in zip(sizes, positions, strict=True):
@@ -142,7 +146,7 @@ class Places:
         self.shifts = _middles(mixed, rims) - self.sizes[:, :, None] * middles
 
     def of_mesh(self, mesh: int) -> Share:
-        """The shares of the vertices of a mesh.
+        """The parents' weights for the vertices of a mesh.
 
         Args:
             mesh: index of the mesh.
@@ -152,7 +156,7 @@ class Places:
         return self._of(self._masks.meshes[mesh])
 
     def of_joints(self) -> Share:
-        """The shares of all joints."""
+        """The parents' weights for all joints."""
         if not self.own.any():
             return self._everywhere(len(self._first.joint_names))
         return self._of(_joint_masks(self._first, self._masks))
@@ -162,7 +166,8 @@ class Places:
         return Share(rows, rows, np.zeros((count, 3)))
 
     def _of(self, masks: Doubles) -> Share:
-        """Shares of points from masks: float64[n, regions], rows sum to 1."""
+        """The parents' weights for points with these masks, float64[n, regions], whose rows sum to
+        1."""
         parts = masks * self.own
         rest = (1 - parts.sum(axis=1, keepdims=True)).clip(0) * self.whole
         inside = parts @ self.table
@@ -198,7 +203,7 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
     Args:
         parents: meshes with the same topology.
-        share: weights of the mesh's vertices.
+        share: the parents' weights for the vertices of the mesh.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -255,7 +260,7 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Sets the mixed skin weights; they stay unchanged if all parents have the same."""
+    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights."""
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -264,7 +269,7 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
     ):
         return
     entries = [sk.skin_entries(mesh) for mesh in parents]
-    # One key per pair of vertex and joint, sorted by vertex, then joint.
+    # One integer per pair of vertex and joint; it sorts pairs by vertex, then joint.
     keys = np.concatenate([vertex << 16 | joint for vertex, joint, _ in entries])
     parts = [weight * weights[vertex, p] for p, (vertex, _, weight) in enumerate(entries)]
     keys, place = np.unique(keys, return_inverse=True)
@@ -286,7 +291,7 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
 
 
 def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
-    """float64[J, regions]: mean mask of the vertices of each joint, weighted, at LOD 0.
+    """float64[J, regions]: mean of the masks of each joint's vertices at LOD 0, by skin weight.
 
     Args:
         dna: the first parent.
@@ -310,7 +315,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
             held[parent] += 1e-9
     rest = np.eye(len(REGIONS))[-1]
     out = np.where(held[:, None] > 0, sums / np.maximum(held, 1e-30)[:, None], rest)
-    # Removes rounding errors from masks that are 0 or 1.
+    # Masks within 1e-9 of 0 or 1 become exactly 0 or 1.
     return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
 
 

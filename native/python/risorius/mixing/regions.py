@@ -3,7 +3,7 @@
 of the vertices of its joints.
 
 The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
-the skin (lashes, films) have the mask of the nearest skin.
+the skin (lashes, clear films on the eyes) have the mask of the nearest skin.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..base.budget import Budget
 from ..controls.regions import region_of
 from .hair import budget_of, nearest, without_hair
 
-# Region -> regions of controls in controls/regions.toml.
+# Region of a mix -> regions of controls, as named in controls/regions.toml.
 _CONTROLS = {
     "brow": ("brow",),
     "eyes": ("eye",),
@@ -35,7 +35,7 @@ _NECK = re.compile(r"neck|spine|clavicle")
 # region of vertices that no control moves: forehead above the brows, ears, back of the head
 REST = "skull"
 REGIONS = (*_CONTROLS, REST)
-# fraction of a control's largest displacement; vertices that move less are of the skull
+# fraction of a control's largest displacement; vertices that move less belong to the skull
 _LEAST = 0.15
 _REACH = 0.03  # distance over which masks are smoothed, as a fraction of the mesh's size
 _MOST_ROUNDS = 60
@@ -82,7 +82,7 @@ class Masks:
                     out[m] = _others(dna, m, skin, out[skin], budget)
         rest = np.eye(len(REGIONS))[-1]
         return [
-            # a mesh that no LOD lists
+            # a mesh that no LOD lists belongs to the skull
             out[m] if m in out else np.tile(rest, (len(mesh.positions), 1))
             for m, mesh in enumerate(dna.meshes)
         ]
@@ -112,7 +112,7 @@ def _rigid(name: str) -> str | None:
 
 
 def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
-    """float64[V, regions] of each skin mesh."""
+    """The masks of each skin mesh, float64[V, regions]."""
     regions = _regions_of_controls(dna)
     most = [np.zeros((len(mesh.positions), len(REGIONS))) for mesh in meshes]
     movers = [Mover(dna, mesh) for mesh in meshes]
@@ -147,7 +147,8 @@ def _regions_of_controls(dna: Dna) -> dict[int, int]:
 
 
 def _below_head(dna: Dna) -> list[int]:
-    """Indices of the joints of neck and spine, and of their descendants but not below a head."""
+    """Indices of the joints of neck and spine, and of their descendants that are not below a head
+    joint."""
     names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
     below = [False] * len(names)
     for joint in sk.parent_order(dna):
@@ -172,7 +173,8 @@ def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
     positions = np.asarray(mesh.positions, np.float64)
     length = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1).mean()
     reach = _REACH * np.ptp(positions, axis=0).max() / max(float(length), 1e-30)
-    # The reach is not finite if a vertex has no finite position; nothing is smoothed then.
+    # `reach`, in mean edge lengths, is not finite if a vertex has no finite position. Then
+    # nothing is smoothed.
     rounds = round(min(_MOST_ROUNDS, 1.5 * reach**2)) if np.isfinite(reach) else 0
     for _ in range(rounds):
         around = masks.copy()

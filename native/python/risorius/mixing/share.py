@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weights of the parents for the points of a mix."""
+"""Computes mixed points from weights of the parents."""
 
 from __future__ import annotations
 

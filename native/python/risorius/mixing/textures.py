@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes textures of mixed faces: blends the parents' textures if all have them.
+"""Makes textures of mixed faces: blends a texture if all parents have it.
 
 Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of eyes
 use the shares of their region. Only images written by this package are mixed, and no hair textures,
@@ -51,7 +51,7 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Mixes the textures that the leading parent's metadata names.
+    """Mixes the textures in the metadata of the leading parent, which has the largest share.
 
     Args:
         parents: compatible faces.
@@ -74,7 +74,8 @@ def mix_textures(
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        # Skips names that are equal on some file systems, and names that lead to other folders.
+        # Skips a name that is the same file as an earlier name on some file systems, and names that
+        # lead to other folders.
         if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
@@ -96,7 +97,7 @@ def mix_textures(
 
 
 def check_room(path: Path, pictures: Iterable[str]) -> None:
-    """Refuses to overwrite images that belong to no face of this name.
+    """Refuses to overwrite images in the texture folder if the DNA file does not exist yet.
 
     Args:
         path: path of the new DNA file; if it exists, its images may be replaced.
@@ -115,7 +116,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: the shares for a mesh's textures; a rigid mesh has those of its region."""
+    """float64[P]: the parents' shares in a mesh's textures. A rigid mesh has the shares of its
+    region."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())
@@ -135,7 +137,7 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The key in WHY of the reason why images cannot be mixed; empty if they can."""
+    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can."""
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"

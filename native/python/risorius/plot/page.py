@@ -120,7 +120,7 @@ def document(facts: Facts, sections: str, links: Sequence[tuple[str, str]]) -> s
     Args:
         facts: facts of the face.
         sections: HTML from `section`.
-        links: (id of a section, text of its link).
+        links: (id of a section, text of its link at the top of the page) for each section.
     """
     title = html.escape(facts.title)
     legend = "".join(

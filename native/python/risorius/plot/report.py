@@ -56,10 +56,11 @@ def render(
         facts: facts of the new face.
         levels: one row per LOD.
         rows: one row per expression.
-        worst: the expressions to draw, with their errors with joints only.
+        worst: the expressions to draw, with the errors of a rig that uses joints only.
         dpi: resolution of bitmaps in dots per inch.
     """
-    # The scale follows the median: a single large error would leave all others colourless.
+    # The colour scale ends at 1.25 times the median error, because with a scale up to one very
+    # large error all other heads would have no colour.
     most = 1.25 * float(np.median([e.largest for e in worst] or [0.05]))
     lines = [
         f"{level.joints:,} joints, {level.vertices:,} vertices\n"

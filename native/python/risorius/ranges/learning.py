@@ -48,7 +48,7 @@ class _Measured:
     Attributes:
         neutral, extreme: values of the control at rest and at its extreme.
         noise: standard deviation of the noise in a frame.
-        rests: whether it is near 0 in some frames.
+        rests: whether a tenth of its values is at most _HIGHEST_REST.
         has_ceiling: whether its peaks end at nearly the same height.
     """
 
@@ -103,7 +103,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """Measures a control. Args: curve: float64[frames]; rate: per second; name: the control."""
+    """Measures a control. Args: curve: float64[frames]; rate: frames per second; name: its name."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)
@@ -144,8 +144,8 @@ def _together(pair: list[_Measured]) -> _Measured:
     """Combines the measurements of both sides, so that a symmetric face stays symmetric."""
     extremes = [side.extreme for side in pair]
     least, most = min(extremes), max(extremes)
-    # If the extremes are similar, the smaller one lets both sides reach 1. Otherwise one side did
-    # not reach its extreme.
+    # If the extremes are similar, both sides get the smaller one, so that both can reach 1.
+    # Otherwise one side did not reach its extreme in the take, and both get the larger one.
     return _Measured(
         float(np.mean([side.neutral for side in pair])),
         least if least >= _SAME * most else most,
@@ -168,7 +168,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # Rounded down, so that the extreme maps to 1 and not slightly below.
+    # The extreme is rounded down, so that it maps to 1 and not slightly below.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

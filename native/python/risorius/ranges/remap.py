@@ -32,7 +32,7 @@ _CAPTURES = ("live_link_face", "csv", "json")  # kinds of imported files that co
 
 
 def is_captured(clip: Clip) -> bool:
-    """Whether a clip is a capture that was not rescaled; speech is no capture."""
+    """Whether a clip is a capture that was not rescaled; a clip made from speech is no capture."""
     is_capture = clip.metadata.get("kind") in _CAPTURES or "subject" in clip.metadata
     return is_capture and _APPLIED not in clip.metadata
 

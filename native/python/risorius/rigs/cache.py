@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A cache of compiled rigs on the disk."""
+"""Stores compiled rigs in a cache folder, and loads them from it."""
 
 from __future__ import annotations
 

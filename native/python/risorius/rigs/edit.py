@@ -36,7 +36,7 @@ def regroup(
         dna: the face; not changed.
         regions: joints of each region, by name or index, as a mapping by region name or a list; a
             name means all joints with that name. Joints that no region lists are grouped by the
-            controls that drive them; None: all joints are.
+            controls that drive them; None: all joints are grouped in this way.
         threshold: (mm, degrees, scale): a coefficient is small if its effect at control value 1 is
             below this; a number x means (x mm, x degrees, x per cent of scale). 0 removes nothing,
             and results stay equal, on the scalar path bitwise.

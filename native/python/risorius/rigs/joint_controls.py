@@ -70,7 +70,7 @@ class JointControl:
 
 
 def one_sign(turns: Doubles) -> Doubles:
-    """Of q and -q, which are the same rotation, the quaternion whose last nonzero part is positive.
+    """Choose q or -q, which are the same rotation, so that the last nonzero component is positive.
 
     RBF solvers with Euclidean distances distinguish q from -q.
 

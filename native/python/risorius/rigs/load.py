@@ -112,7 +112,7 @@ def load(
 
 
 def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = None) -> list[Finding]:
-    """All errors and warnings of a file, in file order; a bad layer does not hide others.
+    """All errors and warnings of a file, in file order; errors of one layer do not hide others.
 
     Args:
         source: a path, or the bytes of a file.

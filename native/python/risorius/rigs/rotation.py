@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Euler angles and quaternions (x, y, z, w) in double precision; see CONVENTIONS.md."""
+"""Converts Euler angles and quaternions (x, y, z, w) in double precision; see CONVENTIONS.md."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def _cases(name: str) -> Iterator[_Case]:
 
 
 def _system() -> str:
-    """Name and version of the operating system; not from platform on Windows, which needs WMI."""
+    """Name and version of the operating system. On Windows, `platform` would need a WMI query."""
     if sys.platform == "win32":
         version = sys.getwindowsversion()
         return f"Windows {version.major}.{version.minor}.{version.build}"

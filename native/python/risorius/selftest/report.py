@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The text of the self-test's report, which names the machine but no folders of the user."""
+"""Writes the self-test's report as text. It describes the machine, but names no folders."""
 
 from __future__ import annotations
 

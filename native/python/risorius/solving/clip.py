@@ -2,10 +2,10 @@
 """Finds the control curves that reproduce a moving mesh.
 
 First each frame is solved alone, starting from the solution of the frame before: few controls
-within their limits that bring the mesh nearest. Each control has a price, a multiple of the value
-that noise alone would give it. Then the selected controls are solved without this price, all frames
-together, with a price on sudden changes of speed. The noise is measured, so that curves of a clean
-mesh are exact, and those of a noisy mesh are calm.
+within their limits that bring the face nearest to the mesh. Each control has a price, a multiple of
+the value that noise alone would give it. Then the selected controls are solved without this price,
+all frames together, with a price on sudden changes of speed. The noise is measured, so that curves
+of a clean mesh are exact, and curves of a noisy mesh are smooth.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _AROUND = 8  # frames before and after a chunk that are smoothed with it
 _FLOOR_MM = 0.004  # mm: smallest noise that is assumed
 _WORTH = 3.0  # price of a control in standard errors of its value
 _LEAST = 0.01  # a control whose curve has a smaller range is not used
-# smallest and largest usual second difference of a control at 30 frames per second
+# limits of the usual second difference of a control's curve, at 30 frames per second
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
 _ENOUGH = 5e-4  # a smaller change of all controls ends an iteration
@@ -86,7 +86,7 @@ class _Job:
 
 
 class _Frame:
-    """Derivatives of the points at a pose near that of a frame, and residuals."""
+    """Derivatives of the points' positions at a pose near a frame's pose, and the residuals."""
 
     def __init__(self, job: _Job) -> None:
         self._job = job
@@ -97,8 +97,8 @@ class _Frame:
     def linearise(self, raw: Doubles, within: float) -> bool:
         """Computes derivatives at a pose, unless they exist for a pose within a distance.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of
-        raw."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest distance of a
+            control."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -118,7 +118,7 @@ class _Frame:
         return np.asarray(self._job.targets[frame] - self._probe.positions(raw))
 
     def pull(self, missing: Doubles) -> Doubles:
-        """float64[R]: the gradient J^T missing of each control."""
+        """float64[R]: J^T * missing, the effect of each control on the missing displacements."""
         return self._probe.gradient(missing)
 
 
@@ -203,13 +203,14 @@ def _curves(job: _Job, count: int, workers: int) -> Doubles:
     """float64[F, R]: controls of all frames, solved frame by frame, then together."""
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
-    # includes the error of another face, which is never reproduced exactly
+    # The remaining error counts as noise, because the motion of another face is never
+    # reproduced exactly.
     job.sigma = max(job.sigma, float(np.sqrt(left)))
     return _together(job, _alone(job, count, begins, workers), workers)
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
-    """First frame of a chunk -> float64[R], its controls; chunks are solved in sequence."""
+    """Index of the first frame of each chunk -> float64[R], the controls in this frame."""
     frame, at, out = _Frame(job), job.rest, {}
     for begin in range(0, count, _CHUNK):
         at = out[begin] = _nearest(job, frame, begin, at, 12)
@@ -267,10 +268,11 @@ def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) 
 
 
 def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
-    """float64[F, R]: all frames with a price on sudden changes, in overlapping chunks.
+    """float64[F, R]: controls of all frames, solved together in overlapping chunks, with a price on
+    sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that changed in that solution change here, without their price.
+    controls that the frames solved alone use may change, and their values have no price here.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))

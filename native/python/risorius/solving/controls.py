@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Argument classes of the solvers: limits of controls, and how controls share a drag."""
+"""Defines arguments of the solvers: limits of controls, and how a drag is divided among them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ControlLimits:
 
         Args:
             pose: float64[R], initial values of the controls.
-            usual: bool or bool[R], used if `free` is None.
+            usual: bool or bool[R], whether a control may change, used if `free` is None.
 
         Raises:
             ArgumentError: a wrong shape, not a number, a lowest above its highest.
@@ -58,7 +58,8 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class ControlSharing:
-    """How the controls of a face share a drag: their ease, partners and opposites."""
+    """How a drag is distributed over the controls: ease (how readily each changes), partners
+    (controls that change equally) and opposites (controls that exclude each other)."""
 
     ease: npt.ArrayLike | None = None
     """float[R] above 0, how readily each control changes: 0.1 costs ten times as much as 1. Two

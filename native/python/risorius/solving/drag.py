@@ -80,7 +80,8 @@ def solve_drag(
             the two axes of a screen, which leave the depth free; None: all three axes.
         weights: float[P], importance of each point; None: 1.
         limits: the controls that may change, and their ranges; None: all, from 0 to 1.
-        sharing: ease, partners and opposites of the controls; None: all controls are equal.
+        sharing: ease, partners and opposites of the controls; None: all controls have the same
+            ease, and none has a partner or an opposite.
         method: "least_squares"; "transpose", which changes controls in proportion to their effect
             on the points and moves less elsewhere; or "sparse", which changes few controls, about
             one per direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
@@ -141,7 +142,7 @@ def _solved(
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
-    """int64[N, 2]: checked pairs of indices of controls."""
+    """int64[N, 2]: the pairs of opposite controls (their indices), after a check."""
     found = wholes("opposites", opposites)
     pairs = found if found.size else np.empty((0, 2), np.int64)
     if pairs.shape[1:] != (2,) or not ((pairs >= 0) & (pairs < count)).all():
@@ -155,7 +156,7 @@ def _kept_apart(
     opposites: npt.NDArray[np.int64],
     solve: Callable[[Drag, Doubles], Doubles],
 ) -> Doubles:
-    """The pose from `solve` with only one control on of each opposite pair: the one used more.
+    """The pose from `solve` in which only the stronger control of each opposite pair is on.
 
     An opposite that was on at the beginning returns to 0 before the other one starts.
     """
@@ -180,9 +181,9 @@ def _kept_apart(
 def _both_on(
     opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The pairs of which both controls are on, and further than before: (weaker, stronger).
+    """Opposite pairs in which both controls increased from `begin`: (weaker, stronger) controls.
 
-    The weaker control was less on before, or is less on now if both had equal values.
+    The weaker control has the smaller value in `begin`, or in `at` if both are equal in `begin`.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -209,10 +210,10 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls that belong elsewhere (see LOCAL) get ELSEWHERE, so that a dragged brow does not turn
-    the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of their
-    effect here to their effect on the whole face, so that the brow lowers before the whole face
-    contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face (see LOCAL) get ELSEWHERE, so that a dragged brow does not
+    turn the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of
+    their effect here to their effect on the whole face, so that the brow lowers before the whole
+    face contracts, which would lower it too. The largest ease is 1.
 
     Args:
         surface: surface of the face.
@@ -223,7 +224,8 @@ def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
-    # solve_drag squares the cost of a change; with the root, the change is proportional to `alone`.
+    # solve_drag squares the cost of a change, so the change grows with the square of the ease.
+    # The root makes it proportional to `alone`.
     readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
     return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The method "sparse" of solve_drag: selects few controls, and adds more if necessary."""
+"""Implements the method "sparse" of solve_drag: few controls, and more only if necessary."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from .sparse import cheapest_change, cheapest_to
 from .surface import Doubles
 
 _HARD = 0.1  # fraction of the largest ease below which a control belongs elsewhere
-# Distance that a sparse drag may miss to use fewer controls, as a fraction of the way and in mm;
-# and gain in distance that controls which belong elsewhere must bring together.
+# _MISSING: distance by which a sparse drag may miss the target to use fewer controls. _HELP: gain
+# in distance that justifies the use of controls of other parts of the face. Both are the smaller of
+# a fraction of the distance to the target and a limit in mm.
 _MISSING, _MISSING_MM = 0.02, 0.6
 _HELP, _HELP_MM = 0.02, 1.3
 _DEAR = 100.0  # price of controls that belong elsewhere, so that all others are selected first
 # Smallest effect of a selectable control relative to the strongest one; the second number is for
-# controls that belong elsewhere.
+# controls of other parts of the face.
 _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
-# mm: more controls are added if few end farther from the targets than all by this distance. If few
-# end nearer than this, the solution with all controls is not computed.
+# mm: if a sparse drag misses the targets by more than this, the solution with all controls is
+# computed too. If that one is nearer by more than this, controls are added to the sparse drag.
 BEHIND_MM = 1.3
-# attempts to add controls by derivatives before the way to the solution with all controls
+# number of attempts to add controls by derivatives; then the sparse pose is moved towards the
+# solution with all controls
 _MORE = 3
 _NOTHING_MM = 0.02  # mm: an attempt that brings the points nearer by less is the last one
 _WEAKEST = 0.01  # fraction of the strongest control's effect below which a control is not added
@@ -79,7 +81,7 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
 
 
 def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The best pose near a change float64[U] that uses only the controls that change there.
+    """The best pose near the change `x`, float64[U], among poses that change the same controls.
 
     It uses full Gauss-Newton steps, whose result is continuous in the targets. If the result is far
     from the targets, halved steps are tried, too, and the nearer result is used.
@@ -109,7 +111,8 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """float64[U], bool[U]: the price of each unknown by its ease, and whether it belongs elsewhere.
+    """float64[U], bool[U]: the price of each unknown by its ease, and whether the unknown belongs
+    to another part of the face than the points.
 
     Args:
         drag: equations of the drag.
@@ -154,7 +157,11 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """Holds the opposites of controls that are on in `every`, at the smaller value of two poses."""
+    """For each control that is on in the pose `every`, fixes its opposite.
+
+    Returns: the drag, and the pose `few` in which each fixed control has the smaller of its values
+        in `few` and `every`.
+    """
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
         int(pair[1 - side])
@@ -170,7 +177,7 @@ def _agreeing(
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
     """A pose with the additional controls that the linearised drag needs to come near enough.
 
-    Controls that have already changed are nearly free.
+    Controls that have already changed have a price near 0.
     """
     units, count = drag.unknowns, len(begin)
     jacobian, missing = units.columns(drag.jacobian(at)), drag.residual(drag.positions(at))
@@ -191,7 +198,8 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """The pose `every` without its weakest controls, as many as half of the tolerance allows."""
+    """The pose `every` without its weakest controls: as many as leave the distance from the targets
+    at most `aim` - BEHIND_MM / 2."""
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))
@@ -210,7 +218,7 @@ def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Dou
 
 
 def _towards(drag: Drag, at: Doubles, other: Doubles, aim: float) -> Doubles:
-    """A pose on the line to another pose, near the first one that is near enough to the targets."""
+    """The first pose from `at` towards `other` that is near enough to the targets, by bisection."""
     if drag.far(at) <= aim:
         return at
     none, whole = 0.0, 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Places handles for dragging: few vertices that control as many controls as possible.
+"""Places handles for dragging: few vertices by which as many controls as possible can be set.
 
 The idea is from Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
 Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles
@@ -84,7 +84,7 @@ def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floa
 
 
 def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
-    """int64[V]: the mirrored vertex; itself on the middle line, -1 without a mirrored vertex.
+    """int64[V]: the mirrored vertex of each vertex; a vertex on the midline has itself, -1: none.
 
     Args:
         places: float64[V, 3], positions at rest.
@@ -112,7 +112,7 @@ def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[n
 
 
 def _leave_out(reach: Floats, surface: Surface, mesh: int, vertices: list[int]) -> None:
-    """Removes from all rows the directions of controls that these vertices can already drag.
+    """Removes from `reach` the combinations of controls that the new handles can already drag.
 
     Args:
         reach: float32[n, 3, R], displacements by controls; changed in place.

@@ -208,7 +208,7 @@ def _similarity(source: Doubles, target: Doubles) -> tuple[Doubles, float, Doubl
     target| (Umeyama 1991).
 
     Args:
-        source, target: float64[V, 3].
+        source, target: float64[V, 3], positions of the same vertices on both meshes.
     """
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
     u, values, v = np.linalg.svd(b.T @ a)

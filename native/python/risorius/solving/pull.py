@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A drag as equations: residuals of target coordinates, derivatives by controls, least squares."""
+"""Makes and solves the equations of a drag: residuals, derivatives by controls, least squares."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GAIN = 1e-5  # fraction of the squared distance: a smaller gain ends the iterat
 
 @dataclass
 class Drag:
-    """The checked equations of a drag; their m = P k rows are target coordinates."""
+    """The checked equations of a drag: P points with k directions each give m = P k equations."""
 
     probe: Probe
     free: npt.NDArray[np.bool_]  # [R]: controls that may change
@@ -46,28 +46,31 @@ class Drag:
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: the weighted distances. Args: positions: float64[P, 3], of the points."""
+        """float64[m]: the weighted distances to the targets. Args: positions: float64[P, 3], of the
+        points."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 
     def left(self, raw: Doubles) -> float:
-        """The sum of squared weighted distances. Args: raw: float64[R], a pose."""
+        """The sum of the squared residuals. Args: raw: float64[R], a pose."""
         missing = self.residual(self.positions(raw))
         return float(missing @ missing)
 
     def far(self, raw: Doubles) -> float:
-        """Weighted root mean square distance in mm. Args: raw: float64[R], a pose."""
+        """Weighted root mean square distance to the targets, mm. Args: raw: float64[R], a pose."""
         return self.error(self.residual(self.positions(raw))) * self.mm
 
     def jacobian(self, raw: Doubles) -> Doubles:
-        """float64[m, R]: derivatives by the controls. Args: raw: float64[R], a pose."""
+        """float64[m, R]: derivatives of the weighted positions along the directions, by each
+        control. Args: raw: float64[R], a pose."""
         self.probe.linearise(raw, self.high, self.free)
         out = self.probe.jacobian()
         along = np.einsum("pki,pir->pkr", self.axes, out) * self.roots[:, None, None]
         return np.asarray(along.reshape(-1, len(raw)))
 
     def error(self, residual: Doubles) -> float:
-        """Weighted root mean square in the file's unit. Args: residual: float64[m]."""
+        """Weighted root mean square of residuals, in the file's unit. Args: residual:
+        float64[m]."""
         return float(np.sqrt(residual @ residual / max(1e-300, float(self.roots @ self.roots))))
 
 
@@ -126,11 +129,12 @@ class Unknowns:
     scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
-        """The same unknowns with equal ease."""
+        """The same unknowns, all with the same ease (see ControlSharing)."""
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
-        """float64[m, U]: derivatives by the unknowns. Args: jacobian: float64[m, R]."""
+        """float64[m, U]: derivatives by the unknowns. Args: jacobian: float64[m, R], derivatives by
+        the controls."""
         both = jacobian[:, self.second] * (self.first != self.second)
         return np.asarray((jacobian[:, self.first] + both) * self.scale)
 
@@ -141,11 +145,13 @@ class Unknowns:
         return out
 
     def values(self, change: Doubles) -> Doubles:
-        """float64[U]: the unknowns. Args: change: float64[R], equal for partners."""
+        """float64[U]: values of the unknowns. Args: change: float64[R], change of the controls,
+        equal for partners."""
         return np.asarray(change[self.first] / self.scale)
 
     def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:
-        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], of a change."""
+        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], limits of the
+        change of each control."""
         lowest = np.maximum(low[self.first], low[self.second]) / self.scale
         return lowest, np.minimum(high[self.first], high[self.second]) / self.scale
 
@@ -204,8 +210,8 @@ def least_squares(
 
 
 def seen_from(drag: Drag, begin: Doubles, at: Doubles) -> tuple[Doubles, Doubles]:
-    """Derivatives float64[m, U] at a pose, and the residual as a function of changes from the
-    beginning.
+    """Linear equations for the change from the pose `begin`: derivatives float64[m, U] at the pose
+    `at`, and the residual float64[m] that they predict for `begin`.
 
     Args:
         drag: equations of the drag.

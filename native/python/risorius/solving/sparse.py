@@ -20,11 +20,12 @@ from .surface import Doubles
 
 _REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: 0, moving, at a bound
 _MOST_STEPS = 600  # largest number of steps of a path
-# largest number of steps to a given distance; the result of a longer path is not sparse
+# largest number of path steps in cheapest_to(); the result of a longer path is not sparse
 _MOST_MORE = 60
 _END = 1e-6  # fraction of the first price at which a path ends
 _FAR = 0.1  # fraction of the first residual: a target that stays farther away is out of reach
-# fraction of the possible gain that may be given up to use fewer controls, for such a target
+# fraction of the possible gain that may be given up to use fewer controls, if the target is out of
+# reach
 _LITTLE = 0.1
 _CALM = 0.12  # fraction of the first price below which controls hardly help, for such a target
 _LEVEL = 1e-9  # smaller differences of slopes count as none
@@ -56,7 +57,8 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: size of the gradient of each resting unknown that may follow it."""
+        """float64[n]: size of the gradient; 0 for unknowns that move or cannot follow the
+        gradient."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
@@ -120,7 +122,8 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """The price's decrease until each resting unknown begins to move, and its direction."""
+        """For each resting unknown, the price's decrease until it begins to move, and its
+        direction."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -153,7 +156,7 @@ def cheapest_change(
     tolerance: float,
     worth: float,
 ) -> Doubles:
-    """float64[n]: the cheapest x with a x near b; mostly 0.
+    """float64[n]: the cheapest x with a @ x near b; most elements are 0.
 
     Args:
         a: float64[m, n], the matrix.
@@ -188,7 +191,7 @@ def cheapest_change(
 def cheapest_to(
     a: Doubles, b: Doubles, low: Doubles, high: Doubles, price: Doubles, aim: float
 ) -> Doubles:
-    """float64[n]: the cheapest x with a x within a distance of b, or as near as possible.
+    """float64[n]: the cheapest x with a @ x within `aim` of b, or as near as possible.
 
     Args:
         a: float64[m, n], the matrix.
@@ -219,7 +222,7 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """float64[n]: the first point of a path whose residual has at most the length `aim`."""
+    """float64[n]: the first point on a path at which the residual is at most `aim` long."""
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Positions of a face's vertices as a function of its raw controls, and their derivatives."""
+"""Computes positions of a face's vertices from its raw controls, and their derivatives."""
 
 from __future__ import annotations
 
@@ -126,7 +126,8 @@ class Surface:
         return self._far().max(axis=0, initial=0.0)
 
     def spread(self) -> Doubles:
-        """float64[R]: root mean square displacement of these vertices per unit of each control."""
+        """float64[R]: root mean square displacement of the vertices that strongest() measures, per
+        unit of each control."""
         far = self._far()
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 
@@ -170,7 +171,7 @@ class Surface:
             points: number of points.
 
         Raises:
-            BudgetError: far more memory than the face, as with very many raw controls.
+            BudgetError: the derivatives by all controls need far more memory than the face.
         """
         count = self.control_count
         place = f"what {count:,} raw controls do to {points:,} points"

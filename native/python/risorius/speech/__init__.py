@@ -70,7 +70,8 @@ def speak(
         intensity: factor on mouth shapes, brows and nods, 0 to 4; lips still close completely.
         blinks: whether to add blinks.
         accents: whether brows and head follow stressed syllables.
-        correctable: whether to add metadata that `mouth` needs besides the phonemes.
+        correctable: whether to add metadata with which `mouth` can recompute the curves after a
+            user has corrected the phonemes.
         library: the face's own expressions by name, whose visemes replace the built-in ones.
         progress: called repeatedly with the fraction of the work done, 0 to 1.
         cancel: called repeatedly; if it returns true, CancelledError is raised.
@@ -151,8 +152,8 @@ def mouth(
 
     Args:
         phonemes: in order, without gaps; the mouth is at rest before and after them.
-        opened: float[n], opening of vowels: from prosody.openness, or the integers in a correctable
-            clip's metadata / 1000.
+        opened: float[n], factor on the jaw of vowels every OPENNESS_STEP seconds: the result of
+            prosody.openness, or the integers "openness" in a correctable clip's metadata / 1000.
         times: float64[frames], seconds, ascending in equal steps.
         intensity, library: see speak.
 

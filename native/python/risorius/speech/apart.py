@@ -2,7 +2,7 @@
 """Runs speech recognition in a separate process.
 
 A program that embeds Python, such as Blender, may have loaded another libpocketsphinx through its
-ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. A
+ffmpeg. The linker then makes the recogniser use that library, and it fails or crashes. A
 separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
     this process                                 separate process
@@ -113,7 +113,7 @@ def _library(texts: Mapping[str, str] | None) -> dict[str, Expression] | None:
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
     python = python_program()
     options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
-    # otherwise a console window would appear on Windows
+    # Without this flag, a console window would appear on Windows.
     quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)
     try:
         return subprocess.Popen(
@@ -220,7 +220,7 @@ def serve(task: dict[str, Any]) -> None:
         words.write(json.dumps(message) + "\n")
         words.flush()
 
-    # before a thread reads the pipe, because on Windows the import would wait for the read
+    # Import before a thread reads the pipe, because on Windows the import would wait for the read.
     with contextlib.suppress(ImportError):
         importlib.import_module("pocketsphinx")
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -248,7 +248,8 @@ def serve(task: dict[str, Any]) -> None:
 def _end_with_parent() -> None:
     """Ends the process when the pipe closes, for example because the parent died.
 
-    It reads with os.read, because locks of Python's buffers would block the end of the process.
+    The pipe is read with os.read, because locks of Python's buffers would block the end of the
+    process.
     """
     while os.read(0, 4096):
         pass

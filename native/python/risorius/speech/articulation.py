@@ -27,8 +27,8 @@ GATED = ("PP", "FF")
 """Visemes in which lips close or touch; they are applied on top of the other visemes."""
 
 # Viseme -> (strength of its pull on the lips, seconds in which the pull falls to 1/e before it, and
-# after it). Sounds of the tongue leave the lips to their neighbours; rounding begins earliest.
-# While lips are closed, the vowels around determine their shape.
+# after it). Sounds of the tongue pull weakly, so that their neighbours shape the lips. Rounding
+# begins earliest. Closed lips (PP, FF) pull least, so that the vowels around shape them.
 _DOMINANCE = {
     "sil": (0.8, 0.06, 0.08), "PP": (0.15, 0.05, 0.05), "FF": (0.15, 0.05, 0.05),
     "TH": (0.6, 0.06, 0.05), "DD": (0.45, 0.05, 0.05), "kk": (0.35, 0.05, 0.05),
@@ -54,8 +54,8 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
         times: float64[frames], seconds, ascending in equal steps.
 
     Returns:
-        float64[frames, 15] in the order of VISEMES: for gated visemes their gates in [0, 1], for
-        the others shares of the rest; each row sums to 1.
+        float64[frames, 15] in the order of VISEMES. The visemes PP and FF have the weight of their
+        `gate`; the other visemes share the rest, so that each row sums to 1.
     """
     pull = np.zeros((len(times), len(VISEMES)))
     for begin, end, viseme in _targets(phonemes):
@@ -145,8 +145,8 @@ def controls(
         weights: float64[frames, 15] from viseme_weights.
         openness: float64[frames], factor on the jaw of vowels; 1 at the voice's usual loudness.
         intensity: factor on all shapes except closures.
-        library: a face's own visemes by name, which replace the built-in ones; their vowels are
-            scaled by openness as a whole.
+        library: a face's own visemes by name, which replace the built-in ones; in a vowel of the
+            library, openness scales all controls, not only the jaw.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].

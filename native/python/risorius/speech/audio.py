@@ -86,7 +86,8 @@ def parse_wav(data: bytes) -> tuple[Samples, int]:
     """Parses the bytes of a WAV file; returns the same as read_audio.
 
     Raises:
-        AudioError: damaged, without samples, or of an unsupported format; without the file's name.
+        AudioError: damaged, without samples, or of an unsupported format; the message does not name
+            the file.
     """
     form: _Format | None = None
     offset = 12
@@ -169,7 +170,8 @@ def _one_channel(channels: Samples) -> Samples:
     """Converts float32[samples, channels] to float32[samples]."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # Microphones with opposite polarity cancel each other, and with them the voice.
+    # If microphones have opposite polarity, the mean of the channels loses the voice, so the
+    # loudest channel is used.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean
@@ -177,7 +179,7 @@ def _one_channel(channels: Samples) -> Samples:
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
     """Converts a sound file with ffmpeg to the bytes of a WAV file."""
-    # a pipe was read already, so ffmpeg would wait for its data forever
+    # ffmpeg gets only files: a pipe has been read already, and ffmpeg would wait for ever.
     if not os.path.isfile(path):
         raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")
@@ -185,7 +187,7 @@ def _converted(path: str | os.PathLike[str], found: str) -> bytes:
         raise AudioError(
             f"{path}: {found}; other formats are read through ffmpeg, which is not on PATH"
         )
-    # With the prefix file: a name is never taken as an address or an option.
+    # Because of the prefix "file:", ffmpeg never takes a name as an address or an option.
     source = f"file:{os.path.abspath(path)}"
     # fmt: off
     done = subprocess.run(

@@ -28,7 +28,7 @@ class Phoneme(NamedTuple):
     """The word that begins with this phoneme, or ""; it ends before the next word or SIL."""
 
 
-# A diphthong is listed at its first vowel; GLIDES has both of its vowels.
+# Viseme -> its phonemes. A diphthong is listed at its first vowel; GLIDES has both vowels.
 _CLASSES = {
     "sil": "SIL", "PP": "P B M", "FF": "F V", "TH": "TH DH", "DD": "T D", "kk": "K G NG HH",
     "CH": "CH JH SH ZH", "SS": "S Z", "nn": "N L", "RR": "R ER", "aa": "AA AE AH AY AW",
@@ -43,7 +43,7 @@ GLIDES = {"AY": ("aa", "I"), "AW": ("aa", "U"), "EY": ("E", "I"), "OW": ("O", "U
 
 
 def viseme_of(phone: str) -> str:
-    """The viseme of a phoneme; noises and unknown sounds have that of silence."""
+    """The viseme of a phoneme; noises and unknown sounds have the viseme of silence."""
     return CLASS_OF.get(phone, "sil")
 
 

@@ -35,7 +35,8 @@ class Accent(NamedTuple):
 def pitch(samples: Samples) -> Curve:
     """Pitch in semitones above 100 Hz every STEP seconds; NaN for unvoiced sound.
 
-    It is the autocorrelation of windows of 40 ms, divided by that of the window (Boersma 1993).
+    The period is the lag with the largest autocorrelation in windows of 40 ms. The autocorrelation
+    is divided by the autocorrelation of the window function (Boersma 1993).
     """
     low = resample(samples, RATE, _PITCH_RATE)
     width, hop = int(0.04 * _PITCH_RATE), int(STEP * _PITCH_RATE)
@@ -53,7 +54,8 @@ def pitch(samples: Samples) -> Curve:
         block = (block - block.mean(axis=1, keepdims=True)) * shape
         power = np.fft.irfft(np.square(np.abs(np.fft.rfft(block, size))))
         score = power[:, lags] / np.maximum(power[:, :1], 1e-9) * (own[0] / own[lags])
-        # prefers the first of equal peaks, which is the period
+        # The small penalty selects the first of equal peaks. It is the period; later peaks are its
+        # multiples.
         best = np.argmax(score - 0.002 * lags, axis=1)
         voiced = (score[np.arange(len(block)), best] > _VOICED) & (power[:, 0] > 1e-6)
         heights = 12.0 * np.log2(_PITCH_RATE / lags[best] / 100.0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Aligns a known text to a voice, or recognises speech, as timed phonemes.
 
-The decoders are PocketSphinx's, with the English model of its wheel. Frames have 10 ms.
+The decoders are PocketSphinx's, with the English model of its wheel. A frame lasts 10 ms.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ _NEEDS = (
 # Seconds of near silence added around each piece, because a decoder must hear speech begin.
 _PAD = 0.3
 _LAG = 0.0128  # seconds from the beginning of a frame to the middle of its 25.6 ms window
-# likelihoods of a word, of skipping a word, and of other speech, for an inexact transcript
+# Likelihoods in the grammar of an inexact transcript: the next word is spoken, it is skipped, or
+# other speech precedes it.
 _SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
-# A single pass with narrow beams: three quick decodings together are better than a thorough one.
+# A single quick pass with narrow beams, because the vote of three quick decodings is better than
+# one thorough decoding.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
 # Options that are tried in turn, because on the best path through the word lattice the alignment of
 # phonemes sometimes does not reach the end of the sound.
@@ -139,7 +141,7 @@ class Recogniser:
         return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
-        """The phonemes of the words that are most likely by an English language model, or None."""
+        """The phonemes of the most likely English words; None if no words are recognised."""
         decoder = self._decoder("words")
         decoder.activate_search()
         _decode(decoder, _pcm(samples))
@@ -175,7 +177,7 @@ def _decode(decoder: Any, pcm: bytes) -> None:
 
 
 def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
-    """A second pass that times phonemes within the words of the first; None if it fails."""
+    """Decodes again to time the phonemes within the words of the first pass; None if it fails."""
     try:
         decoder.set_alignment()
         _decode(decoder, _pcm(samples))
@@ -201,7 +203,14 @@ def _segments(decoder: Any, count: int) -> list[Segment]:
 
 
 def _segment(first: int, last: int, name: str, word: str, count: int) -> Segment:
-    """A Segment from frames of the padded sound, with times of the sound."""
+    """A Segment from frame numbers of the padded sound, with times in the sound without padding.
+
+    Args:
+        first, last: first frame, and last frame + 1.
+        name: name of the segment.
+        word: word that begins with it, as the decoder spells it.
+        count: number of samples without padding.
+    """
     begin, end = (min(max(n * FRAME - _PAD + _LAG, 0.0), count / RATE) for n in (first, last))
     spoken = "" if word[:1] in "<[+" or word == "SIL" else word.partition("(")[0]
     return Segment(begin, end, name, spoken)
@@ -236,7 +245,7 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Converts a piece's phonemes to times of the whole sound; those without duration are dropped.
+    """Converts a piece's phonemes to times of the whole sound; phonemes of no length are dropped.
 
     Args:
         segments: phonemes of the piece.

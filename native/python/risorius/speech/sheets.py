@@ -51,7 +51,7 @@ def write(found: Sequence[Phoneme], name: str) -> str:
 
 
 def table(found: Sequence[Phoneme]) -> str:
-    """Tab-separated lines: begin and end in seconds, phoneme, confidence, the word that begins."""
+    """Tab-separated lines: begin and end in seconds, phoneme, confidence, word that begins here."""
     rows = ["begin\tend\tphoneme\tconfidence\tword"]
     rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
     return "\n".join(rows) + "\n"
@@ -187,7 +187,7 @@ def _from_textgrid(text: str, name: str) -> list[Phoneme]:
 
 def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
     """Name -> intervals of each interval tier. Like Praat, it reads only free-standing numbers,
-    strings and flags, so that long and short files are equal."""
+    strings and flags. So Praat's long and short text formats need no different treatment."""
     tokens = _Tokens(text, name)
     tokens.string()  # ooTextFile
     tokens.string()  # TextGrid

@@ -59,7 +59,7 @@ def _count(votes: Votes, heard: Sequence[Segment], speed: float, weight: float) 
 
 
 def _elected(votes: Votes) -> list[Phoneme]:
-    """Elects the viseme of each frame, then a phoneme for each run; short runs are merged."""
+    """Elects the viseme of each frame, then a phoneme for each run of frames with one viseme."""
     visemes = np.zeros((len(votes), len(VISEMES)))
     for column, viseme in enumerate(_VISEME_OF_COLUMN):
         visemes[:, viseme] += votes[:, column]

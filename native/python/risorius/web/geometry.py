@@ -2,7 +2,7 @@
 """Packs meshes, weights and shapes in few bytes, for native/web/geometry.js.
 
 Numbers are integer steps, stored as differences to an earlier number, with low and high bytes
-apart, because gzip compresses them best in this form."""
+in separate runs, because gzip compresses them best in this form."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class _Streams:
 
         Args:
             values: whole numbers of any shape.
-            stride: numbers are stored as the difference to the number `stride` before; 0:
-                unchanged.
+            stride: numbers are stored as the difference to the number `stride` before; 0: numbers
+                are stored unchanged.
         """
         whole = np.asarray(values, np.int64).ravel()
         if stride:
@@ -89,7 +89,8 @@ def _mesh(mesh: Mesh, kind: str, size: float, streams: _Streams) -> dict[str, An
     about["corners"] = streams.add(corners)
     about["influences"], about["joints"], about["weights"] = _skin(mesh, streams)
     if kind in ("hair", "lashes") and len(mesh.normals):
-        # Hair cards keep the normals of the skin below, which their polygons cannot give.
+        # Hair cards have the normals of the skin below. The page cannot compute these from the
+        # cards' polygons, so they are stored.
         about["normals"] = streams.add(np.rint(_normals(mesh) * _DIRECTION))
     about.update(_targets(mesh, size, streams))
     return about
@@ -105,8 +106,11 @@ def _steps(
 
 
 def _step(values: Floats, most: float) -> float:
-    """The step: the largest power of two, up to 16 steps of the usual size, of which all values are
-    multiples; else the largest one up to `most`."""
+    """The step in which values are stored, a power of two.
+
+    The usual step is the largest power of two up to `most`. It is 16, 8, 4 or 2 times as large if
+    all values are multiples of the larger step.
+    """
     for coarser in (16.0, 8.0, 4.0, 2.0):
         steps = values / (_power(most) * coarser)
         if np.array_equal(steps, np.rint(steps)):
@@ -135,7 +139,8 @@ def _skin(mesh: Mesh, streams: _Streams) -> tuple[list[int], list[int], list[int
     begins = mesh.skin_offsets.astype(np.int64)
     counts = np.diff(begins) if len(begins) else np.zeros(0, np.int64)
     vertex = np.repeat(np.arange(len(counts)), counts)
-    # Neighbours share joints: sorted by joint, their rows look alike and compress better.
+    # Neighbouring vertices share joints. If each vertex lists its joints in ascending order, the
+    # rows of neighbours look alike and compress better.
     order = np.lexsort((mesh.skin_joint_indices, vertex))
     joints = mesh.skin_joint_indices.astype(np.int64)[order]
     weights = np.rint(np.asarray(mesh.skin_weights, np.float64)[order] / _WEIGHT)

@@ -21,7 +21,8 @@ from .textures import Textures, base_name, halved, media_type
 Pixels = npt.NDArray[np.uint8]
 
 _JPEG = "image/jpeg"
-# Role -> (pixels of the longest side, JPEG quality). Wrinkles are soft; hair has few colours.
+# Role of a picture -> (pixels of the longest side, JPEG quality). Wrinkles and hair are stored
+# small, because wrinkles are soft and hair has few colours.
 _SIZES = {
     "color": (1024, 82),
     "hair": (512, 75),
@@ -36,7 +37,8 @@ _REGION = re.compile(r"head_wm([123])_(?!normal)[A-Za-z]+(?:_[A-Za-z]{1,2})?$")
 # pixels per side of a mask: masks are soft, and the page has all of them in one picture
 _TILE = 128
 _FLUSH = 3  # channel number after the three sets of wrinkle normals
-# Wrinkle normals of newer exports are differences about 0.5, so their blue is as grey as their red.
+# Newer exports store wrinkle normals as differences from the skin's normals, with 0.5 for no
+# difference. Their mean blue is about 0.5, in complete normals about 1.
 _OFFSET_BLUE = 0.75  # mean blue below which normals are differences
 
 
@@ -45,7 +47,7 @@ class Looks:
     """Materials and pictures of the page.
 
     Attributes:
-        materials: kind of each material, and use -> number of its picture.
+        materials: table of each material: its kind, and role of a picture -> number of the picture.
         of_mesh: name of a mesh -> number of its material.
         pictures: (media type, bytes) of each picture.
     """
@@ -100,7 +102,7 @@ class _Finder:
         return material
 
     def _picture(self, name: str, role: str, kind: str = "") -> dict[str, int]:
-        """Role -> number of a picture; a colour picture with opacity gives two roles."""
+        """Role -> number of a picture; a colour picture with opacity is split into two pictures."""
         if (name, role) in self.numbers:
             return self.numbers[name, role]
         data = self.textures.read(name)
@@ -120,7 +122,11 @@ class _Finder:
         return found
 
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
-        """Numbers of wrinkle normals, one picture of all masks, (animated map, tile, channel)."""
+        """The table of a material's wrinkles: numbers of the normal maps, and one picture of masks.
+
+        Its list `maps` contains [animated map, tile in the picture of masks, index of the normal
+        map or _FLUSH].
+        """
         sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
         tiles = list[Pixels]()
         for number in (1, 2, 3):

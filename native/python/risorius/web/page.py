@@ -82,7 +82,7 @@ def render(
     clip: Clip | None = None,
     sound: Sound | None = None,
 ) -> bytes:
-    """Writes a page that opens from a file: controls, levels of detail, a clip.
+    """Writes a page that needs no server; it shows the face with controls, LODs and a clip.
 
     Args:
         dna: face with behavior and geometry.
@@ -189,8 +189,13 @@ def _packed(data: bytes, level: int = 9) -> str:
 
 
 def _captures(names: list[str]) -> dict[str, Any]:
-    """The mapping for tables dropped on the page: curve -> [control or angle, weight], with raw
-    controls as numbers and angles as names; and the controls that are shares of others."""
+    """The mapping with which the page reads tables of captures that a user drops on it.
+
+    Returns:
+        "rows": curve -> [control, weight], the control being a raw control's index or the name of
+        an angle. "shares": [index of a control, index of the control of which it takes back a
+        share].
+    """
     mapping = load_mapping(_CAPTURES)
     index = {short_name(name): i for i, name in enumerate(names)}
     index |= {name: i for i, name in enumerate(names)}
@@ -212,8 +217,10 @@ def _captures(names: list[str]) -> dict[str, Any]:
 
 
 def _bones(dna: Dna) -> list[dict[str, Any]]:
-    """Joints that rotate as neck and head: their share of the angles, their axes, and the raw
-    controls that hold their rotation."""
+    """A table for each joint that rotates with the neck or head.
+
+    It contains the joint's share of the angles, its axes, and the raw controls of its rotation.
+    """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     return [
         {
@@ -236,7 +243,7 @@ def _regions(names: list[str]) -> list[dict[str, Any]]:
 
 
 def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes]:
-    """The table for the player, and float32[frames, controls + 4 * turns] as bytes.
+    """The page's table about the clip, and float32[frames, controls + 4 * turns] as bytes.
 
     The columns are the controls that the clip moves, then for each joint of neck and head its
     rotation relative to rest, as a quaternion x, y, z, w about the joint's own axes.
@@ -260,7 +267,11 @@ def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes
 
 
 def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
-    """Joint -> float64[frames, 4]: from its raw controls, else from the angles of neck or head."""
+    """Joint -> float64[frames, 4], its rotation as a quaternion.
+
+    The rotation comes from the joint's raw controls if the clip moves them, else from the angles of
+    neck or head.
+    """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     raw = dna.raw_control_names
     found = {}

@@ -27,14 +27,16 @@ class Textures:
     """The textures of a face.
 
     Attributes:
-    named: name of a mesh without its LOD -> role -> file name.
+        named: name of a mesh without its LOD -> role of a picture -> file name.
     """
 
     def __init__(self, dna: Dna, file: Path | None) -> None:
-        """Args:
-        dna: the face with its metadata.
-        file: path of the DNA file; pictures are in its folder or in <stem>_textures. None: no
-            pictures.
+        """Read the names of the textures.
+
+        Args:
+            dna: the face, whose metadata names the textures.
+            file: path of the DNA file; pictures are in its folder or in <stem>_textures. None: no
+                pictures.
         """
         self._folders = (
             () if file is None else (file.with_name(f"{file.stem}_textures"), file.parent)

@@ -17,19 +17,21 @@ from ..source import BaseMesh
 
 MM = 0.01  # decimetres per millimetre
 SEGMENTS = 48  # columns around the gaze
-# Radius of the iris in radii of the ball. People have 5.85 mm in 12 mm, but the lids of the data
+# Radius of the iris in radii of the ball. It is 5.85 mm / 12 mm in people, but the lids of the data
 # fit a larger ball.
 IRIS = 0.395
 CORNEA = 4 / 3  # radius of the cornea divided by the radius of the iris: 7.8 mm / 5.85 mm
 PUPIL = 0.33  # radius of the pupil in room light, in radii of the iris
 CONVERGENCE = 1.2  # degrees by which each eye turns inwards, to look at a point 1.5 m away
-# Angle in radians between gaze and limbus, the iris' outer edge, at the middle of the ball.
+# Angle in radians between the gaze and the limbus (the iris' outer edge), seen from the ball's
+# middle.
 _LIMBUS = float(np.arcsin(IRIS))
 _EDGE = _LIMBUS + 0.22  # angle in radians at which the cornea's shell sinks into the ball
 _SOFT = 0.012  # width of the blend between cornea and ball, in radii of the ball
 _CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the ball
-# Rings of the iris from the pupil (0) to its root (1); below, depths behind the limbus at root,
-# middle and pupil, in radii of the iris.
+# Positions of the iris' rings, from the rim of the pupil (0) to the root of the iris (1). _ROOT,
+# _MIDDLE and _RIM: depths of the iris' root, of the iris' middle and of the pupil's rim behind the
+# limbus, in radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
 _HOLE = 0.28  # depth of the pupil behind the iris, in radii of the iris
@@ -42,7 +44,8 @@ _CORNEA_RINGS = np.array(
 # Indices of the rings that the coarse LOD keeps.
 _COARSE_BALL = [0, 1, 2, 4, 6, 8, 10, 11, 12, 15, 17, 19, 21, 22, 23, 24, 25, 26]
 _COARSE_CORNEA = [1, 3, 5, 7, 9, 12]
-# Distances from the middle of the texture: the iris gets most of it, the hidden back little.
+# Distances of the limbus and of the angle SIDE_ANGLE (radians from the gaze) from the middle of the
+# texture, in texture widths. The hidden back of the ball gets the small area beyond SIDE_AT.
 IRIS_AT, SIDE_AT, SIDE_ANGLE = 0.26, 0.47, 1.4
 
 
@@ -64,7 +67,7 @@ def side_map(angle: Floats) -> Floats:
     """float64[...]: distance from the middle of the texture for points outside the iris.
 
     Args:
-        angle: float64[...], angle from the gaze in radians, at least that of the limbus.
+        angle: float64[...], angle from the gaze in radians, at least the angle of the limbus.
     """
     low = IRIS_AT + (SIDE_AT - IRIS_AT) * (angle - _LIMBUS) / (SIDE_ANGLE - _LIMBUS)
     high = SIDE_AT + (0.5 - SIDE_AT) * (angle - SIDE_ANGLE) / (np.pi - SIDE_ANGLE)
@@ -235,7 +238,7 @@ def seat(
 
 
 def pupil_wide(radius: float, side: str) -> Floats:
-    """float64[ball vertices, 3]: displacement of the iris to its root, so that the pupil fills it.
+    """float64[ball vertices, 3]: displacement that widens the pupil over the whole iris.
 
     Args:
         radius: radius of the ball in decimetres.

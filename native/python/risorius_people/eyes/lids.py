@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lays the lids on the eye: at rest, in each expression, closed and half closed."""
+"""Moves lids so that they touch the eyeball: at rest, in expressions, closed and half closed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from . import eyeball
 from .eyeball import IRIS, MM
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
-# mm above the eye of the rings from the lashes' roots to the inner rim: the skin's edge, the middle
-# of the rim, the contact with the eye, and a ring hidden in the ball.
+# Heights above the eye in mm of the four rings of a lid's rim, from the lashes' roots inwards: the
+# skin's edge, the middle of the rim, the contact with the eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-# Share of the rim's displacement that the rings outside the rim follow, from the rim outward.
+# Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
-# mm by which lids rise in a full look, because half a look moves them straight, not round the ball
+# mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
+# round the ball, so without this height they would be inside the ball at half of the look.
 _LIFT = 0.38
 # Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
 # eyes turn by a third of this, and their lower lids stay still.
@@ -96,11 +97,11 @@ class Lids:
     rest: Floats
 
     def grid(self, values: Floats) -> Floats:
-        """float64[13, COLUMNS, 3]: the values of the rings' vertices."""
+        """float64[13, COLUMNS, 3]: `values` at the vertices of the rings."""
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """float64[13, COLUMNS, 3]: a grid with its rim laid on the eye; the skin around it follows.
+        """float64[13, COLUMNS, 3]: a grid whose rim touches the eye; skin around the rim follows.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
@@ -120,7 +121,7 @@ class Lids:
             out[_EDGE] += lack[:, :, None] * ray[_EDGE]
             drawn = _FADE[::-1, None] * lack[0]
             out[:ROOT] += drawn[:, :, None] * ray[:ROOT]
-        # Skin outside the rim that is pushed up must stay above the eye, too.
+        # Skin around the rim must stay above the eye, too.
         arm = out[:ROOT] - self.middle
         length = np.linalg.norm(arm, axis=2)
         angle = np.arccos(np.clip(arm @ gaze / length, -1, 1))
@@ -193,8 +194,8 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
 
 
 def _lower_lid(grid: Floats) -> Floats:
-    """float64[13, COLUMNS, 1]: the lower lid's weight, 1 at the rim's middle, 0 at the corners
-    and the cheek."""
+    """float64[13, COLUMNS, 1]: how much a grid point belongs to the lower lid: 1 at the middle of
+    the lid's rim, 0 at the eye's corners and on the cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)
@@ -210,7 +211,8 @@ def _lower_closed(lids: Lids) -> Floats:
 
 
 def following(lids: Lids, way: str, look: Floats) -> Floats:
-    """float64[V, 3]: displacement of the lids, because the eye turns further than in the data.
+    """float64[V, 3]: displacement of the lids in a look, larger than in the data because the eye
+    rotates further.
 
     Args:
         lids: the lids at rest.
@@ -224,10 +226,10 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 
 
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
-    """Displacements from rest that close the lids: laid on one line, and as in the data.
+    """Two displacements from rest that close the lids, float64[V, 3] each.
 
-    Both are float64[V, 3]. The data's displacement is shortened, because it would move the upper
-    lid past the lower lid.
+    The first lays both lids on one line. The second is the data's displacement, shortened because
+    it would move the upper lid past the lower lid.
 
     Args:
         lids: the lids at rest.
@@ -295,7 +297,9 @@ def _even(share: Floats, known: Floats) -> Floats:
 
 
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
-    """float64[V, 3]: displacement of the skin outside the grid, minus the opening of the lids.
+    """float64[V, 3]: the shortened blink from rest, for the skin outside the grid.
+
+    It also undoes the displacement that opened the lids to their rest pose.
 
     Args:
         lids: the lids at rest.
@@ -312,7 +316,7 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
 
 
 def between(lids: Lids, way: Floats) -> Floats:
-    """float64[V, 3]: correction of half-closed lids, which move straight and not round the ball.
+    """float64[V, 3]: correction of half-closed lids, which would move straight through the ball.
 
     Args:
         lids: the lids at rest.
@@ -342,7 +346,7 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
 
 
 def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) -> Floats:
-    """float64[V, 3]: displacement to add if closed lids get a second expression.
+    """float64[V, 3]: displacement to add so that closed lids stay closed in a second expression.
 
     Args:
         lids: the lids at rest.

@@ -16,8 +16,8 @@ _BALLS = {
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Sections of the caruncle: (columns from the corner, distance inwards on the rim, height above the
-# line between both rims, in lid thicknesses).
+# Cross sections of the caruncle: (number of grid columns from the eye's inner corner, position `at`
+# across the rim as in _rim, height above the line between both rims in lid thicknesses).
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),
@@ -93,7 +93,7 @@ def _mixed(*parts: tuple[float, Row]) -> Row:
 
 
 def _on_skin(rings: Ints, row: int, column: int) -> Row:
-    """Weights of a lid vertex after one Catmull-Clark step, which the skin of LOD 0 has.
+    """Weights of the base mesh's vertices for a lid vertex after the subdivision of LOD 0.
 
     Args:
         rings: int64[13, COLUMNS], the rings of the eye.

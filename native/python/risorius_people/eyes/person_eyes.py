@@ -73,7 +73,7 @@ class Eyes:
 
         Args:
             eye: lids of the eye.
-            way: float64[V, 3], displacement; that of the lashes is changed.
+            way: float64[V, 3], displacement; its rows of the lashes are changed.
             before: float64[V, 3], the part of the skin's displacement that the lashes have already.
         """
         roots = eye.rings[_LASH_RINGS].ravel()
@@ -117,14 +117,15 @@ class Eyes:
                 turn = turns.get(other)
                 more = lids.stays_on_the_ball(eye, units[one], units[other], turn)
                 correctives[(one, other)] = self._with_lashes(eye, more, still)
-            # If the control's own shape is closed + 4 * half, the sum adds 4 x (1 - x) * half: 0
-            # for open and closed lids, and half in between.
+            # The control's shape becomes closed + 4 * half. At a value x it gives, together with
+            # this corrective, x * closed + 4 * x * (1 - x) * half: all of `half` at x = 0.5, and
+            # none of it for open and closed lids.
             correctives[(blink, blink)] = -4 * half
             units[blink] = closed
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:
-        """Turns the eyes about their middle; the lids follow further than in the data."""
+        """Makes a look rotate the eyeball about its middle; lids follow more than in the data."""
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
         for way in lids.LOOKS:

@@ -46,7 +46,7 @@ def _rings(
     first: list[int],
 ) -> Ints:
     ahead = [_beside(first, faces, edges, way) for way in (0, 1)]
-    # The next ring inwards is nearer to the middle of the eye.
+    # Of both neighbouring rings, the inner one is nearer to the middle of the eye.
     middle = base.positions[groups[f"helper-{side}-eye"]].mean(axis=0)
     ahead.sort(key=lambda ring: np.linalg.norm(base.positions[ring] - middle, axis=1).mean())
     inside, outside = [first, ahead[0]], [first, ahead[1]]

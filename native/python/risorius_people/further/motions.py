@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Displacements made by code: lids, lashes, pupils, neck, teeth and tongue.
+"""Computes displacements of lids, lashes, pupils, neck, teeth and tongue that the data lack.
 
 Each function in MOTIONS gets the places of a face and the value `by` of its row in further.toml; it
 returns float64[V, 3].
@@ -45,14 +45,17 @@ def _number(by: object) -> float:
 
 
 def _lid_turn(places: Places, by: object) -> Floats:
-    """A rotation about the middle of the eye, so that a lid slides on the ball; 1: up, -1: down."""
+    """Rotates about the middle of the eye, so that a lid slides on the ball.
+
+    `by` is the angle in radians, positive: up.
+    """
     arm = places.positions - places.eye_of()
     way = np.cross(np.array([-1.0, 0, 0]), arm)
     return np.asarray(way * _number(by))
 
 
 def _lid_press(places: Places, _: object) -> Floats:
-    """Presses both lids together, towards the nose and outwards, as tightly shut eyes do."""
+    """Presses both lids together, towards the nose and forward, as tightly shut eyes do."""
     upper, lower = places.lids["U"][:, None], places.lids["D"][:, None]
     turn = _lid_turn(places, 1) / 0.15
     inwards = np.zeros_like(turn)
@@ -64,7 +67,7 @@ def _lid_press(places: Places, _: object) -> Floats:
 
 
 def _lashes_up(places: Places, by: object) -> Floats:
-    """Turns upper lashes up about their roots; -1: the half at the nose, 1: at the temple."""
+    """Rotates upper lashes up; `by` -1: the half of the lid at the nose, 1: at the temple."""
     positions, groups = places.positions, places.groups
     out = np.zeros_like(positions)
     for letter in "lr":
@@ -78,12 +81,12 @@ def _lashes_up(places: Places, by: object) -> Floats:
 
 
 def _lashes_down(places: Places, by: object) -> Floats:
-    """Turns upper lashes down about their roots; -1: the half at the nose, 1: at the temple."""
+    """Rotates upper lashes down; `by` -1: the half of the lid at the nose, 1: at the temple."""
     return -_lashes_up(places, by) * np.array([1.0, 1.0, -1.0])
 
 
 def _pupil(places: Places, by: object) -> Floats:
-    """Moves the rim of the pupil along the ball; 1: wider, -1: narrower. The iris' rim stays."""
+    """Moves the pupil's rim along the ball; `by` 1: wider, -1: narrower. The iris' rim stays."""
     out = np.zeros_like(places.positions)
     for side, middle in places.eyes.items():
         eye = places.groups[f"helper-{side.lower()}-eye"]
@@ -150,7 +153,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
     def move(places: Places, by: object) -> Floats:
         _, points, share = _on_tongue(places)
         beyond = np.clip((share - begin) / (1 - begin), 0, 1) ** power
-        # a positive rotation about the axis to the character's left would be down
+        # negated, because a positive rotation about x, to the character's left, is down
         degrees = beyond[:, None] * _vector(by) * [-1, 1, 1]
         return _of_tongue(places, _turned(points, _root(points, share, begin), degrees))
 

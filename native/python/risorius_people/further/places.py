@@ -51,7 +51,7 @@ def bell(distance: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Places:
-    """Regions and measures of a face for the further controls.
+    """Regions and measures of a face for the controls of further.toml.
 
     Arrays have a row per vertex of the base mesh; lengths are in decimetres.
 
@@ -99,7 +99,7 @@ def find_places(
         positions: float64[V, 3], in decimetres.
         groups: name of a group of the base mesh -> vertex indices.
         jaw_open: float64[V, 3], displacement of the opening jaw, which distinguishes the lips.
-        brow_shapes: float64[V, 3], sum of the sizes of displacements of brows up and down.
+        brow_shapes: float64[V, 3], sum of the absolute displacements of brows up and down.
     """
     count = len(positions)
     faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
@@ -109,7 +109,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # A parabola, because the lips touch over some millimetres, not along a line.
+    # Smooths the line (degree 4 in x), because the lips touch in an area some millimetres high.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)
@@ -129,7 +129,10 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of lips that are near the other lip, share no face with it, and that the jaw parts.
+    """Vertices of one lip that touch the other lip.
+
+    Near such a vertex is a vertex of the other lip. The opening jaw parts both vertices, and no
+    face has both.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -152,12 +155,12 @@ def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: F
 
 
 def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
-    """float64[V]: weight of a lid of both eyes; lashes get the weight of the skin below.
+    """float64[V]: weight of both upper or both lower lids; lashes get the weight of the skin below.
 
     Args:
         positions: float64[V, 3], in decimetres.
         groups: name of a group of the base mesh -> vertex indices.
-        number: number of its lash group: 1 for the lower lid, 2 for the upper one.
+        number: number of the lids' lash group: 1 for lower lids, 2 for upper lids.
     """
     out = np.zeros(len(positions))
     body = groups["body"]
@@ -167,7 +170,8 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         roots = positions[lashes[height < np.quantile(height, 0.35)]]
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
-        # At the corners the other lid is as near, so only skin on this side of the roots counts.
+        # At the corners of the eye both lids are equally near, so only skin above the roots of the
+        # upper lashes or below the roots of the lower lashes counts.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

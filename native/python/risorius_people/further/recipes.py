@@ -22,7 +22,7 @@ _OF_DATA = {"data", "units", "size", "with"}
 
 
 def names_of(row: str) -> list[str]:
-    """The raw controls of a row: its name, or one name for each side if it contains {s}."""
+    """The raw controls of a row: the row's name, or one name per side if the name contains {s}."""
     return [row.replace(_SIDE, side) for side in "LR"] if _SIDE in row else [row]
 
 
@@ -32,12 +32,12 @@ CONTROLS_OF_CODE = [
 
 
 def unit_shape(source: Source, origin: Mapping[str, float], name: str, count: int) -> Floats:
-    """float64[V, 3]: displacement of a FACS-like unit, mixed from the data's origins, in
-    decimetres.
+    """float64[V, 3]: displacement of a FACS-like unit in decimetres, mixed from the shapes of the
+    origins.
 
     Args:
         source: the data with the unit.
-        origin: origin of the data -> its share in the person; the sum is 1.
+        origin: one of ORIGINS (parts of the world) -> its share in the person; the sum is 1.
         name: name of the unit.
         count: number of vertices V.
     """
@@ -56,12 +56,13 @@ def further_units(
     units: Mapping[str, Floats],
     sides: Mapping[str, Floats],
 ) -> tuple[dict[str, Floats], dict[tuple[str, str], Floats]]:
-    """Raw control -> float64[V, 3], and two raw controls -> float64[V, 3] of a corrective, in
-    decimetres.
+    """The displacements of further.toml in decimetres.
+
+    Returns raw control -> float64[V, 3], and for correctives two raw controls -> float64[V, 3].
 
     Args:
         source: the data with the shapes.
-        origin: origin of the data -> its share in the person; the sum is 1.
+        origin: one of ORIGINS (parts of the world) -> its share in the person; the sum is 1.
         places: regions of the face.
         units: raw control -> float64[V, 3], of the controls that exist already.
         sides: "L" or "R" -> float64[V], weight of the side; the sum is 1.

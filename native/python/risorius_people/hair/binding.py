@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes hair cards meshes of a Dna: each vertex gets the weights and shapes of the skin below it.
+"""Binds hair cards to a face: each vertex gets the weights and blend shapes of the skin below it.
 
 Cards are bound to the finished face, so the hair moves with the skin of any rig, and the fits of
 the rig need not handle hair.
@@ -22,7 +22,7 @@ from .surface import Roots, about, nearest_places, nearest_rows
 _LEAST_WEIGHT = 0.01  # smaller skin weights are dropped
 ARM = 0.8  # centimetres: a hair turns with the skin as if it were at most this long
 _MOST_INFLUENCES = 8  # joints per vertex
-# Controls that move touching lips and lids apart.
+# Controls that move upper and lower lip, or upper and lower lid, differently.
 _PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
 
@@ -55,8 +55,8 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
 def whereabouts(dna: Dna, head: Mesh) -> Floats:
     """float64[V, 12]: positions at rest, with an open jaw, and with either eye closed.
 
-    Lips and lids touch at rest; in these poses they are far apart, so that the nearest points of
-    two heads are on the same lip or lid.
+    The poses move upper and lower lips and lids differently. Therefore the point of another head
+    with the nearest 12 numbers is on the same lip or lid, although lips touch at rest.
 
     Args:
         dna: face with the controls.
@@ -81,7 +81,8 @@ def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Fl
         head: the head mesh of the LOD.
         strips: the hair of the LOD.
         unit: length of the strips' unit in the unit of the mesh.
-        own: float64[n, 12], `whereabouts` at the roots on the head of LOD 0; None: on this head.
+        own: float64[n, 12], `whereabouts` of the roots on the head of LOD 0; the nearest places on
+            this head are used. None: this head is LOD 0.
         there: float64[V, 12], `whereabouts` of the head's vertices.
     """
     positions = np.asarray(head.positions, np.float64) / unit
@@ -146,8 +147,8 @@ class Turning:
         return unit_vectors(self._places.of(unit_vectors(np.stack(sums, axis=1)[:-1])))
 
     def of(self, delta: Floats) -> Floats:
-        """float64[n, 3]: displacement of the cards by their rotation, besides the shift of their
-        places.
+        """float64[n, 3]: displacement of the cards by their rotation, to add to the shift of the
+        skin.
 
         Args:
             delta: float64[V, 3], the shape's displacement of the skin.
@@ -156,10 +157,10 @@ class Turning:
 
 
 def turned(off: Floats, was: Floats, now: Floats) -> Floats:
-    """float64[..., 3]: displacement of ends that rotate with a normal.
+    """float64[..., 3]: displacement of the ends of hairs if the skin's normal rotates.
 
     Args:
-        off: float64[..., 3], vector from the foot of the normal to each end.
+        off: float64[..., 3], vector from the point on the skin to the hair's end.
         was, now: float64[..., 3], unit normals before and after the rotation.
     """
     axis = np.cross(was, now)
@@ -185,7 +186,8 @@ def bind(
         mesh: the cards; changed.
         head: the mesh of the skin.
         places: place on the skin for each vertex of the cards.
-        least: length in the unit of the mesh; a shape that moves no vertex further is left out.
+        least: length in the unit of the mesh; a shape whose largest displacement is smaller is left
+            out.
         rigid: whether places that move less than `least` follow the head joint alone.
         turns_itself: whether to leave out the rotation by shapes, because the caller adds its own.
     """
@@ -224,7 +226,7 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: places that no control moves further than `least`, and that no neck joint moves."""
+    """bool[n]: whether no control moves a place further than `least`, and no neck joint does."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

@@ -2,7 +2,7 @@
 """Cuts or drops hairs that expressions would bring into the skin.
 
 Long hair under the chin would enter the throat if the mouth opens wide. Hair at the rim of a lip
-would enter the lip if it rolls in. The finished face is posed to find such hairs.
+would enter the lip if the lip rolls in. The finished face is posed to find such hairs.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _NEAR = 0.3  # decimetres: skin further than this from every hair is ignored
 _SOME = 256  # number of hair points that determine which skin is near
 _LOW = 0.002  # decimetres: height above the skin that an end must keep, unless it is lower at rest
 _DEEPER = 0.002  # decimetres by which a root, which is in the skin, may sink deeper than at rest
-# decimetres: a control that moves all skin by less cannot bring a hair into the skin
+# decimetres: a control that moves no skin farther than this cannot bring a hair into the skin
 _STILL = 0.002
-# decimetres: a control that moves the skin under a hair by less does not affect this hair
+# decimetres: a control that moves the skin under a hair by less than this does not affect the hair
 _STIRRED = 0.0005
 _SUNK = 0.0015  # decimetres: hairs that sink by less in the rough test are not tested exactly
 _ROUGHLY = 4  # the rough test uses every fourth vertex
@@ -71,7 +71,7 @@ def cut_clear(
     """Shortens or drops hairs that would go through the skin, and returns the others.
 
     Args:
-        strips: hair that follows the skin at its roots alone, in decimetres; changed.
+        strips: hair in decimetres, of which only the roots follow the skin; changed.
         dna: the finished face.
         head: the head mesh of LOD 0.
         unit: length of a decimetre in the unit of the mesh.
@@ -103,7 +103,7 @@ def cut_clear(
 
 
 def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
-    """The results for all rows in order; a thread computes them in advance."""
+    """The results of `work` for all rows in order; a thread computes them in advance."""
     waiting: deque[Future[T]] = deque()
     with ThreadPoolExecutor(1) as pool:
         for row in rows:
@@ -115,7 +115,7 @@ def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
 
 
 class _Ground:
-    """The skin near the hairs, and its motion with the face. Args: as of cut_clear."""
+    """The skin near the hairs, and its motion with the face. Arguments are as in cut_clear."""
 
     def __init__(self, strips: Strips, dna: Dna, head: Mesh, unit: float) -> None:
         self.unit, self._dna, self._rig = unit, dna, Rig(dna)
@@ -147,7 +147,7 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """The roots of strips, as weighted corners of triangles; corners are rows of this skin."""
+        """The roots of strips, as weights of vertices; vertices are numbered as in `rest`."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:
@@ -193,7 +193,10 @@ class _Posed:
         return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
-        """float64[n, rows, 2, 3]: left and right edges in the pose, moved as in binding.py."""
+        """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
+
+        They move as the cards that binding.py binds to the skin.
+        """
         ground = self._ground
         roots = ground.roots(strips)
         was, now = (unit_vectors(roots.of(n)) for n in (ground.upright, self._turned))
@@ -209,8 +212,11 @@ class _Posed:
         )
 
     def rough(self, strips: Strips) -> Floats:
-        """float64[n, rows]: approximate heights of the guides above the skin, from the tangent
-        plane of the nearest among every fourth vertex."""
+        """float64[n, rows]: approximate heights of the guides above the skin.
+
+        They are measured from the tangent plane of the nearest vertex. Only every fourth vertex is
+        considered.
+        """
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
         near = _nearest(points, self.skin[some])
@@ -229,7 +235,7 @@ class _Posed:
 
 
 class _Cutting:
-    """Hairs that are cut, and `stays`, bool[n], which is False for dropped hairs."""
+    """Cuts hairs, and sets `stays`, bool[n], to False for dropped hairs."""
 
     def __init__(self, strips: Strips, still: _Posed) -> None:
         self._strips, self._still = strips, still

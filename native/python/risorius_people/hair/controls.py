@@ -57,7 +57,7 @@ def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
 
 
 def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Adds shapes that rotate lashes about their roots by the angle of the lid around the eye.
+    """Adds shapes that rotate lashes about their roots by the angle by which the lid slides.
 
     Args:
         dna: face with joints of both eyes.

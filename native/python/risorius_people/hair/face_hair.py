@@ -49,7 +49,8 @@ def brow_flow(surface: Surface) -> Floats:
     low = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [64, 56, 42, 26, 8])
     high = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [56, 34, 2, -16, -14])
     angle = low + (high - low) * smooth_step(0.5 + 0.5 * across)
-    # A rotation to the left about the outward normal is up on the left side, down on the right.
+    # A positive rotation about the outward normal raises hairs on the left side of the face, and
+    # lowers them on the right side.
     return tangent(_turned(arc, surface.normals, np.radians(angle) * side), surface.normals)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Grows guides of hair: they follow a flow over the skin, and rise above it by their stiffness."""
+"""Grows guides of hair: polylines that follow a flow over the skin at given angles above it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def grow(
         least: float64[n] or a number, smallest height of a tip above the skin in decimetres.
         stiff: weight of the previous direction in each step, 0 to 1.
         fall: float64[n] or a number, weight of gravity at the tip.
-        hug: strength that pulls a loose guide back to the skin, above the lower ends of the ears.
+        hug: weight of the pull back to the skin on guides that are above the lobes of the ears.
         sway: float64[n, 3], constant offset of each guide's direction from the flow. Noise in the
             flow would instead bend a card at every vertex.
 

@@ -31,16 +31,18 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # number of the first LOD without hair cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # fraction of the strips that is kept at each LOD
-# More brows are kept, because wide cards would look like dashes while the face is still large.
+# Fraction of the brows that is kept at each LOD. It is larger than for other hair, because fewer
+# cards must be wider, and wide cards look like dashes while the face is large on the screen.
 _BROWS = (1.0, 0.75, 0.3, 0.1)
 _MOST_VERTICES = 12_000  # limit for all cards at LOD 0 together
 _OWN = ("hair", "beard")  # meshes that not all people have
 _ROWS = (99, 4, 3, 3)  # largest number of rows of a card at each LOD
-# Millimetres: shapes that move a mesh by less are left out.
+# Millimetres: shapes that move no vertex of a mesh farther than this are left out.
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # millimetres in a centimetre
 _OVERDONE = np.float32(1.4)  # factor on the controls of an expression; each control stays at most 1
-# Expression that brings most of a beard to folds of the skin, and its weight.
+# Expression that is added to all others when the beard is tested, and its weight. The expression
+# folds the skin under most of the beard.
 _WIDEST, _OVER = "smile_open", np.float32(0.5)
 _COIL = 1.6  # mm: radius of the coils of an afro 4 cm long
 _PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1
@@ -112,7 +114,8 @@ def add_hair(dna: Dna, grown: Grown) -> None:
         dna: the face; changed.
         grown: the hair; hairs of the beard that would enter the skin are cut or dropped.
     """
-    # Meshes that not all people have come last, so that the others have the same numbers in a mix.
+    # Meshes that not all people have come last, so that all other meshes have the same index in all
+    # people. Mixing people needs this.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}

@@ -16,7 +16,7 @@ from .growth import curled, eased, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
-# Position of the whorl at the crown on the man's head.
+# Position of the whorl at the crown, in decimetres on the man's head as in Surface.man.
 _WHORL = np.array([0.10, 0.86, -1.40])
 _PARTING = 0.10  # x of the parting on the man's head; his left is positive
 _THIN = TILES["scalp"][4] - DENSE  # number of thin tiles
@@ -54,7 +54,7 @@ def _roots(
     even: bool = True,
     fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
-    """Roots inside an uneven hairline, and float64[n], their distances inside it in decimetres.
+    """Roots behind an uneven hairline, and float64[n], their distances from it in decimetres.
 
     Short hair (`even` False) is denser where it lies flat, and sparser where it stands up. Long
     hair is denser at the hairline and, with `fine` 1, at a parting.
@@ -62,7 +62,8 @@ def _roots(
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
-    # Uneven, because single hairs grow before the line, and the corners at the temples are round.
+    # Wide waves in the hairline make its corners at the temples round, and leave single hairs in
+    # front of the line.
     if even:
         inside = inside + 0.016 * wavy(man, random, 1.6)
     density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)
@@ -171,8 +172,8 @@ def afro(surface: Surface, person: Person) -> Strips:
     length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
-    # The edges of upright cards are visible at the hairline, with little hair around: they lie
-    # flat.
+    # Cards lie flat at the hairline, because there is too little hair to hide the edges of upright
+    # cards.
     upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
 
     def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
@@ -218,7 +219,7 @@ def long(surface: Surface, person: Person) -> Strips:
     length *= random.uniform(0.88, 1.08, n)
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    # smallest height above the skin, so that an ear that rises does not come through
+    # smallest height above the skin in decimetres, so that raised ears stay below the hair
     least = (0.036 + 0.02 * random.random(n)) * surface.scale
     points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
@@ -236,7 +237,7 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """A fringe: hair from behind the hairline that falls over the forehead to a line."""
+    """A fringe: hair from behind the hairline falls over the forehead, and ends at one height."""
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T
@@ -249,7 +250,7 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
     length = 1.1 * surface.scale * random.uniform(0.9, 1.1, n)
     rise = np.radians(random.uniform(14, 26, n)), np.zeros(n)
     near = np.flatnonzero((y > -0.3) & (z > -1.5))
-    # The skin of the forehead moves below the fringe, so a gap is kept.
+    # A gap below the fringe leaves room for the moving skin of the forehead.
     least = (0.025 + 0.03 * random.random(n)) * surface.scale
     sway = 0.07 * random.normal(0, 1, (n, 3))
     points, out = grow(surface, roots, flow, length, rise, rows, near, least, 0.4, 0.3, 1.0, sway)
@@ -265,7 +266,9 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
 def _ended(
     surface: Surface, points: Floats, out: Floats, end: Floats, near: Ints
 ) -> tuple[Floats, Floats]:
-    """Guides that end where they come down to a height on the head; their number of points stays.
+    """Shortens guides to end where they first descend to a given height on the head.
+
+    The number of their points stays.
 
     Args:
         surface: surface of the head.
@@ -301,7 +304,7 @@ def parted_flow(surface: Surface) -> Floats:
     fore = smooth_step((z + 0.5) / 0.5) * top
     flow[:, 1] += 0.4 * fore
     flow[:, 2] -= 0.55 * fore
-    # Hair in front of the ears and above goes back; below the ears it falls.
+    # Hair in front of the ears and above them points back; below the ears it points down.
     before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
     flow[:, 2] -= 0.9 * before
     low = smooth_step((-0.35 - y) / 0.25)[:, None]

@@ -30,7 +30,7 @@ class Strips:
         normals: float64[n, rows, 3], unit normals for shading, away from the skin.
         tiles: int64[n], tile of each strip in the atlas.
         roots: place of each strip on the skin.
-        held: float64[n]: above 0, each row follows the skin below it; 0, all rows follow the root.
+        held: float64[n]; if above 0, each row follows the skin below it, else all follow the root.
     """
 
     points: Floats
@@ -99,7 +99,8 @@ def make_strips(
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
-    # If a hair crosses the outward direction, its left side flips, and the card would fold.
+    # If a hair's direction passes through the outward direction, its left side changes its sign,
+    # and the card would fold.
     along = np.sign((side[:, 1:] * side[:, :-1]).sum(axis=2, keepdims=True))
     side[:, 1:] *= np.cumprod(np.where(along < 0, -1, 1), axis=1)
     if turns is not None:
@@ -107,7 +108,8 @@ def make_strips(
         c, s = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
         side = c * side + s * up
     sides = side * half_width[:, None, None] * taper[None, :, None]
-    # A strip on edge would have half of its root deep in the skin, so its root is narrowed.
+    # A strip that stands on its edge would have half of its root deep in the skin, so its root
+    # is narrowed.
     deep = np.abs((sides[:, 0] * outside[:, 0]).sum(axis=1))
     sides[:, 0] *= np.minimum(1, ROOT_DEEP / np.maximum(deep, 1e-9))[:, None]
     return Strips(points, sides, unit(outside), tiles, roots, np.full(len(points), held))

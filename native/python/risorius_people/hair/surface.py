@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin on which hair grows: places on its triangles, which are the same for all people."""
+"""Represents places on the skin, where hair grows, by triangles that all people share."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Surface:
     Attributes:
         positions: float64[V, 3] of the person, in decimetres.
         normals: float64[V, 3], unit normals of the person.
-        man: float64[V, 3], the man's positions, on which all maps of hair are defined. y and z are
+        man: float64[V, 3], the man's positions, by which the areas of hair are defined. y and z are
             relative to the middle of his left eye, x to the middle of the face.
         scale: size of the person's head relative to the man's.
     """
@@ -77,7 +77,7 @@ class Surface:
         self._around = about(self.triangles, len(positions))
 
     def scattered(self, density: Floats, spacing: float, random: np.random.Generator) -> Roots:
-        """Random places; their smallest distance is the spacing divided by the root of the density.
+        """Random places, at least the spacing divided by the square root of the density apart.
 
         Args:
             density: float64[V], 0 to 1; 0 means no places.

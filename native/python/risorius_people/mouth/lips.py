@@ -20,15 +20,15 @@ _BINS = 24  # number of bins across the mouth
 
 
 class Mouth:
-    """The faces of the mouth with the subdivision of LOD 0, and the vertices of both lips.
+    """The faces of the mouth, subdivided as in LOD 0, and the vertices of both lips.
 
     Attributes:
         operator: converts values of the base mesh's vertices to the subdivided faces' vertices.
-        upper, lower: int[n], subdivided vertices of each lip.
+        upper, lower: int[n], indices of the subdivided vertices of each lip.
     """
 
     def __init__(self, base: BaseMesh, pucker: Floats, jaw_open: Floats) -> None:
-        """Finds the lips by their motion, because their positions touch.
+        """Finds the lips by their motion, because their positions are too near to each other.
 
         Args:
             base: the base mesh.

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Makes teeth and gums by code along the arch of the base mesh's own teeth, which are bare strips.
+"""Makes teeth and gums in place of the base mesh's teeth, which are bare strips.
 
 A crown is a stack of rings between the biting edge and the gum. Its measures are means of adults
-(Wheeler's Dental Anatomy, tables of the crowns). Lengths are in decimetres, positions on the base
-mesh. Each vertex is an affine combination of the strip's vertices, so that teeth fit every head and
-move with the strip.
+(Wheeler's Dental Anatomy, tables of the crowns). Lengths are in decimetres on the base mesh. Each
+vertex is an affine combination of a strip's vertices, so that teeth fit every head and move with
+the strip.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ _PROFILES = {
         (-1.6, -0.9, -0.35, 0.15, 0.35, 0.2, -0.1, -0.5),
     ),
 }
-# mm beyond the gum's margin, on the side of the lip
+# Rows of the gum on the side of the lip: mm from the gum's margin away from the biting edge.
 _GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)
 _GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm outside the crown's lip side
 _PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)  # the same on the side of the tongue
@@ -76,17 +76,17 @@ _PALATE_IN = (0.9, -0.2, -1.6, -6.0)
 
 
 class Arch:
-    """The curve of the biting edges, by its length from the middle, with a frame at each point."""
+    """The curve of a jaw's biting edges, as a function of the distance along it from the middle."""
 
     def __init__(self, edge: Floats, up: float) -> None:
-        """Fits the curve to points of one half.
+        """Fits the curve to points of its left half; the right half mirrors it.
 
         Args:
             edge: float64[n, 3] in decimetres, points from the middle outward.
             up: 1 for the upper jaw, -1 for the lower jaw: sign of y from the edge to the gum.
         """
-        # A smooth curve through few points: polynomials in the fraction of the length. y and z are
-        # even functions.
+        # Polynomials in the fraction of the length make a smooth curve from few points. The points
+        # are symmetric, so y and z become even functions.
         way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
         both = np.concatenate([-way[:0:-1], way])
         points = np.concatenate([edge[:0:-1] * (-1, 1, 1), edge])
@@ -102,14 +102,14 @@ class Arch:
         length = np.concatenate([[0], np.cumsum(steps)])
         self._length = length - length[-1] / 2
         self.half = float(length[-1] / 2)
-        # The direction to the gum is the normal of the plane of the edges.
+        # The direction to the gum is the normal of the plane that fits the biting edges.
         middle = points - points.mean(axis=0)
         normal = np.linalg.svd(middle)[2][2]
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Frames of the arch: points, directions along it to the character's left, directions to
-        the lips.
+        """Points of the arch, its directions there to the character's left, and the directions
+        towards the lips.
 
         Args:
             way: float64[n], decimetres along the arch from the middle, positive on the left.
@@ -202,7 +202,8 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         p = base.positions[used]
         half = p[p[:, 0] > -1e-6]
-        # The edge is the outermost row on the biting side, found by an inclined plane through it.
+        # The edge is the outermost row of points on the biting side. The row is not level, so the
+        # points are compared with an inclined line that is fitted to the row in each round.
         edge = half
         for _ in range(6):
             slope = np.polyfit(edge[:, 2], edge[:, 1], 1)[0]
@@ -218,7 +219,9 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
 
 
 def places_of(teeth: tuple[Tooth, ...], arch: Arch) -> tuple[Floats, float]:
-    """float64[n]: middles of the crowns along the arch; and the factor on their widths.
+    """Distances of the crowns' middles from the arch's middle, float64[n], in decimetres.
+
+    Also returns the factor on their widths, at most 1, that makes all crowns fit the arch.
 
     Args:
         teeth: the teeth of one half, from the middle outward.
@@ -310,7 +313,7 @@ def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> N
     def sheet(heights: Floats, offsets: Floats, tongue: bool) -> None:
         rows = []
         for h, o in zip(heights, offsets, strict=True):
-            # Far from the margin the height of the gum is even.
+            # The curve of the margin fades out over 5 mm, to a gum of even height.
             rise = margin + (high - margin) * np.clip(h / 5, 0, 1) + h * MM
             lip = lean * rise + 0.3 * MM + o * MM - between * (0.4 if tongue else 1.0)
             if tongue:

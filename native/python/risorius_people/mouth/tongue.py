@@ -14,7 +14,7 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 
 OUT = "tongueOut"
-# Controls that lift the middle of the lower lip further than the open jaw lowers the tongue.
+# Controls that lift the middle of the lower lip into an extended tongue.
 LIFTING = ("mouthCornerPull", "mouthPressD", "jawChinRaiseD")
 _JAW = 0.08  # lift of the tongue with an open jaw, because the data's tongue would lie in the lip
 _BEHIND = 0.22  # decimetres behind the lip from which the tongue rises
@@ -34,7 +34,8 @@ def over_lip(
     """
     at = positions[tongue] + units[OUT][tongue]
     lip = positions[rim]
-    # The tongue rises fully at the lip and in front of it, and not at all at its root.
+    # The tongue rises fully at the lip and in front of it, and not at all at _BEHIND or more behind
+    # the lip.
     share = smooth_step((at[:, 2] - lip[:, 2].max()) / _BEHIND + 1.0)
     near = np.exp(-(((at[:, :1] - lip[None, :, 0]) / _EVEN) ** 2)) + 1e-12
     near /= near.sum(axis=1, keepdims=True)
@@ -47,7 +48,7 @@ def over_lip(
 
 
 def _up(positions: Floats, vertices: Ints, lift: Floats) -> Floats:
-    """float64[V, 3]: `lift` along y. Args: positions: float64[V, 3]; vertices: with a lift each."""
+    """float64[V, 3]: displacement of `vertices` along y, each by its `lift`; others stay."""
     out = np.zeros_like(positions)
     out[vertices, 1] = lift
     return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The texture atlas of a person's hair cards: its tiles by kind of hair."""
+"""Defines the texture atlas of hair cards: a group of tiles for each kind of hair."""
 
 from __future__ import annotations
 

@@ -25,14 +25,15 @@ def paint_eye(person: Person) -> Floats:
     """float64[EYE_SIZE, EYE_SIZE, 3]: pupil, fibres of the iris, soft limbus, sclera; the gaze is
     at the centre.
 
-    The iris takes most of the texture, see side_map.
+    The iris takes a larger part of the texture than of the ball, see side_map.
     """
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    # darker beside dark skin, next to which the same white would seem to glow
+    # The sclera is darker if the skin is dark, because a white one would seem to glow beside dark
+    # skin.
     colour *= 1 - 0.23 * depth_of(person)
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)
@@ -96,7 +97,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
     depth = np.clip(beyond * 0.75 + 0.3 * smooth(0.2, 0.95, reach) + patches, 0, 1)[:, :, None]
     colour = inner * (1 - depth) + outer * depth
     fibres = _fibres(around, reach, random)
-    # Inside the collarette fibres are short and fine.
+    # Inside the collarette the fibres are fine, so they have less contrast.
     contrast = 0.45 + 0.55 * beyond
     light = 0.50 + 1.05 * (0.5 + contrast * (fibres - 0.5))
     light += 0.30 * np.exp(-(((reach - frill) / 0.045) ** 2)) * (0.4 + fibres)

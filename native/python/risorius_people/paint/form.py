@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes fine form of the face that the mesh shows too softly: beside a nostril, at a lip, under an
-eye.
+"""Computes the fine form of a face for the skin's relief: beside nostrils, at lips, under eyes.
 
 Form is the height of a vertex above or below the mean of its neighbourhood. The mesh shows it too
 softly, so the skin's relief adds it once more, like an unsharp mask. Hollows of the form also get
@@ -25,7 +24,8 @@ _SCALES = ((6, 1.4), (30, 0.42))
 _MOST = 0.016  # decimetres: larger form is of the head and not of its skin
 _SOFT = 5.0  # texels at HEAD_SIZE over which the edges of the mesh are blurred
 _HOLLOW = 0.006  # decimetres: depth at which a hollow has its full colour
-# (ages in years), (factor on the form at these ages), because a child's face is round.
+# (ages in years), (factor on the form at these ages). It is smaller for children, because their
+# faces are round.
 _AGES = ((8, 25), (0.5, 1.0))
 
 
@@ -53,7 +53,7 @@ def stressed(polygons: Polygons, places: Floats) -> Floats:
 
 
 def _neighbours(edges: Ints, values: Floats) -> Floats:
-    """float64[V, k]: the sum over the neighbours of each vertex."""
+    """float64[V, k]: for each vertex, the sum of `values` over its neighbours."""
     columns = [
         sum(np.bincount(a, column[b], len(column)) for a, b in (edges.T, edges.T[::-1]))
         for column in values.T

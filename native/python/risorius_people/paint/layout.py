@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Texture layout of the head, in which the face gets most of the texture.
+"""Lays out the texture of a head so that the face gets most of the texture.
 
 The base mesh's own layout is of a whole body: the head gets a tenth, and its back as many texels as
 the face. In this layout the island of the face fills the upper part, upright and enlarged in the
@@ -83,7 +83,7 @@ def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
 
 
 def _into(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Maps [0, 1] to a cell without its margin."""
+    """Maps coordinates from [0, 1] to a cell of the texture, except the cell's margin."""
     a, b = np.array(low) + _MARGIN, np.array(high) - _MARGIN
     return np.asarray(a + places * (b - a))
 

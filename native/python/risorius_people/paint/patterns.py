@@ -16,7 +16,7 @@ from ..polygons import Floats, Ints
 def mottling(
     side: int, width: float, random: np.random.Generator, high: float | None = None
 ) -> Floats:
-    """float32[side, side]: smooth noise with mean 0, deviation 1, and spots about `width` wide.
+    """float32[side, side]: smooth noise with mean 0, standard deviation 1, spots `width` wide.
 
     Args:
         side: side of the tile in texels.

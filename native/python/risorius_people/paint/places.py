@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where hair grows on the man's head, as densities at vertices.
+"""Computes where hair grows on the man's head, as densities from 0 to 1 at given points.
 
 Positions are in decimetres: x from the middle of the face to the side, y up and z to the front from
 the middle of the eyes.
@@ -66,7 +66,7 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
 def hairline_height(
     points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
 ) -> Floats:
-    """float64[n]: distance inside the hairline in decimetres, negative outside.
+    """float64[n]: distance from the hairline in decimetres, positive on the side with hair.
 
     Args:
         points: float64[n, 3], on the man's head.
@@ -106,7 +106,7 @@ def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
 
     Args:
         points: float64[n, 3], on the man's head.
-        eye: distance of his eye's middle from the middle of the face.
+        eye: decimetres from the middle of the face to the middle of his eye.
     """
     along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
     return along, points[:, 1] - brow_ridge(along)
@@ -139,7 +139,7 @@ def brow_density(points: Floats, eye: float) -> Floats:
 
     Args:
         points: float64[n, 3], on the man's head.
-        eye: distance of his eye's middle from the middle of the face.
+        eye: decimetres from the middle of the face to the middle of his eye.
     """
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))
@@ -165,7 +165,7 @@ def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
     moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
     moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
     chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
-    # beside the tuft below the lower lip
+    # bare skin on both sides of the tuft of hair below the lower lip
     bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)
     full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
     goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))

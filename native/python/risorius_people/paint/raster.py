@@ -11,15 +11,15 @@ _AT_ONCE = 1 << 20  # largest number of texels that are searched together
 
 
 class Raster:
-    """The triangle and the weights of each covered texel, found once for all values of vertices.
+    """The triangle and the weights of each texel that a polygon covers, for interpolation.
 
     Attributes:
-        covered: bool[size, size], whether a face covers a texel.
+        covered: bool[size, size], whether a polygon covers a texel.
         where: int[n], the covered texels, numbered row by row.
     """
 
     def __init__(self, polygons: Polygons, uvs: Floats, size: int) -> None:
-        """Finds the texels of all faces; if two faces overlap, the later one counts.
+        """Finds the texels of all polygons; if two polygons overlap, the later one counts.
 
         Args:
             polygons: mesh with texture coordinates.
@@ -120,7 +120,7 @@ class Raster:
         return out.reshape(size, size, *values.shape[1:])
 
     def image(self, values: Floats) -> Floats:
-        """float32[size, size, k]: an image of values of vertices, 0 where no face is.
+        """float32[size, size, k]: an image of values of vertices, 0 where no polygon is.
 
         Args:
             values: float[V, k], values of the vertices.
@@ -157,7 +157,8 @@ def _halves(whole: Floats) -> Floats:
 
 
 def _filled(image: Floats, share: Floats) -> Floats:
-    """Means of covered texels; a texel without them takes the next coarser level's value."""
+    """Image / share, the mean of the covered texels in each block; blocks without covered texels
+    take the value of a coarser level."""
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

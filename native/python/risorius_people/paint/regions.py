@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where a head has blood, pigment, hair roots, pores and oil, as smooth fields over its vertices.
+"""Computes where a head has blood, pigment, hair roots, pores and oil, as values at its vertices.
 
 Positions are in decimetres: `x` from the middle of the face, `y` up and `z` to the front from the
-left eye's middle. All people share topology and texture layout with the man, so his fields serve
-all.
+left eye's middle. The values are computed on the man's head, and used for all people, because they
+share its topology and texture layout.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .images import smooth
 from .layout import islands
 
 FAR_RINGS = 14.0  # largest number of edge loops that are counted
-# number of the base mesh's edge loops from the mouth's island to the rim of the lips
+# number of the base mesh's edge loops from the inside of the mouth to the outer rim of the lips
 LIPS_RINGS = 8.0
 DIVIDED = 2.0  # an edge of the base mesh is divided into this many edges of the head at LOD 0
 _REACH = 0.12  # decimetres: size of the spots of the noise in fields
@@ -34,10 +34,10 @@ class Face:
         x: float64[V], to the side; the character's left is positive.
         y: float64[V], up.
         z: float64[V], to the front.
-        lids: float64[V], how far a vertex moves in a blink, relative to the largest, 0 to 1.
+        lids: float64[V], motion of a vertex in a blink, as a fraction of the largest, 0 to 1.
         mouth: float64[V], number of the base mesh's edge loops from the inside of the mouth, which
             is an island of the texture; negative inside.
-        eyes: float64[V], the same number from the skin behind the lids.
+        eyes: float64[V], number of edge loops from the skin behind the lids; negative there.
         uneven: float64[V, 3], noise with mean 0 and deviation about 1, equal on both sides of
             texture seams.
     """
@@ -56,7 +56,7 @@ class Face:
         return np.abs(self.x)
 
     def spot(self, x: float, y: float, wide: float, high: float) -> Floats:
-        """float64[V]: a spot in front and its mirror image, 1 in the middle.
+        """float64[V]: a soft spot on the front of the face and its mirror image, 1 in each middle.
 
         Args:
             x, y: position of the spot's middle.
@@ -153,7 +153,7 @@ def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Fl
 
     Args:
         places: float64[n, 3], positions.
-        pitch: side of a cell of its grid, in the unit of `places`.
+        pitch: side of a cell of the random grid, in the unit of `places`.
         random: generator of the grid.
     """
     low = places.min(axis=0) - pitch

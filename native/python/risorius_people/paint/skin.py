@@ -48,7 +48,7 @@ def depth_of(person: Person) -> float:
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """float64[V]: distance inside the hairline in decimetres, less for sparse hair; not on ears."""
+    """float64[V]: as `hairline_height`, but smaller for sparse hair and on ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
@@ -57,7 +57,7 @@ def _hairline(face: regions.Face, person: Person) -> Floats:
 
 
 def _grown_beard(face: regions.Face, person: Person) -> Floats:
-    """float64[V], 0 to 1: mask of the beard's cards."""
+    """float64[V], 0 to 1: density of the hair cards of the beard, 0 without a beard."""
     if person.beard_style == "none":
         return np.zeros(len(face.x))
     at = np.column_stack([face.x, face.y, face.z])
@@ -83,7 +83,7 @@ class Texels:
         self.side = max(64, self.size // 2)
 
     def mottling(self, width: float, seed: int, high: float | None = None) -> Floats:
-        """float32[n]: noise with deviation 1.
+        """float32[n]: noise with mean 0 and standard deviation 1.
 
         Args:
             width: width of its spots in texels at HEAD_SIZE.
@@ -131,7 +131,10 @@ class Texels:
 
 
 class Skin:
-    """The fields of a face at the texels, float32[n] each, and the colours made from them."""
+    """Values of a face at the texels, such as its blood and pores, and colours made from them.
+
+    field: name of a value -> float32[n].
+    """
 
     def __init__(self, person: Person, face: regions.Face, texels: Texels, eye: Floats) -> None:
         self.person, self.texels, self.eye = person, texels, eye
@@ -196,7 +199,7 @@ class Skin:
         return np.asarray(out)
 
     def _vessels(self) -> Floats:
-        """Amount of fine vessels on cheeks and noses that are old and light."""
+        """Amount of fine vessels on cheeks and noses of old people with light skin."""
         amount = self.old * (1 - self.deep)
         if amount <= 0:
             return np.zeros(1, np.float32)
@@ -235,7 +238,8 @@ class Skin:
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        # A product of powers, because light passes between hairs and each absorbs a share.
+        # The colours of skin and hair are mixed by a product of their powers, because light passes
+        # many hairs, and each absorbs a fraction of it.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
         if person.beard_style != "none":  # roots between the beard's cards

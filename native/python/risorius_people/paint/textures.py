@@ -50,8 +50,8 @@ def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
 
 
 def lasting(place: Floats, eye: Floats) -> Floats:
-    """float64[h, w], 0 to 1: how much of an expression's folds stays with age; most at brow and
-    eyes.
+    """float64[h, w], 0 to 1: fraction of an expression's folds that can remain in an old face at
+    rest; largest at brow and eyes.
 
     Args:
         place: float64[h, w, 3], position of each texel on the head in decimetres.
@@ -82,8 +82,9 @@ class Wrinkles:
     """The textures of the folds of expressions.
 
     Attributes:
-        pictures: file name -> masks, and normals of the sets.
-        sets: number of a set -> file name of its normals.
+        pictures: file name -> image: a mask for each expression, and a normal map for each texture
+            set, which several expressions share.
+        sets: number of a texture set -> file name of its normal map.
         still: float32[h, w], 0 to 1, depth of each texel in a fold of the face at rest.
     """
 
@@ -100,7 +101,7 @@ def head_wrinkles(
     units: dict[str, Expression],
     size: int,
 ) -> Wrinkles:
-    """Paints masks, and normals of the sets as differences from flat normals.
+    """Paints the masks of wrinkles, and the normal maps of texture sets relative to flat normals.
 
     Args:
         person: the person, with the age.
@@ -163,7 +164,7 @@ def paint_head(
         own: float64[V, 3], all vertices of the person, whose form the relief shows.
         eye: float64[3], middle of the left eye.
         units: raw control -> expression.
-        still: float32[h, w], 0 to 1, depth of each texel in a fold, in a smaller texture.
+        still: float32[h, w], 0 to 1, depth of each texel in a fold; h and w divide `size`.
         size: number of texels of a side.
     """
     p = head.carry(positions)
@@ -257,8 +258,9 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A texture at the size and precision in which it is stored.
 
-    Eyes get half the head's side. Small textures are part of the released zip: they keep seven
-    bits, roughness six, because PNG cannot compress the noise of the other bits.
+    Textures of eyes get half the side. Textures up to 1024 x 1024 are part of the released zip:
+    head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are noise, which
+    PNG cannot compress.
 
     Args:
         name: file name of the texture.

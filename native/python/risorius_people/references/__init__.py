@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The joints that all sample people share, fitted once on the man.
+"""Stores references: the joints that all sample people share, fitted once on the man.
 
-joints.npz, made by packaging/ship/find_joints.py, has the joints for build.RIG; joints for other
-options are kept in the user's cache."""
+joints.npz, made by packaging/ship/find_joints.py, has the joints for the options build.RIG. The
+joints for other options are files in the user's cache."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ SHIPPED = Path(__file__).with_name("joints.npz")
 
 
 def shipped() -> Reference:
-    """The reference for build.RIG, which is part of the package."""
+    """The joints for build.RIG, which the package contains."""
     return Reference.read(SHIPPED)
 
 
 def _path(options: RigOptions) -> Path:
-    """Path of a cached reference; its name begins with a hash of all inputs but the options."""
+    """Path of a cached reference; its name has a hash of data and code, and a hash of `options`."""
     known = hashlib.sha256(SHA256.encode() + fingerprint())
     for entry in sorted(Path(__file__).parent.rglob("*")):
         if entry.suffix in (".py", ".toml"):
@@ -36,7 +36,7 @@ def _path(options: RigOptions) -> Path:
 
 
 def kept(options: RigOptions) -> Reference | None:
-    """The cached reference for these options, or None if this version did not make one here.
+    """The cached reference for these options, or None if this version has not fitted it yet.
 
     Args:
         options: options of the joint rig.
@@ -48,7 +48,9 @@ def kept(options: RigOptions) -> Reference | None:
 
 
 def keep(options: RigOptions, reference: Reference) -> None:
-    """Caches a reference, and removes those of other versions; if it fails, the next build refits.
+    """Caches a reference, and removes the references of other versions.
+
+    Errors of files are ignored, because the next build can fit the joints again.
 
     Args:
         options: options of the joint rig.

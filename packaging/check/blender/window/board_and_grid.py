@@ -84,7 +84,7 @@ HEIGHT_OF_NOTHING = 500  # y of a point in the view beside the face, pixels
 
 
 def grid(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Test the pictures of expressions: drawn, clicked, undone, blended by dragging, cancelled."""
+    """Test the pictures of expressions: click and undo, blend by dragging, and cancel by Esc."""
     clear(hand)
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_animation", "RISORIUS_PT_expressions")

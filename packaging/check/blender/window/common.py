@@ -16,7 +16,7 @@ Step = Callable[[Hand, Path], Iterator[Check]]
 
 
 class NotThereError(Exception):
-    """This Blender or the extension lacks a part, so a step cannot run."""
+    """This Blender or the extension lacks a feature that a step needs, so the step cannot run."""
 
 
 def slider(hand: Hand, name: str = JAW) -> float:
@@ -55,20 +55,20 @@ def look_at_face(hand: Hand) -> None:
 
 
 def take_up(hand: Hand) -> None:
-    """Activate the tool that drags the face by the button at the top of the tab."""
+    """Click on the button at the top of the tab that activates the tool for dragging the face."""
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is in the hand", lambda: hand.ask("drags"))
 
 
 def put_down(hand: Hand) -> None:
-    """Return to the previous tool by the same button."""
+    """Click on the button of take_up() again, which returns to the previous tool."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is put down", lambda: not hand.ask("drags"))
 
 
 def clear(hand: Hand) -> None:
-    """Put the face into the neutral pose and remove layers, keys, tweaks and heat map."""
+    """Put the face into the neutral pose, and remove layers, keyframes, tweaks and heat map."""
     hand.ask("run", code=REST)
     hand.still()
 

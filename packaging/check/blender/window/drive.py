@@ -93,7 +93,8 @@ def open_import(hand: Hand) -> None:
     """Open File > Import and click on the entry for DNA files."""
     for x in (42, 50, 60, 34):  # possible places of the menu File beside Blender's logo
         for y in range(38, 560, 15):  # possible places of the entry Import
-            # The menu is opened again for each place, because it closes beside a submenu.
+            # The menu is opened again for each place, because it closes if the pointer leaves it
+            # beside a submenu.
             hand.move(WIDTH / 2, HEIGHT / 2)
             hand.click(x, 13)
             hand.still()
@@ -111,7 +112,7 @@ def entry_beside(hand: Hand, y: int) -> tuple[float, float] | None:
 
     Args:
         hand: the pointer.
-        y: height of the tried entry of the menu File, pixels.
+        y: y of the tried entry of the menu File on the screen, in pixels.
 
     Returns: place of the entry, or None if the submenu is not Import.
     """

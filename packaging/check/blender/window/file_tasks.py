@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does tasks with a real pointer: the menu Face, two faces, a rig from a head, studio and bake."""
+"""Tests tasks with a real pointer: the menu Face, two faces, a rig from a head, studio, bake."""
 
 from __future__ import annotations
 
@@ -285,7 +285,7 @@ bpy.app.handlers.render_complete.clear()
 
 
 def _bake(hand: Hand) -> Iterator[Check]:
-    """Key two frames, bake the face by the search, undo it by Done, and export glTF."""
+    """Key two frames, bake the face by Blender's search, undo this by Done, and export glTF."""
     ready_tab(hand)
     go_to(hand, 1)
     key_all(hand)

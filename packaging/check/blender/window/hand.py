@@ -28,10 +28,10 @@ class LateError(Exception):
 
 
 class Hand:
-    """Moves the pointer of a display. Asks Blender only for places on the screen and for its state.
+    """Moves the pointer, presses keys and takes pictures; calls functions of inside.py in Blender.
 
     Attributes:
-        talk: folder of the questions and answers; see inside.py.
+        talk: folder of the files by which functions of inside.py are called.
         out: folder of the pictures.
         user: Blender's user folder.
         blender: Blender's process.
@@ -176,7 +176,7 @@ class Hand:
             pattern: regular expression of the command or of the value's path.
             of_field: search for a value instead of a command.
             columns: horizontal places to search, as fractions of the width.
-            area: left, top, width, height of another area than the sidebar.
+            area: left, top, width, height of the area to search; None: the sidebar.
             step: vertical distance of the places, pixels.
 
         Raises:

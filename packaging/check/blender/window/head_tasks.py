@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes a rig from a head without expressions with a real pointer: landmarks, Esc, the rig."""
+"""Tests making a rig from a head without expressions: landmarks, cancel by Esc, the rig."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs in a Blender with a window, and answers the questions of drive.py.
+"""Runs in a Blender with a window, and calls the functions that drive.py requests.
 
     blender --python inside.py -- TALK
 
@@ -154,7 +154,7 @@ def state():
 
 
 def head():
-    """The visible mesh of the face with the most vertices."""
+    """The visible mesh that has the most vertices of all meshes of the face."""
     shown = [o for o in bpy.data.objects if o.get("risorius_rig") and o.type == "MESH"]
     shown = [o for o in shown if "dna_mesh" in o and o.visible_get()]
     return max(shown, key=lambda o: len(o.data.vertices))
@@ -170,7 +170,7 @@ def points():
 
 
 def on_screen(place):
-    """The pixel of a point of world space on the screen, or None behind the viewer."""
+    """The pixel on the screen of a point in world space; None if it is behind the viewer."""
     area, drawing, _sidebar = view()
     at = view3d_utils.location_3d_to_region_2d(drawing, area.spaces.active.region_3d, place)
     if at is None:
@@ -224,7 +224,10 @@ def drags():
 
 
 def two_handles():
-    """The lowest handle, and the nearest handle more than 20 pixels away: points and places."""
+    """The lowest handle, and the handle nearest to it that is more than 20 pixels away.
+
+    Returns mesh and vertex ("point") and the place on the screen ("at") of each.
+    """
     one, live = rig(), module("scene.character.runtime").of(rig())
     found = module("scene.drag.picking").handles_of(bpy.context, one, live)
     found = [f for f in found if on_screen(f[1]) is not None]
@@ -236,7 +239,7 @@ def two_handles():
 
 
 def kept(key):
-    """A list property of the control armature; empty if it is missing."""
+    """A list property of the control armature; empty if the property is missing."""
     return list(rig()["risorius_controls"].get(key, ()))
 
 
@@ -310,7 +313,7 @@ def bone_in_world(name):
 
 
 def board_leads():
-    """Whether the board leads the face."""
+    """Whether the face board, and not the sliders, sets the controls of the face."""
     return bool(module("scene.character.board").leads_face(rig()))
 
 
@@ -335,7 +338,7 @@ def timeline_at(frame):
 
 
 def timeline_header():
-    """The rectangle of the timeline's header, and the scene's last frame."""
+    """Left, top, width and height of the timeline's header, and the scene's last frame."""
     area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
     region = next(r for r in area.regions if r.type == "HEADER")
     return [*rectangle(region), bpy.context.scene.frame_end]
@@ -347,7 +350,7 @@ def keyed_frames_of_active():
 
 
 def keyed_frames(controls=None):
-    """Frames at which a face's action has keys.
+    """Frames at which a face's action has keyframes.
 
     Args:
         controls: control armature; None takes the first face.
@@ -358,7 +361,7 @@ def keyed_frames(controls=None):
 
 
 def seen_keys(editor="DOPESHEET_EDITOR"):
-    """Frames of the keys that the timeline, or another editor in its place, shows."""
+    """Frames of the keyframes that the timeline, or another editor in its place, shows."""
     area = next(a for a in window().screen.areas if a.type == editor)
     region = next(r for r in area.regions if r.type == "WINDOW")
     with over(area, region):
@@ -367,7 +370,7 @@ def seen_keys(editor="DOPESHEET_EDITOR"):
 
 
 def curves_below():
-    """(data path, array index, [[frame, value], ...]) of each curve of the face's action."""
+    """(data path, array index, [[frame, value], ...]) of each F-curve of the face's action."""
     data = rig()["risorius_controls"].animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     keys = [(c.data_path, c.array_index, [list(p.co) for p in c.keyframe_points]) for c in curves]
@@ -375,18 +378,18 @@ def curves_below():
 
 
 def curves_of_empty():
-    """The curves of the Empty "Look Here", which the eyes follow."""
+    """The F-curves of the Empty "Look Here", which the eyes follow."""
     action = bpy.data.objects["Look Here"].animation_data.action
     return list(module("scene.base.compat").curves_of(action))
 
 
 def tweaks():
-    """Whether a tweak is active."""
+    """Whether a tweak of the face's animation is active."""
     return module("scene.animation.tweaks").of(rig()["risorius_controls"]) is not None
 
 
 def given_by_board(control):
-    """The value that the board gives to a raw control."""
+    """The value to which the face board sets a raw control."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))
 
 
@@ -478,7 +481,7 @@ def redraw():
 
 def run(code):
     """Run Python code that prepares the scene."""
-    exec(code, globals())
+    exec(code, dict(globals()))  # names of one run must not replace functions of this file
     return True
 
 
@@ -489,7 +492,7 @@ def leave():
 
 
 def answer():
-    """Answer all waiting questions. Returns the seconds until Blender's timer calls again."""
+    """Answer all requests of drive.py. Returns the seconds until Blender's timer calls again."""
     while True:
         path = TALK / f"ask-{_next[0]}.json"
         if not path.exists():

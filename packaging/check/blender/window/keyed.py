@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A step of drive.py: keys are visible in the timeline, and a tweak layer takes new keys."""
+"""Tests that keyframes are visible in the timeline, and that a tweak layer receives new ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FIELD = r'CTRL_expressions\.jawOpen"\]$'
 
 
 def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Test Key All with the head selected, I over a slider, I during a tweak, and Done."""
+    """Test Key All with the head selected, pressing I over a slider and in a tweak, and Done."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)

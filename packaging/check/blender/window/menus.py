@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Uses Blender's search, the menu Face, dialogs and the file browser by keys and clicks."""
+"""Operates Blender's search, the menu Face, dialogs and the file browser by keys and clicks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> 
     Args:
         hand: the pointer.
         words: search text.
-        operator: bl_idname of the last operator afterwards; "" does not check it, for dialogs.
+        operator: bl_idname that the last operator must have afterwards; "" for dialogs, which are
+            not checked.
         keys: keys that confirm the entry.
 
     Raises:
@@ -37,7 +38,7 @@ def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> 
 
 
 def open_face_menu(hand: Hand) -> tuple[float, float]:
-    """Click on the menus of the view's header until Face opens. Returns its x and upper edge."""
+    """Click on the menus of the view's header until Face opens. Returns x and top of the menu."""
     hand.ask("watch", panel="RISORIUS_MT_face")
     left, top, width, height = hand.see("rectangle(header_of_view())")
     hand.do("key", "Escape")
@@ -113,7 +114,7 @@ def save_as(hand: Hand, path: Path) -> None:
 
 
 def _write(hand: Hand, region: str, column: float, text: str) -> None:
-    """Type text into the field of a region of the file browser, then move over the file list.
+    """Type text into a field of the file browser, then move the pointer over the file list.
 
     Args:
         hand: the pointer.

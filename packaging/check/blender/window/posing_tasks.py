@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does animators' tasks with a real pointer: a smirk with one brow up, two seconds, a gaze."""
+"""Tests three tasks of animators with a real pointer: a smirk, a shot of two seconds, a gaze."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Key rest, a blink, surprise and rest. Check the keys in all editors, and move one column."""
+    """Key rest, a blink, surprise and rest. Check the keyframes in all editors, and move a few."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -118,7 +118,7 @@ def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
-    """Check dope sheet and graph editor, which replace the timeline and fill the window."""
+    """Check the keyframes in the dope sheet and in the graph editor; each fills the window."""
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
     hand.ask("run", code=KEEP_EDITOR)

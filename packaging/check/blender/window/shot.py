@@ -46,7 +46,7 @@ def expression(hand: Hand, name: str) -> None:
 
 
 def shot(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Animate ten seconds, starting with a new face: steps 3 to 12 of the page."""
+    """Animate ten seconds, starting at the neutral pose: steps 3 to 12 of docs/animator.md."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)

@@ -147,7 +147,8 @@ def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
         hand.move(*start)
         hand.drag(start, end)
         state = hand.ask("state")
-        # If the head is small, a pixel covers millimetres. So the vertex under the press is used.
+        # If the head is small, a pixel covers millimetres. So the pointer is compared with
+        # the vertex that the press took, and not with the vertex at which the press was aimed.
         at = hand.ask("seen_in_front", vertex=state["dragged"])
         moved = len(state["sliders"]) > 0
         hand.picture("skin-" + name.replace(" ", "-"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests a capture with a real pointer: import a take, add a layer and a tweak over it."""
+"""Tests tasks on a captured take with a real pointer: import it, add a layer and a tweak."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIELD = r'CTRL_expressions\.jawOpen"\]$'
 
 
 def capture(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Import a Live Link take, add a layer with a smile, and tweak the jaw. The take stays."""
+    """Import a Live Link take, add a smile as a layer, tweak the jaw; the take must not change."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -70,7 +70,7 @@ def _smile(hand: Hand) -> Iterator[Check]:
 
 
 def _tweak(hand: Hand) -> Iterator[Check]:
-    """Open the jaw more around frame 50 in a tweak, by the wheel and I over the slider."""
+    """Open the jaw more around frame 50 in a tweak, by the wheel and the key I over the slider."""
     below = hand.ask("curves_below")
     go_to(hand, 50)
     search(hand, "Tweak over a Range")

@@ -57,7 +57,7 @@ def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _replace(hand: Hand) -> Iterator[Check]:
-    """Select a sound in the list and replace it by the menu. Only keys near it may change."""
+    """Select a sound in the list and replace it by the menu. Only keyframes near may change."""
     word_set = hand.find(r"risorius\.word_set")
     x, y = hand.find(r"risorius\.sound_insert", columns=(0.93, 0.97, 1.0))
     before, frame = hand.see(CHOSEN), hand.ask("state")["frame"]
@@ -88,7 +88,7 @@ def _replace(hand: Hand) -> Iterator[Check]:
 
 
 def _changed(before: list[Any], after: list[Any]) -> list[float]:
-    """Frames of keys that were added, removed or changed between two states of the curves."""
+    """Frames of keyframes that were added, removed or changed between two states of the curves."""
     one, other = _keys(before), _keys(after)
     differ = (one.get(c, set()) ^ other.get(c, set()) for c in {*one, *other})
     return sorted({frame for keys in differ for frame, _value in keys})

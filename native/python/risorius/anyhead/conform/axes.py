@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The axes and the unit of a file, and a face in them made to stand."""
+"""Converts a face from the axes and unit of its file to the space x left, y up, z front, in cm."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def mm_of(dna: Dna) -> float:
 
 
 def standing_skin(dna: Dna, skin: int) -> Surface:
-    """The skin of a face, standing, in cm, with triangles that face outward.
+    """The skin of a face in the standing space, in cm, with triangles that face outward.
 
-    Left-handed files have them inverted.
+    Triangles that face inward, as in left-handed files, are reversed.
 
     Args:
         dna: the face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The deformation of a skin mesh from its own head (source) to another head (target).
+"""Computes the deformation of a skin mesh from its own head (source) to another head (target).
 
 Each vertex has a deformation gradient (Sumner and Popovic, "Deformation Transfer for Triangle
 Meshes", 2004). The gradients are smoothed over about 2 cm, because expressions scale with the size
@@ -26,8 +26,9 @@ _CELL = 0.4  # of the smoothing radius: edge length of the grid cells that are s
 _STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems regular
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024  # vertices that are smoothed together
-# The point with the same texture coordinates is taken if its distance is at most _LONGER times the
-# distance of the closest point plus _BESIDE times the reach. _SAME_TEXEL: share of the UV square.
+# A point is bound to the skin point with the same texture coordinates if that is at most _LONGER
+# times as far away as the closest skin point, plus _BESIDE times the smoothing radius. _SAME_TEXEL:
+# largest UV distance at which texture coordinates count as the same.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
 _NO_TEXTURE = 1e-6  # texture coordinates with a smaller extent are unusable
 _TURNED = 0.5  # a rotation counts if it leaves at most this share of the RMS difference
@@ -59,7 +60,7 @@ class Similar:
 
 @dataclass(frozen=True)
 class Hold:
-    """Points bound to a skin: a triangle, a point on it, and the offset from there.
+    """Points bound to a skin: for each, a triangle, a point on it, and the offset from that point.
 
     Attributes:
         triangle: int64[n], a triangle of the skin for each point.
@@ -138,7 +139,7 @@ class Change:
         return out
 
     def _spread(self, rows: Doubles) -> Doubles:
-        """float64[V, n]: Gaussian sums of the rows of neighbouring vertices."""
+        """float64[V, n]: for each vertex, the Gaussian-weighted sum of the rows of all vertices."""
         points = self.before.points
         at = np.floor((points - points.min(axis=0)) / (_CELL * self.reach)).astype(np.int64)
         at = np.ravel_multi_index(tuple(at.T), tuple(at.max(axis=0) + 1))
@@ -153,7 +154,7 @@ class Change:
         return out
 
     def _near(self, points: Doubles, others: Doubles) -> Doubles:
-        """float64[n, m]: Gaussian weights between points."""
+        """float64[n, m]: Gaussian weights between n `points` and m `others`, by their distance."""
         square = (points**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * points @ others.T
         return np.exp(-np.maximum(square, 0.0) / (2 * self.reach**2))
 
@@ -176,7 +177,7 @@ class Change:
         therefore preferred, and points with the same texture coordinates if they are close enough.
 
         Args:
-            points: float64[n, 3].
+            points: float64[n, 3], positions on or near the source skin.
             mesh: the mesh that the points are the vertices of; None: points without normals.
         """
         found, places, far = self._closest.nearest(points)
@@ -267,8 +268,8 @@ def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
 def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
     """The rotation (float64[3, 3]) and the scale of the whole target head.
 
-    A longer chin alone makes a small rotation fit better, and such a rotation is part of the form.
-    A rotation is therefore returned only if it explains most of the difference.
+    If only the chin is longer, a small rotation already fits better, although the head is not
+    rotated. A rotation is therefore returned only if it explains most of the difference.
 
     Args:
         before, after: float64[n, 3], vertex positions on the source and the target head.
@@ -294,7 +295,7 @@ def _flat(coordinates: Doubles) -> Doubles:
 
 
 def _sums(rows: Ints, values: Doubles, count: int) -> Doubles:
-    """float64[count, ...]: the sums of the values of each row."""
+    """float64[count, ...]: for each number in `rows`, the sum of the values with this number."""
     flat = values.reshape(len(values), -1)
     out = np.empty((count, flat.shape[1]))
     for k in range(flat.shape[1]):

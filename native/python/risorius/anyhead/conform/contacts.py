@@ -24,12 +24,13 @@ from ..surface import Surface
 from .change import Change, Hold
 from .parts import Eye
 
-# Shares of the reach (2 cm on a head of 24 cm): the least motion of a vertex that comes into
-# contact, the largest distance in contact, the least distance in the neutral pose, and the largest
-# gap that is not corrected.
+# Fractions of the smoothing radius (2 cm on a head of 24 cm): least motion of a vertex that comes
+# into contact, largest distance in contact, least distance in the neutral pose, and largest gap
+# that is not corrected.
 _FAR, _NEAR, _APART, _LEAST = 0.1, 0.05, 0.12, 0.004
 _FACING = 0.2  # least cosine between one normal and the opposite of the other normal
-# Shares of the reach: smoothing of the correction around a contact, for joints and for shapes.
+# Standard deviations of the correction around a contact, for joints and for shapes, as fractions of
+# the smoothing radius of 2 cm.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
 _SEEN = 0.001  # of the reach: smaller deltas are not added to a blend shape
 _MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
@@ -161,7 +162,8 @@ def _gaps(face: _Posed, posed: Doubles, touch: Touch, change: Change) -> Doubles
 
 
 def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V]: share of its motion that each vertex needs in addition; None without a gap."""
+    """float64[V]: fraction by which the motion of each vertex must grow; None if there is no
+    gap."""
     posed = face.at(control)
     ways = posed - face.rest
     way = ways[touch.vertex] - np.einsum("nk,nkd->nd", touch.shares, ways[touch.corners])
@@ -169,7 +171,8 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
     square = np.einsum("nd,nd->n", way, way)
     share = np.einsum("nd,nd->n", gaps, way) / np.maximum(square, 1e-12 * change.reach**2)
     length = np.sqrt(square)
-    # LODs without blend shapes have the joints alone: lids that overlap are better than a gap.
+    # At LODs without blend shapes only joints close the lids, and overlapping lids are better
+    # than a gap. So the joints aim at an overlap.
     share += _OVERLAP * np.std(share * length) / np.maximum(length, 1e-6 * change.reach)
     if np.median(np.abs(share) * length) < _LEAST * change.reach:
         return None
@@ -183,9 +186,10 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 
 
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V, 3]: motion that each vertex needs in addition; None without a gap.
+    """float64[V, 3]: motion that each vertex needs in addition; None if there is no gap.
 
-    Both lids move in proportion to their motion. The correction fades out behind the rims.
+    The gap is divided between both lids in proportion to their motion by the control. The
+    correction fades out behind the rims.
     """
     posed = face.at(control)
     ways = posed - face.rest
@@ -256,7 +260,7 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with deltas added to the blend shapes of a control; None if it has none."""
+    """The face with deltas added to the blend shapes of a control; None if the control has none."""
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]

@@ -60,7 +60,7 @@ def conform(
             file; the skin of LOD 0 is required.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
-        balls: eyeballs of the target head; each eye of the face moves to the one near it.
+        balls: eyeballs of the target head; each eye of the face moves to the eyeball near it.
         teeth: float64[n, 3], the lower teeth of the target head, of any topology.
 
     Raises:
@@ -176,7 +176,7 @@ def _target(target: BlendShapeTarget, linear: Doubles) -> BlendShapeTarget:
 
 
 def _normals(mesh: Mesh, moved: Moved) -> Doubles:
-    """float64[N, 3]: the normals of the file, rotated with the vertex normals of the surface."""
+    """float64[N, 3]: the mesh's stored normals, rotated as its geometric vertex normals rotate."""
     own = np.asarray(mesh.normals, np.float64)
     rows = np.asarray(mesh.layout_normals, np.int64)
     vertex = np.full(len(own), -1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The jaw of a face on the target head: its place, its size, and the motion of its joint."""
+"""Computes the jaw of a face on the target head: its place, size, and the motion of its joint."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def jaw_between(
 ) -> JawChange | None:
     """The change of the lower jaw, in the axes and the unit of the file.
 
-    The model of form tells it by the skin, and the lower teeth of the head show it where it has
-    some. None if the face has no jaw, or if the model finds no face in the skin.
+    The statistical head model predicts it from the skin. If both heads have lower teeth, the teeth
+    correct the prediction. None if the face has no jaw, or if the model finds no face in the skin.
 
     Args:
         dna: the source face.
@@ -61,8 +61,8 @@ def jaw_between(
 
 
 def _lower_teeth(dna: Dna, jaw: int, given: Mapping[str, Doubles]) -> tuple[Doubles, Doubles]:
-    """float64[n, 3]: the lower teeth of LOD 0 on the source head, and on the target head where
-    their positions are given."""
+    """float64[n, 3]: the lower teeth of LOD 0 on the source head, and on the target head. The
+    latter are empty unless the positions of all teeth are given."""
     before, after = [np.zeros((0, 3))], [np.zeros((0, 3))]
     own = {
         m: _carried_by(dna, m, jaw) for m in finest(dna) if kind_of(dna.mesh_names[m]) == "teeth"
@@ -76,7 +76,7 @@ def _lower_teeth(dna: Dna, jaw: int, given: Mapping[str, Doubles]) -> tuple[Doub
 
 
 def _carried_by(dna: Dna, m: int, jaw: int) -> Ints:
-    """Vertices of a mesh that hang on a joint or on joints below it."""
+    """Vertices of a mesh with most of their skin weights on a joint and its descendants."""
     below = np.zeros(len(dna.joint_names), bool)
     below[jaw] = True
     for at in sk.parent_order(dna):
@@ -104,8 +104,8 @@ def joint_shifts(
 ) -> Doubles:
     """float64[columns, 3]: the motion of the jaw joint on the target head by input, in world axes.
 
-    The jaw rotates by the same angle on both heads. The motion of the teeth has the size of the
-    teeth, and the joint moves so that the teeth do.
+    The jaw rotates by the same angle on both heads. The motion of the teeth is scaled with the
+    teeth, and the joint's translation is chosen so that the teeth make this motion.
 
     Args:
         dna: the source face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Neutral joint positions on the target head, and joint translations of the joint groups.
+"""Computes neutral joint positions and the translations of joint groups on the target head.
 
 Joints keep their orientation, so that rotation columns keep their meaning. If the whole head is
 rotated, the root joints take the rotation. Translation columns are transformed by the deformation
@@ -168,12 +168,12 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> lis
 
 
 def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> None:
-    """Write translation columns of a joint; a column that two groups have is written once.
+    """Write translation columns of a joint; a column that two joint groups have is written once.
 
     Args:
         groups: copies, changed in place.
         joint: its index.
-        shifts: float64[columns, 3], in the axes of its parent.
+        shifts: float64[columns, 3], translations in the axes of the joint's parent.
     """
     left = shifts.copy()
     for group in groups:

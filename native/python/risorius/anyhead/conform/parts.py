@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rigid parts of a face: the eyeballs and the inside of the mouth."""
+"""Finds the rigid parts of a face: the eyeballs and the inside of the mouth."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An eyeball with its cornea, and the distance of its surface from its centre in any direction."""
+"""Measures the distance of an eye's surface, with cornea, from its centre in any direction."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Eyeball:
         middle: float64[3], the centre.
         radius: the radius of the white of the eye.
         points: float64[V, 3], vertices of the ball and of the meshes that turn with it.
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], indices into `points`.
     """
 
     side: str

@@ -121,7 +121,8 @@ class Eyelids:
         return self.vertices[own], self._height[own]
 
     def apart(self, points: Doubles) -> float:
-        """The mean distance between the upper and the lower edge, divided by the edge's width.
+        """The mean distance between the upper and the lower edge, divided by the upper edge's
+        width.
 
         Args:
             points: float64[V, 3], vertex positions of the target in any pose or shape.
@@ -255,15 +256,16 @@ class Eyelids:
         return float(self._seen(points, turn).max(initial=0.0))
 
     def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: height of the visible eye between the edges, in the target's unit."""
+        """float64[columns]: height of the visible eye in each column of the opening, target's
+        unit."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         beside = _BESIDE * self.mm / self.ball.radius
         edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
         return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: the angle, in radians, by which the edges have to approach each other;
-        negative if they overlap by more than closed lids may."""
+        """float64[columns]: for each column of the opening, the angle in radians by which the edges
+        have to approach each other; negative if they overlap by more than closed lids may."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
@@ -272,7 +274,7 @@ class Eyelids:
             return np.zeros(len(apart))
         columns = np.arange(len(apart))
         apart = np.interp(columns, columns[known], apart[known])
-        # Columns in which the eye is visible also close by a small overlap.
+        # In columns in which the eye is still visible, the edges approach by an additional overlap.
         seen = self._seen(points, turn) / self.ball.radius
         lacks = np.where(seen > 0, np.maximum(apart, seen) + _PRESSED * unit, 0.0)
         through = np.minimum(apart + _THROUGH * unit, 0.0)
@@ -281,7 +283,7 @@ class Eyelids:
         return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
-        """float64[n]: the share of a turn that each vertex takes, 0 to 1.
+        """float64[n], 0 to 1: the fraction of the edge's rotation by which each lid vertex rotates.
 
         most: the largest angle of an edge in radians; it widens the fade.
         """
@@ -297,8 +299,9 @@ class Eyelids:
         turn: Doubles | None,
         wanted: Doubles,
     ) -> Doubles:
-        """float64[n]: the angles, in radians, by which vertices of the upper lid go down, so that
-        its edge goes down by `wanted`. The lid's own turn is scaled first; `_fade` adds the rest.
+        """float64[n]: the angles, in radians, by which vertices of the upper lid rotate down so
+        that its edge rotates down by `wanted`. The lid's rotation by the expression is scaled
+        first; `_fade` distributes the remaining angle.
         """
         columns = self.opening.across
         high = self._edge(points, turn)
@@ -317,8 +320,9 @@ class Eyelids:
     def _edge_line(
         self, points: Doubles, turn: Doubles | None, *, upper: bool
     ) -> tuple[Doubles, Doubles]:
-        """float64[columns]: the lowest angle of the upper lid, or the highest of the lower lid, of
-        points above the eye, and their distances from the eye's centre; NaN without such a point.
+        """float64[columns] each: angle up of a lid's edge, and distance of the edge from the eye's
+        centre, in each column of the opening. The edge is the lowest point of the upper lid, or the
+        highest point of the lower lid, among points outside the eye; NaN if there is none.
         """
         across, up, away = self.opening.frame.angles(points)
         own = self._above == upper
@@ -342,8 +346,8 @@ class Eyelids:
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
-        """float64[n]: for each vertex the height that its triangles lack to be `above` over the
-        eye. Only triangles that are clear of the eye at rest count."""
+        """float64[n]: height by which the triangles of each vertex must rise to be `above` over
+        the eye. Only triangles outside the eye at rest count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -364,7 +368,8 @@ class Eyelids:
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
-        # The rim keeps the height that it has at rest.
+        # The rim of a moved lid stays as high above the eye as at rest, but need not be higher than
+        # _SKIN.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)

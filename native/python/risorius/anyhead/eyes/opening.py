@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Finds the opening between the lids of an eye by rays from the eye's centre.
 
-A ray that hits no lid leaves through the opening. This tells upper from lower lid on a mesh of any
-topology, without names and without a template.
+A ray that hits no lid leaves through the opening. This distinguishes the upper from the lower lid
+on a mesh of any topology, without names and without a template.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Frame:
         """Angle across and angle up in radians, and distance from the centre, float64[n] each.
 
         Args:
-            points: float64[n, 3].
+            points: float64[n, 3], positions in the space of the head.
         """
         arm = points - self.middle
         length = np.linalg.norm(arm, axis=1)
@@ -103,7 +103,8 @@ def near_eye(surface: Surface, ball: Eyeball) -> Surface:
         surface: the skin.
         ball: the eye.
     """
-    # Boxes are tested because a large triangle may pass the eye with all corners far away.
+    # Bounding boxes of the triangles are tested, because a large triangle may pass near the eye
+    # although all of its corners are far away.
     corners = surface.points[surface.triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     off = ball.middle - np.clip(ball.middle, low, high)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eyes, teeth, tongue, lashes and brows of a head: found in it, or fitted in from a template."""
+"""Finds eyes, teeth, tongue, lashes and brows of a head, and adds missing ones from a template."""
 
 from .completing import complete, head_parts
 from .fitted import Bodies, Fitted, Fittings

@@ -116,8 +116,9 @@ class _Completing:
         return True
 
     def _seat(self, ball: Eyeball, lids: Eyelids) -> Similarity:
-        """The transform of an eyeball to its place behind the lids. The lid rims determine its
-        size; its depth gives the rims the same height above it as on the template."""
+        """The transform of an eyeball to its place behind the lids. The lid rims determine the size
+        of the eyeball. Its depth is chosen so that the rims are as high above the eyeball as on the
+        template."""
         rim, height = lids.rim(_RIM)
         near = similarity(self.skin.points[rim], self.laid[rim])
         front = near.turn @ lids.opening.frame.front

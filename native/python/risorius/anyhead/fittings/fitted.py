@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a head other than its skin: the kind of each, and the bone that it follows."""
+"""Defines the meshes of a head other than its skin: their kinds, and the bones they follow."""
 
 from __future__ import annotations
 

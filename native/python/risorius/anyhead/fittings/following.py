@@ -124,7 +124,7 @@ def _closest(
     """int64[n, size]: for the vertices `own` the nearest vertices among `near`; the largest of
     their distances, in which 1 cm is added for an opposite normal."""
     away = np.sqrt(sum((points[own, k][:, None] - points[near, k][None]) ** 2 for k in range(3)))
-    # Excludes the other lid and the inside of a lip.
+    # Vertices with an opposite normal may be on the other lid or on the inside of a lip.
     against: npt.NDArray[np.bool_] = normals[own] @ normals[near].T < 0.0
     away[against] += 1.0
     found = np.argpartition(away, size - 1, axis=1)[:, :size]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The jaw of a head by its own lower teeth."""
+"""Finds the lower teeth of a head, and corrects the predicted change of its jaw by them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .template_parts import template_parts
 
 
 def lower_teeth(fittings: Fittings) -> Doubles | None:
-    """float64[n, 3]: the vertices of the lower teeth; None: there are none by themselves.
+    """float64[n, 3]: vertices of the lower teeth; None unless upper and lower teeth are separate.
 
     Args:
-        fittings: of a head.
+        fittings: the meshes of a head.
     """
     rows = fittings.of(TEETH)
     lower = [row.part.mesh.positions for row in rows if row.hangs == JAW]
@@ -27,10 +27,10 @@ def lower_teeth(fittings: Fittings) -> Doubles | None:
 
 
 def jaw_by_teeth(told: JawChange, template: Dna, found: Fittings) -> JawChange:
-    """The change of the jaw from a template, by the lower teeth of both heads where both have some.
+    """The change of the jaw from a template to a head, corrected if both have lower teeth.
 
     Args:
-        told: what the skin tells.
+        told: the change that the statistical head model predicts from the skin.
         template: a face of a DNA file.
         found: the meshes of the head.
     """

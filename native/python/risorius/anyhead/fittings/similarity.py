@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Similarity transforms (rotation, scale and translation) and their least-squares fit."""
+"""Fits similarity transforms (rotation, scale and translation) to points by least squares."""
 
 from __future__ import annotations
 

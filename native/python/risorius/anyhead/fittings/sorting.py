@@ -293,7 +293,7 @@ def _divide_mouth(out: Fittings, place: _Place) -> None:
 
 
 def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
-    """int64[V]: the island of each vertex; float64[islands]: the middle height of each island."""
+    """int64[V]: the island of each vertex; float64[islands]: the y of the middle of each island."""
     labels: Ints = islands_of(part.mesh)
     heights, count = part.mesh.positions[:, 1], int(labels.max()) + 1
     low, high = np.full(count, np.inf), np.full(count, -np.inf)
@@ -303,7 +303,8 @@ def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
 
 
 def _between_rows(out: Fittings, place: _Place) -> float:
-    """The height of the line between upper and lower teeth; without two rows, of the mouth."""
+    """The y of the line between upper and lower teeth; without two rows of teeth, the y of the
+    mouth."""
     middles = [_heights(row.part)[1] for row in out.of(TEETH)]
     every = np.concatenate(middles) if middles else np.zeros(0)
     apart = float(np.ptp(every)) if len(every) > 1 else 0.0

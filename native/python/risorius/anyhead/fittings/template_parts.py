@@ -59,7 +59,7 @@ def _polygons(mesh: Mesh, axes: Doubles, *, flipped: bool) -> ObjMesh:
 def _shapes(
     dna: Dna, own: list[int], names: list[str], axes: Doubles
 ) -> dict[int, dict[str, Doubles]]:
-    """For each mesh of `own`: float64[V, 3] by control, the displacements."""
+    """Index of each mesh of `own` -> control -> displacements of the mesh, float64[V, 3]."""
     out: dict[int, dict[str, Doubles]] = {m: {} for m in own}
     if not own:
         return out

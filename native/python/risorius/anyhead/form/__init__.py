@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A small statistical model of the form of heads, and its fit to a surface."""
+"""Fits a small statistical model of the shape of heads to a surface."""

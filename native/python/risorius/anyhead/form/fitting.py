@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Fits the statistical head model to a surface by iterative closest points.
 
-Each round pairs vertices of the model with the closest points of the surface with a similar normal.
-A Gauss-Newton step then solves rotation, translation, scale and weights of the model together.
+Each round pairs vertices of the model with the closest surface points that have a similar normal. A
+Gauss-Newton step then solves rotation, translation, scale and weights of the model together.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _BEYOND = 3.5  # standard deviations: largest weight of a part
 
 @dataclass
 class Pose:
-    """A fitted model and its place: point = scale * rotation @ form + shift.
+    """A fitted model and its place: point = scale * rotation @ model + shift.
 
     Attributes:
-        rotation: float64[3, 3].
-        scale: units of the surface per cm of the form.
+        rotation: float64[3, 3], from the space of the model to the space of the surface.
+        scale: units of the surface per cm of the model.
         shift: float64[3], the translation.
-        parts: float64[K], weights of the form's parts in standard deviations.
-        expressions: float64[E], weights of the form's expressions, 0 to 1.2.
+        parts: float64[K], weights of the principal components in standard deviations.
+        expressions: float64[E], weights of the model's expressions, 0 to 1.2.
     """
 
     rotation: Doubles
@@ -46,15 +46,15 @@ class Pose:
     expressions: Doubles = field(default_factory=lambda: np.zeros(len(head_form().expressions)))
 
     def points(self, form: HeadForm) -> Doubles:
-        """float64[V, 3]: vertices of the fitted form in the surface's space."""
+        """float64[V, 3]: vertices of the fitted model in the space of the surface."""
         return self.place(form.shaped(self.parts, self.expressions))
 
     def place(self, points: Doubles) -> Doubles:
-        """Transform points from the form's space to the surface's: float64[n, 3]."""
+        """float64[n, 3]: points, transformed from the space of the model to the surface's space."""
         return np.asarray(self.scale * points @ self.rotation.T + self.shift)
 
     def back(self, points: Doubles) -> Doubles:
-        """Transform points from the surface's space to the form's: float64[n, 3]."""
+        """float64[n, 3]: points, transformed from the surface's space to the space of the model."""
         return np.asarray((points - self.shift) @ self.rotation / self.scale)
 
 
@@ -87,8 +87,8 @@ class Target:
             farthest: largest distance of a pair.
 
         Returns:
-            bool[n], False for points without a partner or with one at a border of the surface;
-            float64[n, 3], the partners; float64[n, 3], their normals.
+            bool[n], False for points without a partner or with a partner at a border of the
+            surface; float64[n, 3], the partners; float64[n, 3], their normals.
         """
         triangle, shares, _ = self.closest.nearest(points, normals, least_cosine, farthest)
         at = np.maximum(triangle, 0)
@@ -109,9 +109,9 @@ class Step:
 
     Attributes:
         rounds: number of rounds; each finds new pairs.
-        reach: cm of the form; pairs farther apart have little weight.
-        vertices: number of vertices of the form that are paired.
-        parts: number of the form's parts whose weights may change.
+        reach: distance in cm of the model; pairs farther apart have little weight.
+        vertices: number of vertices of the model that are paired.
+        parts: number of principal components whose weights may change.
         prior: strength of the pull of weights towards 0; 1: the model's standard deviations.
         least_cosine: least cosine between the normals of a pair.
         expressions: whether weights of expressions may change.
@@ -151,8 +151,8 @@ def fit(
         target: the surface.
         pose: the pose to begin with; it is not changed.
         steps: the steps of the fit in order.
-        held: vertices of the form with known positions.
-        weights: float64[V], weight of each vertex of the form; None: the weights of the form.
+        held: vertices of the model with known positions.
+        weights: float64[V], weight of each vertex of the model; None: the weights in the model.
     """
     form = head_form()
     if weights is not None:
@@ -170,10 +170,10 @@ def fit(
 
 @dataclass(frozen=True)
 class Held:
-    """Vertices of the form with known positions.
+    """Vertices of the model with known positions.
 
     Attributes:
-        vertices: int64[n], indices of vertices of the form.
+        vertices: int64[n], indices of vertices of the model.
         points: float64[n, 3], their positions in the surface's space.
         weights: float64[n]; 1 is the weight of a pair in the middle of the face.
     """
@@ -184,7 +184,7 @@ class Held:
 
 
 def _chosen(form: HeadForm, count: int) -> Ints:
-    """int64[n]: vertices spread over the form, denser where the weights of the form are high."""
+    """int64[n]: vertices spread over the model, denser where its fit weights are high."""
     if count >= form.skin:
         return np.arange(form.skin)
     areas = np.zeros(form.skin)
@@ -197,7 +197,7 @@ def _chosen(form: HeadForm, count: int) -> Ints:
 
 
 def form_normals(form: HeadForm, shaped: Doubles) -> Doubles:
-    """float64[skin, 3]: unit vertex normals of a form in its own space.
+    """float64[skin, 3]: unit vertex normals of a shaped model in its own space.
 
     Args:
         form: gives the triangles.
@@ -224,12 +224,12 @@ def _mean_normals() -> Doubles:
 
 
 def pose_normals(form: HeadForm, pose: Pose, shaped: Doubles) -> Doubles:
-    """float64[skin, 3]: unit vertex normals of a form in the surface's space.
+    """float64[skin, 3]: unit vertex normals of a shaped model in the surface's space.
 
     Args:
         form: the model.
-        pose: the pose of the form.
-        shaped: float64[V, 3], vertex positions of the form with the weights of the pose.
+        pose: the pose of the model.
+        shaped: float64[V, 3], vertex positions of the model with the weights of the pose.
     """
     as_mean = not pose.parts.any() and not pose.expressions.any()
     normals = _mean_normals() if as_mean else form_normals(form, shaped)
@@ -248,7 +248,7 @@ def _round(
     used = chosen[found]
     if len(used) < 30:
         return pose
-    # The equations are in the form's space; points of the surface are transformed to it.
+    # The equations are in the space of the model; points of the surface are transformed to it.
     away = shaped[used] - pose.back(near[found])
     across = across[found] @ pose.rotation
     weight = form.weights[used] / (1 + (np.linalg.norm(away, axis=1) / step.reach) ** 2) ** 2
@@ -261,8 +261,8 @@ def _round(
 
 
 class _System:
-    """The normal equations of a round. Unknowns: rotation (3), translation (3), growth (1), then
-    the weights of parts and of expressions."""
+    """The normal equations of a round. Unknowns: rotation (3), translation (3), log scale (1), then
+    the weights of principal components and of expressions."""
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:
         self.form, self.shaped, self.step = form, shaped, step
@@ -275,7 +275,7 @@ class _System:
         """Add equations that reduce the distances of pairs.
 
         Args:
-            used: int64[n], vertices of the form.
+            used: int64[n], vertices of the model.
             away: float64[n, 3], vectors from their partners to these vertices.
             across: float64[n, 3], normals at the partners; None: all directions have equal weight.
             weight: float64[n], weights of the pairs.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The statistical head model: a mean head, its principal variations and some expressions."""
+"""Loads the statistical head model: a mean head, its main variations and some expressions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FILE_NAME = "heads.npz"  # made by packaging/ship/make_head_form.py
 
 @dataclass(frozen=True)
 class TeethForm:
-    """A linear regression from the skin to the lower teeth, over the drawn heads.
+    """A linear regression from the skin to the lower teeth, over the heads of the model.
 
     Its 12 results are the centre of the teeth in cm, and row by row the matrix [3, 3] that maps the
     teeth of the mean head to the teeth of this head.
@@ -38,7 +38,8 @@ class TeethForm:
 
 @dataclass(frozen=True)
 class HeadForm:
-    """A mean head plus weighted parts, in cm, y up, face towards +z, origin between the eyes.
+    """A mean head plus weighted principal components (parts), in cm, y up, face towards +z. The
+    origin is midway between the eyes.
 
     The last four vertices belong to no triangle: the centre and the foremost point of the left
     eyeball, then of the right eyeball.
@@ -48,7 +49,7 @@ class HeadForm:
         parts: float64[K, V, 3], principal displacements of one standard deviation.
         expressions: float64[E, V, 3], displacements of expressions, for weights from 0 to 1.
         expression_names: the names of the expressions.
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], vertex indices of the skin's triangles.
         weights: float64[V], weight of each vertex in a fit, 0 to 1.
         places: the vertex index of each landmark by name.
         teeth: the regression from the skin to the lower teeth.
@@ -72,7 +73,7 @@ class HeadForm:
         """float64[V, 3]: vertex positions of a head with given weights.
 
         Args:
-            parts: float64[K], weights of the parts in standard deviations.
+            parts: float64[K], weights of the principal components in standard deviations.
             expressions: float64[E], weights of the expressions.
         """
         out = self.mean + np.tensordot(parts, self.parts, 1)

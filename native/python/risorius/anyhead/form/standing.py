@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where in a surface a head is, of any unit and direction: the best of many guesses."""
+"""Finds a head of unknown unit and direction in a surface: the best fit of many guesses."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from .fitting import FINE, PLACE, ROUGH, Held, Pose, Step, Target, fit, pose_nor
 from .heads import HeadForm, head_form
 
 TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
-_SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # of the surface's height that the head may have
-_PLACED, _KEPT, _TRIED = 48, 10, 3  # guesses that go on to the next stage
-_WORSE = 1.6  # a guess so much worse than the best one is none
-_OBLIQUE = 48
-SURE, NO_FACE = 0.13, 0.21  # errors up to which a head is one, and from which it is none
+_SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # tried heights of the head / height of the surface
+_PLACED, _KEPT, _TRIED = 48, 10, 3  # number of guesses that each stage keeps
+_WORSE = 1.6  # guesses with an error above this multiple of the least error are dropped
+_OBLIQUE = 48  # number of rotations
+SURE, NO_FACE = 0.13, 0.21  # largest error of a certain head; larger errors than NO_FACE: no head
 _GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
-_CELLS = 9000
-_FAR = 1.5  # cm of the form: farther counts as this far
+_CELLS = 9000  # largest number of vertices of a coarsened surface
+_FAR = 1.5  # cm of the model: larger distances count as this distance
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A form in a surface.
+    """The head model fitted to a surface.
 
     Attributes:
-        pose: of the form.
-        error: see `misfit`, and a little for parts that are seldom; cm of the form.
+        pose: the fitted model.
+        error: the result of `misfit` plus a penalty for unlikely weights, in cm of the model.
     """
 
     pose: Pose
@@ -40,7 +40,7 @@ class Standing:
 
 
 def turns(up: Doubles | None, front: Doubles | None) -> list[Doubles]:
-    """float64[3, 3] each: rotations from the form to the surface that map axes to axes.
+    """float64[3, 3] each: rotations from the model to the surface that map axes to axes.
 
     Args:
         up, front: float64[3], the head's directions in the axes of the surface; rotations more than
@@ -57,12 +57,12 @@ def turns(up: Doubles | None, front: Doubles | None) -> list[Doubles]:
 
 
 def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -> list[Pose]:
-    """Heads of several sizes at the top of a surface.
+    """Approximate poses of heads of several sizes at the top of a surface.
 
     Args:
-        points: float64[n, 3] of it.
-        turn: float64[3, 3], from the form to the surface.
-        shares: of the surface's height that the head may have.
+        points: float64[n, 3], points of the surface.
+        turn: float64[3, 3], the rotation from the model to the surface.
+        shares: heights of the heads as fractions of the surface's height.
     """
     stood = points @ turn
     low, high = stood.min(axis=0), stood.max(axis=0)
@@ -81,15 +81,15 @@ def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -
 
 
 def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> float:
-    """How far three quarters of the middle of the face are from a surface at most, cm of the form.
+    """Distance from the surface within which 3/4 of the model's face vertices are, cm of the model.
 
-    Holes, hair and inner sides take what is left of it.
+    The remaining quarter may be at holes, hair and inner sides of the surface.
 
     Args:
         target: the surface.
-        pose: of the form.
-        form: it.
-        count: of vertices that are looked at.
+        pose: the pose of the model.
+        form: the model.
+        count: approximate number of face vertices that are measured.
     """
     face = np.flatnonzero(form.weights[: form.skin] > 0.6)
     face = face[:: max(1, len(face) // count)]
@@ -101,7 +101,7 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
 
 
 def _strange(pose: Pose) -> float:
-    """The penalty of a fit for unlikely weights of parts and expressions, in cm."""
+    """The penalty of a fit for unlikely weights of components and expressions, in cm."""
     return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
 
 
@@ -112,16 +112,17 @@ def find_standing(
     held: Held | None = None,
     progress: Progress | None = None,
 ) -> list[Standing]:
-    """The likeliest places of a head in a surface, the best first.
+    """The likeliest poses of a head in a surface, the smallest error first.
 
     Args:
         target: the surface.
-        up, front: float64[3], where it has them; None: anywhere.
-        held: vertices of the form whose places are known.
-        progress: told the share that is done, 0 to 1; False stops.
+        up, front: float64[3], the head's directions in the axes of the surface; None: unknown.
+        held: vertices of the model with known positions.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        Stopped: progress said False.
+        Stopped: `progress` returned False.
     """
     coarse = Target(coarsened(target.surface))
     best = _best(target, coarse, turns(up, front), held, telling(progress, 0.0, 0.5))
@@ -132,7 +133,7 @@ def find_standing(
 
 
 def oblique() -> list[Doubles]:
-    """float64[3, 3] each: turns spread evenly over all there are (Alexa 2022)."""
+    """float64[3, 3] each: rotations spread evenly over all rotations (Alexa 2022)."""
     k = np.arange(_OBLIQUE) + 0.5
     share = k / _OBLIQUE
     a, b = 2 * np.pi * k / 2**0.5, 2 * np.pi * k / 1.533751168755204288118041
@@ -157,7 +158,7 @@ def _best(
     held: Held | None,
     tell: Callable[[float], bool],
 ) -> list[Standing]:
-    """The best places of a head that stands in one of several ways, the best first."""
+    """The best poses of a head with one of the rotations `ways`, the smallest error first."""
     form = head_form()
     poses = [g for turn in ways for g in guesses(coarse.surface.points, turn)]
 
@@ -179,10 +180,10 @@ def _best(
 
 
 def coarsened(surface: Surface) -> Surface:
-    """A surface of few vertices: those of a cell of a grid become one.
+    """A simplified surface: all vertices in a cell of a grid are merged into one.
 
     Args:
-        surface: it stays as it is.
+        surface: the surface; it is not changed.
     """
     used = np.unique(surface.triangles)
     low = surface.points[used].min(axis=0)
@@ -209,7 +210,7 @@ def _rated(target: Target, poses: Sequence[Pose], form: HeadForm, count: int) ->
 
 
 def _apart(rated: Sequence[Standing]) -> list[Standing]:
-    """Without what is nearly the same as a better one."""
+    """Drops each pose that is nearly the same as a pose with a smaller error."""
     out: list[Standing] = []
     for one in rated:
         size = 10.0 * one.pose.scale

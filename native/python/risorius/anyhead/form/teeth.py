@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The lower teeth of a head by its skin, and how they differ between two heads.
+"""Predicts the lower teeth of a head from its skin, and their change between two heads.
 
-The jaw moves by the size and the place of the lower teeth, which the skin hides. The model of form
-knows both of many heads and tells them by the form of the face.
+The size and the place of the lower teeth determine the motion of the jaw, but the skin hides the
+teeth. The statistical head model contains the teeth of many heads and predicts the teeth from the
+skin.
 """
 
 from __future__ import annotations
@@ -17,21 +18,21 @@ from .fitting import Pose, Target, form_normals
 from .heads import head_form
 from .standing import SURE, find_standing
 
-_NEAR = 1.0  # cm of the form: a vertex of the model farther from a face is not on it
-_LEAST = 0.9  # of the vertices that tell the teeth: so many must lie on the face
-_BEYOND = 3.0  # standard deviations that a quantity of the teeth may have
-_OTHER_SIZE = 0.1  # teeth that differ from the expected size by a larger share are other models
-_OTHER_PLACE = 0.4  # cm: teeth farther from their expected place are other models
+_NEAR = 1.0  # cm of the model: largest distance of a vertex of the model from the face
+_LEAST = 0.9  # least fraction of the vertices of the regression that must be on the face
+_BEYOND = 3.0  # limit of each predicted value in standard deviations
+_OTHER_SIZE = 0.1  # teeth with a larger relative difference from the predicted size are ignored
+_OTHER_PLACE = 0.4  # cm: teeth farther from their predicted place are ignored
 _UP, _FRONT = np.eye(3)[1], np.eye(3)[2]
 
 
 @dataclass(frozen=True)
 class JawChange:
-    """The lower jaw of one head and of another.
+    """The change of the lower jaw from one head to another head.
 
     Attributes:
-        before, after: float64[3], a place of the jaw on the one head and on the other.
-        linear: float64[3, 3], what makes a small vector of the one jaw that of the other.
+        before, after: float64[3], the same point of the jaw on the first and the second head.
+        linear: float64[3, 3], maps vectors on the first jaw to vectors on the second jaw.
     """
 
     before: Doubles
@@ -40,10 +41,10 @@ class JawChange:
 
 
 def standing_pose(surface: Surface) -> Pose | None:
-    """The model of form in a head that stands; None: there is none.
+    """The head model fitted to an upright head; None if no face was found.
 
     Args:
-        surface: y up, the face towards z.
+        surface: the head, y up, the face towards +z.
     """
     best = find_standing(Target(surface), _UP, _FRONT)[0]
     return best.pose if best.error <= SURE else None
@@ -53,13 +54,13 @@ def jaw_change(surface: Surface, points: Doubles, on: Surface, pose: Pose) -> Ja
     """The change of the lower jaw between two heads with the same triangles.
 
     Args:
-        surface: the one head.
-        points: float64[V, 3], its vertices on the other.
-        on: that of both in which the model of form lies.
-        pose: of the model.
+        surface: the first head.
+        points: float64[V, 3], vertex positions of the second head.
+        on: the surface of one of these heads, to which the head model was fitted.
+        pose: the fitted model.
 
     Returns:
-        None: the head lacks a part of the face.
+        The change; None if the head lacks a part of the face.
     """
     places = _places(on, pose)
     if places is None:
@@ -72,8 +73,9 @@ def jaw_change(surface: Surface, points: Doubles, on: Surface, pose: Pose) -> Ja
 
 
 def _places(surface: Surface, pose: Pose) -> tuple[Ints, Ints, Doubles] | None:
-    """Which of the vertices that tell the teeth lie on a surface, the corners int64[n, 3] of their
-    triangles and the shares float64[n, 3]."""
+    """The vertices of the teeth regression that are on a surface: their indices among the vertices
+    of the regression, the corners int64[n, 3] of the triangles at these points, and barycentric
+    coordinates float64[n, 3]. None if too few are on the surface."""
     form = head_form()
     shaped = form.shaped(pose.parts, pose.expressions)
     chosen = form.teeth.vertices
@@ -87,12 +89,12 @@ def _places(surface: Surface, pose: Pose) -> tuple[Ints, Ints, Doubles] | None:
 
 
 def _teeth(used: Ints, points: Doubles) -> tuple[Doubles, Doubles]:
-    """The middle float64[3] of the lower teeth, and what makes the mean head's teeth those of this
-    head, float64[3, 3].
+    """The predicted centre float64[3] of the lower teeth of a head, and the matrix float64[3, 3]
+    that maps the teeth of the mean head to these teeth.
 
     Args:
-        used: int64[n], which of the vertices that tell them are there.
-        points: float64[n, 3], where.
+        used: int64[n], indices among the vertices of the regression.
+        points: float64[n, 3], positions of these vertices on the head.
     """
     form = head_form()
     told, mean = form.teeth, form.mean[form.teeth.vertices[used]]
@@ -111,16 +113,17 @@ def _teeth(used: Ints, points: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def shown_by(told: JawChange, before: Doubles, after: Doubles) -> JawChange:
-    """The change of the jaw as the lower teeth of both heads and the skin show it together.
+    """The predicted change of the jaw, corrected by the lower teeth of both heads.
 
-    Boxes around the teeth give the place, and half of the size by width and depth: how high teeth
-    are says nothing of a jaw. Teeth that differ more from the expected ones are other models, and
-    what the skin tells stays.
+    The bounding boxes of the teeth give the place. The size is the geometric mean of the predicted
+    size and the size by width and depth of the boxes; their height is not used, because it does not
+    depend on the jaw. Teeth that differ too much from the prediction are a different kind of model,
+    so the prediction is returned.
 
     Args:
-        told: what the skin tells.
-        before, after: float64[n, 3], the lower teeth of the one head and of the other; they may
-            have other vertices.
+        told: the change that the head model predicts from the skin.
+        before, after: float64[n, 3], the lower teeth of the first and of the second head, of any
+            topology.
     """
     sizes = [np.ptp(points, axis=0) for points in (before, after)]
     if min(size.min() for size in sizes) <= 0:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Landmarks of a face: found automatically, checked, and stored as JSON."""
+"""Finds the landmarks of a face automatically, checks them, and stores them as JSON."""

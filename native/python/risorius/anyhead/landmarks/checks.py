@@ -14,7 +14,7 @@ from .marks import LandmarkError
 LEAST, MOST = 200, 1_000_000  # vertices of a head
 _FLAT = 0.02  # of a mesh's size: border vertices within this distance of a plane lie in it
 _CUT = 0.3  # of the border: a mesh with more of its border in one end plane was cut there
-_DEEP = 0.12  # cm of the form: least depth of a step between the lids that counts as an opening
+_DEEP = 0.12  # cm of the model: least depth of a step between the lids that counts as an opening
 _ROWS, _COLUMNS = 25, 5  # grid of rays through an eye
 _LOOKED_AT = 100_000  # largest number of edges that are tested
 _CROSSED = 0.06  # largest share of the edges of a face that may pass through the face
@@ -90,7 +90,8 @@ def completed(surface: Surface) -> list[Surface]:
 
     Returns:
         For each side of the bounding box at which the surface has a flat cut: the surface together
-        with its mirror image at this side. A flat cut of the neck counts too. Empty without a cut.
+        with its mirror image at this side. A flat cut of the neck counts too. The list is empty if
+        there is no flat cut.
     """
     points = surface.points
     border = points[surface.border()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Landmarks without clicks: the model of form is laid onto a head and says where they are."""
+"""Finds the landmarks of a head automatically: the statistical head model is fitted to it."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from .checks import LEAST, check_crossings, check_eyes, check_mesh, completed, l
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
-_HELD, _EYE = 60.0, 8.0  # how much a given landmark counts, and the middle of a given eyeball
-_NEAR_EYE = 2.0  # cm of the form: farther from the model's eye an eyeball is none of this head
-_ON = 0.4  # cm of the form: a landmark so far from the surface is not on it
-_LARGE, _TRIED = 0.3, 4  # of the largest piece: what may be a head too; how many are looked at
-_LOOKED, _FITTED, _REFINED = 0.8, 0.85, 0.95  # shares of the work at whose ends the steps are
-_AWAY = 20.0  # cm of the form: what is so far from a face belongs to another
+_HELD, _EYE = 60.0, 8.0  # weights of a landmark by the user and of the centre of an eyeball
+_NEAR_EYE = 2.0  # cm of the model: eyeballs farther from the model's eyes are ignored
+_ON = 0.4  # cm of the model: landmarks farther from the surface are left out
+_LARGE, _TRIED = 0.3, 4  # smallest piece / largest piece that may be a head; most pieces tried
+_LOOKED, _FITTED, _REFINED = 0.8, 0.85, 0.95  # progress after each step
+_AWAY = 20.0  # cm of the model: pieces farther from a face belong to another head
 
 
 @dataclass(frozen=True)
 class Hints:
-    """What is known of a head before it is looked at.
+    """Known facts about a head, which help to find its landmarks.
 
     Attributes:
-        where: what errors call the head.
-        marks: float64[3] by name of landmarks that a person gave.
-        up, front: float64[3], where the head has them; None: anywhere.
-        eyes: middles (float64[3]) of eyeballs that are meshes of their own.
-        open_eyes: whether eyes without openings are refused.
+        where: name of the head in error messages.
+        marks: float64[3] by name, landmarks that the user placed.
+        up, front: float64[3], the head's directions in the axes of the surface; None: unknown.
+        eyes: float64[3] each, centres of eyeballs that are separate meshes.
+        open_eyes: whether a head with closed or painted eyes is refused.
     """
 
     where: str = "the head"
@@ -48,13 +48,13 @@ class Hints:
 
 @dataclass(frozen=True)
 class Found:
-    """A head whose form is known.
+    """A head with its landmarks and the fitted head model.
 
     Attributes:
-        landmarks: of it.
-        pose: of the model of form in it.
-        error: how far three quarters of the face are from the model at most, cm of the model.
-        lips_apart: whether the lips are two; else they are one surface, which cannot open.
+        landmarks: the landmarks of the head.
+        pose: the head model fitted to the head.
+        error: error of the fit in cm of the model, see form.standing.Standing.
+        lips_apart: whether the lips are separate; connected lips cannot open.
     """
 
     landmarks: Landmarks
@@ -63,13 +63,13 @@ class Found:
     lips_apart: bool = True
 
     def require_lips(self, where: str) -> None:
-        """Ends where the lips are one surface.
+        """Refuse a head whose lips are connected.
 
         Args:
-            where: what the error calls the head.
+            where: name of the head in the error message.
 
         Raises:
-            LandmarkError: they are.
+            LandmarkError: the lips are connected.
         """
         if not self.lips_apart:
             raise LandmarkError(
@@ -81,16 +81,17 @@ class Found:
 def find_landmarks(
     target: Surface, hints: Hints | None = None, progress: Progress | None = None
 ) -> Landmarks:
-    """The landmarks of a head.
+    """Find the landmarks of a head.
 
     Args:
-        target: the head, standing or not, of any unit.
-        hints: what is known of it.
-        progress: told the share that is done, 0 to 1; False stops.
+        target: the head in any direction and unit.
+        hints: known facts about the head.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        LandmarkError: there is no face in it, or one that cannot be used; says which.
-        Stopped: progress said False.
+        LandmarkError: no face was found, or the face is unusable; the message says why.
+        Stopped: `progress` returned False.
     """
     return find_form(target, hints, progress).landmarks
 
@@ -98,16 +99,17 @@ def find_landmarks(
 def find_form(
     target: Surface, hints: Hints | None = None, progress: Progress | None = None
 ) -> Found:
-    """The landmarks of a head and the model of form in it.
+    """Find the landmarks of a head, and fit the head model to it.
 
     Args:
-        target: the head, standing or not, of any unit.
-        hints: what is known of it.
-        progress: told the share that is done, 0 to 1; False stops.
+        target: the head in any direction and unit.
+        hints: known facts about the head.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
-        LandmarkError: there is no face in it, or one that cannot be used; says which.
-        Stopped: progress said False.
+        LandmarkError: no face was found, or the face is unusable; the message says why.
+        Stopped: `progress` returned False.
     """
     hints, tell = hints or Hints(), telling(progress)
     tell(0.0)
@@ -131,7 +133,7 @@ def find_form(
 
 
 def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, Pose, float]:
-    """The piece of a surface that is a head, the model's pose in it and its error."""
+    """The head (a piece of the surface), the fitted head model, and the error of the fit."""
     seen = Target(target)
     best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]
@@ -159,12 +161,12 @@ def _heads(parts: Sequence[Surface], hints: Hints, tell: Progress) -> list[tuple
 
 
 def _at_end(tell: Progress) -> Progress:
-    """Progress of work that seldom follows: it may be stopped, and its share stays at the end."""
+    """Progress of work that is rarely necessary: it reports 1.0 always, and can be stopped."""
     return lambda _share: tell(1.0)
 
 
 def _off(part: Surface, pose: Pose) -> bool:
-    """Whether a piece lies away from the head of a pose and is as large as one."""
+    """Whether a piece is far from the head at `pose`, and large enough to be another head."""
     inside = pose.back(part.points[np.unique(part.triangles)])
     middle = (inside.min(axis=0) + inside.max(axis=0)) / 2
     large = float(np.ptp(inside, axis=0).max()) > 0.5 * _AWAY
@@ -172,7 +174,7 @@ def _off(part: Surface, pose: Pose) -> bool:
 
 
 def _why_none(seen: Target, hints: Hints, tell: Progress) -> str:
-    """Why no face was found, for a sentence."""
+    """The reason why no face was found, as the end of an error message."""
     halves, tell = completed(seen.surface), _at_end(tell)
     if any(_standing(Target(whole), hints, tell)[0].error <= NO_FACE for whole in halves):
         return "half of the face is missing: mirror it (in Blender: the modifier Mirror)"
@@ -188,7 +190,7 @@ def _why_none(seen: Target, hints: Hints, tell: Progress) -> str:
 
 
 def _on_surface(seen: Target, pose: Pose, points: Mapping[str, Doubles]) -> Landmarks:
-    """The landmarks that are near the surface, on it."""
+    """Move landmarks to the closest points of the surface. Landmarks far from it are left out."""
     form = head_form()
     names = list(points)
     places = np.array([points[name] for name in names])
@@ -217,7 +219,10 @@ def _held(hints: Hints) -> Held | None:
 
 
 def _with_eyes(pose: Pose, hints: Hints) -> Held | None:
-    """The places of given landmarks and of given eyeballs, each at the nearer eye of the model."""
+    """The user's landmarks, and the given eyeballs as positions of the eyes of the head model.
+
+    None if no given eyeball is near an eye of the model.
+    """
     held = _held(hints)
     form = head_form()
     middles = pose.points(form)[[form.skin, form.skin + 2]]

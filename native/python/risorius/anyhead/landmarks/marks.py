@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The landmarks of a head (found, moved by hand or missing), and their JSON file."""
+"""Stores the landmarks of a head (found, moved by the user or missing) in a JSON file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Landmarks:
     """Landmarks of a face by name, in the space of the surface in which they were found.
 
     Attributes:
-        points: float64[3] by name.
+        points: float64[3] by landmark name, positions.
         how: FOUND or MOVED for each point.
         notes: sentences for the user.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The names of the landmarks of a face, and their names in sentences."""
+"""Lists the names of the landmarks of a face, and their names in sentences."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def _those_with(key: str) -> frozenset[str]:
 
 
 def other_side(name: str) -> str:
-    """The name of the landmark on the other side of the face; a middle landmark's own name."""
+    """The name of the same landmark on the other side; a landmark on the midline gives its own
+    name."""
     swap = {"_L": "_R", "_R": "_L"}
     return name[:-2] + swap[name[-2:]] if name[-2:] in swap else name
 

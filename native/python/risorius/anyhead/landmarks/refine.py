@@ -21,10 +21,11 @@ class Region:
     Attributes:
         begins: prefixes of the names of its landmarks.
         sides: whether the left and the right side are separate regions.
-        width: cm of the form: distance from the region's centre at which the weight is 1/e.
-        prior: strength of the pull of the form's weights towards 0.
+        width: distance from the region's centre at which the weight is 1/e, in cm of the model.
+        prior: strength of the pull of the model's weights towards 0.
         least_cosine: least cosine between the normals of a pair.
-        expressions: whether expressions may change; at the mouth they would replace its own form.
+        expressions: whether weights of expressions may change. They may not at the mouth, because
+            an expression would be fitted in place of the shape of the lips.
     """
 
     begins: tuple[str, ...]
@@ -41,7 +42,7 @@ REGIONS = (
     Region(("nose_", "nostril_"), False, 3.5, 0.7, 0.5),
     Region(("ear_",), True, 4.5, 0.7, 0.4),
 )
-_STRAYED = 1.2  # cm of the form: a region whose landmarks move farther is rejected
+_STRAYED = 1.2  # cm of the model: a region whose landmarks move farther is rejected
 _SEEN = 0.02  # smaller weights are set to 0
 
 

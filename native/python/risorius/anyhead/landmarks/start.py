@@ -12,8 +12,8 @@ from .find import Found, find_form
 from .marks import MOVED
 from .names import vague_landmarks
 
-_NEIGHBOURS = 12  # vertices of the form from which the displacement of a point is interpolated
-_REACH = 2.5  # cm of the form: radius in which a landmark moves the skin
+_NEIGHBOURS = 12  # vertices of the model from which the displacement of a point is interpolated
+_REACH = 2.5  # cm of the model: radius in which a landmark moves the skin
 _ROWS = 2000  # points that are computed together, to limit memory
 
 
@@ -115,7 +115,7 @@ def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> 
 
 
 def pairs_of(template: Surface, one: Found, other: Found) -> list[tuple[int, Doubles]]:
-    """The template's vertex nearest to each landmark, and its position on another head.
+    """The template's vertex nearest to each landmark, and the vertex's goal on another head.
 
     The goal is the vertex's own position on the other head and not the landmark. This keeps the
     distance between vertex and landmark, so that a coarse template is not distorted.

@@ -95,8 +95,8 @@ class Contacts:
         return float(beyond @ self._share) * MM**3
 
     def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """The same volume in mm3, measured by SkinChecker; contacts of the skin with itself do not
-        count. Slower than `volume`.
+        """The volume of `volume` in mm3, measured by SkinChecker, which is slower. Contacts of the
+        skin with itself do not count.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.
@@ -228,7 +228,7 @@ class Contacts:
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
             arm = points - surface.at(triangle.astype(np.int64), shares)
-            # Excludes points next to the open border of gums, which are not inside.
+            # Excludes points next to the open border of gums, because these points are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
             deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Closes the lips in poses that close the mouth, so that they meet and do not cut each other.
 
-Positions do not tell upper from lower lip at a point of contact, but the motion of an opening jaw
-does. This finds the lips of a mesh of any topology by its expressions.
+At a point of contact, positions do not distinguish the upper from the lower lip, but the motion by
+jawOpen does. So the lips of a mesh of any topology are found by its expressions.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Lips:
         expressions: Mapping[str, Doubles],
         corners: Doubles | None = None,
     ) -> None:
-        """Find the lips; `found` is False if the face has none that part.
+        """Find the lips; `found` is False if the face has no lips that part.
 
         Args:
             skin: the skin of the target at rest.
@@ -113,7 +113,8 @@ class Lips:
     def _touching(self) -> Doubles | None:
         """float64[2, 3]: both ends of the line in which the lips touch at rest; None if they do not
         touch."""
-        # Halved because the first estimate of the width covers about two mouths.
+        # `least` is halved, because `mm` derives from the first estimate of the mouth's width,
+        # which is about twice too large.
         half, least = COLUMNS // 2, _TOUCH * self.mm / 2
         for _ in range(3):  # each round narrows the columns
             gap = self.meeting(self.skin.points).gap
@@ -247,7 +248,7 @@ class Lips:
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest
-        # The cosine excludes points beside the border of an open lip surface.
+        # The cosine excludes points next to the border of an open lip surface.
         inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
         inside &= distance < _NEAR * self.mm
         signed = np.where(inside, -distance, distance)

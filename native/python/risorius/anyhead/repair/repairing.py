@@ -33,7 +33,7 @@ class Places(Protocol):
 
     @property
     def points(self) -> Mapping[str, Doubles]:
-        """float64[3] by name."""
+        """float64[3] by landmark name: the position of each landmark."""
 
 
 @dataclass
@@ -107,8 +107,8 @@ def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose,
     """The controls of an open jaw with closed lips; empty if the face has no such controls.
 
     Args:
-        expressions: float64[V, 3] by raw control.
-        combinations: float64[V, 3] by controls that are 1 together.
+        expressions: float64[V, 3] by raw control, displacements of the skin.
+        combinations: float64[V, 3] by controls that are 1 together, displacements of the skin.
     """
     names = dict.fromkeys([*expressions, *(name for pose in combinations for name in pose)])
     lips = [name for name in names if name.startswith(_CLOSE)]
@@ -118,7 +118,8 @@ def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose,
 def _together(
     pose: Pose, expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]
 ) -> Doubles:
-    """float64[V, 3]: the displacements of a pose, summed from its controls and their pairs."""
+    """float64[V, 3]: the displacements of a pose, summed from its controls and from the correctives
+    of pairs of these."""
 
     def alone(name: str) -> Doubles:
         return np.asarray(expressions.get(name, 0.0), np.float64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faults of expressions (gaps, cuts and stretched polygons) before and after the repair."""
+"""Reports faults of expressions (gaps, cuts, stretched polygons) before and after the repair."""
 
 from __future__ import annotations
 

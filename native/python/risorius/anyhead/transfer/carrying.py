@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What an expression does at each vertex of the template, as this head's form has it.
+"""Computes the displacements of the template's vertices in each expression on another head.
 
-The change of form says how far a motion goes here and which way. What the jaw takes along turns
-with it by the same angle on everybody, from a place of the jaw that lies where this head's is; only
-what is left of the motion follows the form.
+Vertices that the jaw moves are rotated by the same angle as on the template, about the hinge of the
+other head's jaw. The remaining motion is transformed by the deformation gradients between both
+heads.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from .closing import BLINKS, closing_shares
 from .form import changes_of_form
 from .template import Pose, TemplateFace, left_over
 
-_REST = 0.05  # cm: where the jaw moves a place less than that, it does not carry it
-_FLESH = 0.1  # of a size: by so much flesh makes a jaw larger or smaller whose bone is the same
-_SPURIOUS = 0.002  # cm: a corrective ends where the template's does
+_REST = 0.05  # cm: vertices that the jaw moves less count as not moved by it
+_FLESH = 0.1  # relative size difference up to which soft tissue explains it, not the bone
+_SPURIOUS = 0.002  # cm: a corrective fades out where the template's corrective is smaller
 
 
 class Carrying:
-    """From a template to the same vertices on another head."""
+    """Computes the displacements of a template's poses for the same vertices on another head."""
 
     def __init__(
         self,
@@ -32,13 +32,13 @@ class Carrying:
         trust: Doubles,
         teeth: JawChange | None = None,
     ) -> None:
-        """Compares the two.
+        """Compute the deformation from the template to the other head.
 
         Args:
             face: the template.
-            points: float64[V, 3], its vertices on the other head, cm.
-            trust: float64[V], 0 to 1: how sure the place of each is.
-            teeth: how the lower teeth differ; None: the form of the skin tells it.
+            points: float64[V, 3], positions of its vertices on the other head, cm.
+            trust: float64[V], 0 to 1: confidence in each position.
+            teeth: the change of the jaw; None: it is estimated from the skin.
         """
         self._face, self._points = face, points
         self._form = changes_of_form(face.surface, points, trust)
@@ -51,7 +51,7 @@ class Carrying:
                     self._closing[control] = shares
 
     def _jaw_by_form(self, trust: Doubles) -> JawChange | None:
-        """The change of the jaw from the form of the skin that it moves."""
+        """The change of the jaw, estimated from the deformation of the skin that jawOpen moves."""
         face = self._face
         if face.jaw is None:
             return None
@@ -61,18 +61,18 @@ class Carrying:
         weight /= weight.sum()
         form = np.einsum("v,vij->ij", weight, self._form)
         grown = float(np.log(np.cbrt(max(np.linalg.det(form), 1e-3))))
-        # Heads of one bone have more or less flesh about it: small differences are such.
+        # Small size differences are attributed to soft tissue, so they do not change the jaw.
         size = float(np.exp(grown * grown**2 / (grown**2 + _FLESH**2)))
         middle, other = weight @ face.surface.points, weight @ self._points
         hinge = other + size * (face.jaw.hinge - middle)
         return JawChange(face.jaw.hinge, hinge, size * np.eye(3))
 
     def ways(self, strength: float = 1.0) -> dict[Pose, Doubles]:
-        """float64[V, 3] by pose, of what each control does alone, and of what is left over where
-        the controls of a corrective meet.
+        """float64[V, 3] by pose: displacements by each control, and by each corrective in addition
+        to its controls.
 
         Args:
-            strength: what expressions are multiplied with; 1 is the template's own.
+            strength: factor of all expressions; 1: the strength of the template.
         """
         face = self._face
         whole = {pose: self.carried(pose) for pose in face.ways}
@@ -82,15 +82,15 @@ class Carrying:
         }
         for pose, way in other.items():
             there = np.linalg.norm(own[pose], axis=1, keepdims=True)
-            # Two controls at a share of 1 fire their corrective by the square of it.
+            # A corrective is a product of two controls, so it scales with the squared strength.
             out[pose] = strength**2 * way * (there / (there + _SPURIOUS))
         return out
 
     def carried(self, pose: Pose) -> Doubles:
-        """float64[V, 3]: the way of all controls of a pose together.
+        """float64[V, 3]: displacements with all controls of a pose at 1.
 
         Args:
-            pose: one of the template.
+            pose: a pose of the template.
         """
         way = self._by_form(pose)
         for control in pose:

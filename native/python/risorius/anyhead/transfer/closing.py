@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How far lids go until they meet on another head.
+"""Scales the motion of lids so that they meet on another head.
 
-The form of a lid does not contain the height of the opening. Where two places of the template's
-lids meet in a blink, the same places of the head shall meet, so motions near them are multiplied
-with the share that this takes.
+The deformation gradient of a lid does not contain the height of the eye opening. If two points of
+the template's lids meet in a blink, the same points must meet on the head. So motions near these
+points are multiplied by the factor that closes the gap.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from .template import TemplateFace
 
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
 _MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
-_MEETS, _APART = 0.1, 0.35  # cm: farthest places that meet, and nearest that are two lids at rest
-_AROUND = 0.3  # cm around places that meet, in which motions are multiplied
-_REST = 0.02  # of the most that places say together: from there motions stay as they are
-_SHARES = (0.3, 2.0)  # least and largest share
-_ROWS = 256  # vertices that are looked at together
+_MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance at rest
+_AROUND = 0.3  # cm: standard deviation of the fall-off around contacts
+_REST = 0.02  # of the largest sum of weights: with a smaller sum the factor tends to 1
+_SHARES = (0.3, 2.0)  # smallest and largest factor
+_ROWS = 256  # number of vertices that are compared at once
 
 
 def lids_that_meet(surface: Surface, way: Doubles) -> tuple[Ints, Ints]:
-    """Vertices int64[n] that meet others, int64[n], when a motion is done.
+    """Pairs of vertices, int64[n] each, that meet at the end of a motion but are apart at rest.
 
     Args:
-        surface: at rest.
+        surface: the skin at rest.
         way: float64[V, 3], the motion.
     """
     able = np.flatnonzero(np.linalg.norm(way, axis=1) > _MOVES)
@@ -47,13 +47,13 @@ def lids_that_meet(surface: Surface, way: Doubles) -> tuple[Ints, Ints]:
 def closing_shares(
     face: TemplateFace, points: Doubles, control: str, carried: Doubles
 ) -> Doubles | None:
-    """float64[V, 1]: what the motions of a blink are multiplied with; None where no lids meet.
+    """float64[V, 1]: factor of a blink's motion at each vertex; None if no lids meet.
 
     Args:
         face: the template.
-        points: float64[V, 3], its vertices on the other head.
-        control: of the blink.
-        carried: float64[V, 3], its motion on the other head so far.
+        points: float64[V, 3], positions of its vertices on the other head.
+        control: name of the blink's control.
+        carried: float64[V, 3], the blink on the other head before this correction.
     """
     surface, way = face.surface, face.ways[(control,)].astype(np.float64)
     one, other = lids_that_meet(surface, way)
@@ -79,7 +79,7 @@ def closing_shares(
 
 def _squares(one: Doubles, other: Doubles) -> Doubles:
     """float64[n, m]: squares of the distances between points."""
-    middle = other.mean(axis=0)  # of numbers near 0 less is lost
+    middle = other.mean(axis=0)  # numbers near 0 lose less precision
     a, b = one - middle, other - middle
     square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
     return np.asarray(np.maximum(square, 0.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The deformation gradient at each vertex between two surfaces with the same triangles.
+"""Computes the deformation gradient at each vertex between two surfaces with equal triangles.
 
 The gradients are of Sumner and Popovic ("Deformation Transfer for Triangle Meshes", 2004), but at
 vertices and smoothed over 2 cm: the form of a lip's edge or a pore does not determine how far a

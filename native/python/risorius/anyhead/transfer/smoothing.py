@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Smoothing of values on a surface by its cotangent Laplacian."""
+"""Smooths values on a surface by its cotangent Laplacian."""
 
 from __future__ import annotations
 

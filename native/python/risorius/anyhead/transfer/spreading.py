@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Interpolates values at the template's vertices to the vertices of another head.
 
-Each vertex takes the value of the nearest point of the template with a similar normal. Vertices
+Each vertex takes the value of the nearest template point that has a similar normal. Vertices
 without such a point (the back of a throat, hair, a collar, a hole of a scan) get a smooth
 continuation of their neighbours' values over the head's triangles.
 """
@@ -87,7 +87,11 @@ class Spreading:
     def _fitting(
         self, smoothing: Smoothing, area: Doubles, parting: Doubles, tell: Callable[[float], bool]
     ) -> Doubles:
-        """float64[n], 0 to 1: how close the value of each vertex is to its neighbours' values."""
+        """float64[n], 0 to 1: how close the motion of each vertex in the poses is to its
+        neighbours' motion.
+
+        tell: gets the finished share of the work.
+        """
         longest = np.linalg.norm(parting, axis=2).max(axis=0)
         values = self._values(parting.reshape(len(parting), -1))
         fits = np.ones(len(values))
@@ -124,7 +128,7 @@ def _merged(surface: Surface) -> tuple[Ints, Ints]:
     size = float(np.ptp(surface.points, axis=0).max()) or 1.0
     normals = surface.normals()
     places = np.round(surface.points / (1e-6 * size)).astype(np.int64)
-    # Lips that touch lie at one place and face each other.
+    # Touching lips have vertices at the same position with opposite normals, which must stay apart.
     facing = np.round(normals * 0.7).astype(np.int64)
     _, first, of = np.unique(
         np.concatenate([places, facing], axis=1), axis=0, return_index=True, return_inverse=True

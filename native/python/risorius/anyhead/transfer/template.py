@@ -142,7 +142,7 @@ def _poses(dna: Dna) -> list[tuple[int, ...]]:
 
 
 def _skin(dna: Dna, posed: Posed) -> int:
-    """The index of the skin mesh of LOD 0 with the most vertices."""
+    """The index of the skin mesh of LOD 0; the mesh with the most vertices if there are several."""
     known = [m for m in posed.mesh_indices if len(dna.meshes[m].positions)]
     skin = [m for m in known if kind_of(dna.mesh_names[m]) == "skin"]
     if not skin:
@@ -168,7 +168,8 @@ def _jaw(
     points: Doubles,
     ways: dict[Pose, Floats],
 ) -> Jaw | None:
-    """The jaw from the jaw joint; without a moving joint, from the displacements of jawOpen."""
+    """The jaw from the motion of the jaw joint, or from the displacements of jawOpen if no joint
+    moves."""
     if JAW in dna.joint_names:
         found = _jaw_of_joint(dna, sets, names, axes)
         if found.turns:

@@ -70,7 +70,7 @@ def transfer(
         options: strength and threads; None: the defaults.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
-        teeth: difference of the lower teeth from the template; None: predicted from the skin.
+        teeth: change of the lower jaw from the template to the head; None: estimated from the skin.
 
     Raises:
         AnyHeadError: no vertex of the head is near the template, or the strength is out of range.
@@ -107,8 +107,8 @@ def _tell(progress: Progress | None, share: float) -> None:
 
 
 def _parting(face: TemplateFace, ways: dict[Pose, Doubles]) -> Doubles | None:
-    """float64[T, n, 3]: displacements of poses that part lips and lids; without controls of known
-    names the controls with the largest motion. None if nothing moves."""
+    """float64[T, n, 3]: displacements of poses that part lips and lids. If the template has no
+    controls with the known names, the controls that move most are used. None if nothing moves."""
     named: list[Pose] = [(name,) for name in _PARTING if (name,) in ways]
     far = {pose: float(np.square(way).sum()) for pose, way in face.ways.items() if len(pose) == 1}
     chosen = named or sorted(far, key=lambda pose: -far[pose])[: len(_PARTING)]

@@ -19,7 +19,8 @@ from ..work import MM, listed_meshes
 from .poser import Controls, make_checker, skin_and_solids
 
 Row = tuple[Controls, Doubles]
-# Vertices of other meshes follow the skin fully up to the first distance and not beyond the second.
+# Vertices of other meshes follow the skin fully if their distance from it is at most _NEAR_MM, and
+# not at all beyond _FAR_MM.
 _NEAR_MM, _FAR_MM = 6.0, 12.0
 _LEAST_MM = 0.01  # shorter deltas are left out
 _SKIN = 0.1  # a mesh with more than this fraction of the skin's vertices is a coarser skin
@@ -29,7 +30,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     """Append correctives to a face. Returns the new face.
 
     If a combination already has a corrective, the displacements are added to its shapes. Lashes and
-    coarser levels get the displacements of the nearest skin.
+    coarser LODs get the displacements of the nearest skin.
 
     Args:
         dna: a face of shapes; it is not changed.
@@ -64,7 +65,7 @@ def _channels(dna: Dna) -> dict[frozenset[int], int]:
 
 
 def _whole_levels(dna: Dna) -> list[int]:
-    """The levels that use all blend shape channels."""
+    """The LODs that use all blend shape channels."""
     lods, rows = dna.blend_shape_channels.lods, len(dna.blend_shape_channels.input_indices)
     return [lod for lod in range(min(len(lods), max(1, dna.lod_count))) if int(lods[lod]) == rows]
 
@@ -82,8 +83,8 @@ def _with_channels(dna: Dna, combinations: Sequence[Controls]) -> Dna:
         *dna.blend_shape_channel_names,
         *("_x_".join(names[c] for c in controls) for controls in combinations),
     ]
-    # A level uses the first rows of the channels. The new rows come last, so only levels that use
-    # all other channels can use them.
+    # A LOD uses the first rows of the channel table. The new rows come last, so only LODs that use
+    # all other channels can use the new ones.
     whole, channels = _whole_levels(dna), out.blend_shape_channels
     lods = [int(n) + count * (lod in whole) for lod, n in enumerate(channels.lods)]
     new = range(first_channel, first_channel + count)
@@ -120,14 +121,16 @@ def _add_targets(
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
     for m in sorted(meshes):
         mesh = copy.copy(made[m])
-        # Skin and lashes may have no shapes yet, if joints do all of their motion.
+        # Skin and lashes get targets even if they have none yet because joints do all of their
+        # motion.
         shaped = mesh.blend_shape_targets or m in skins or "lash" in dna.mesh_names[m].lower()
         if m in solids or not shaped:
             continue
         corners, shares = np.zeros((0, 3), np.int64), np.zeros((0, 3))
         if m != skin:
             points = np.asarray(mesh.positions, np.float64)
-            # A coarser skin has the same normals as the skin, but lashes have two sides.
+            # Only for a coarser skin, the nearest point must have a similar normal. The normals of
+            # lashes point to both sides, so normals are not compared there.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
             corners, shares, distance = nearest.of(points, normals)
@@ -187,7 +190,8 @@ class _Nearest:
 
 
 def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarget:
-    """The target plus a shape float64[V, 3]. Args: mm  length of the unit in mm."""
+    """The target with the displacements float64[V, 3] of a shape added. Args: mm: length of the
+    unit in mm."""
     sums = np.array(shape)
     np.add.at(sums, np.asarray(target.vertex_indices, np.int64), target.deltas)
     moved = np.flatnonzero(np.linalg.norm(sums, axis=1) * mm > _LEAST_MM)

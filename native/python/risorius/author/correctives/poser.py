@@ -121,15 +121,15 @@ def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
 def skin_and_solids(
     dna: Dna, solids: Sequence[str] = SOLIDS, lod: int = 0
 ) -> tuple[int, list[int]]:
-    """Index of the skin, the mesh with the most vertices of a level, and indices of its solids.
+    """Index of the skin, and indices of the solids. The skin is the largest mesh by vertex count.
 
     Args:
         dna: the face.
         solids: parts of the names of meshes that the skin must not intersect.
-        lod: the level.
+        lod: index of the LOD.
 
     Raises:
-        ArgumentError: the level has no meshes.
+        ArgumentError: the LOD has no meshes.
     """
     meshes = listed_meshes(dna, lod)
     if not meshes:
@@ -144,7 +144,7 @@ def skin_and_solids(
 
 
 def worst(all_of: Iterable[SkinFaults]) -> SkinFaults:
-    """The worst value of each entry. Combinations may have the faults of their parts."""
+    """For each vertex, face and edge, the worst depth, stretch and fold of all given faults."""
     return reduce(
         lambda a, b: SkinFaults(
             np.maximum(a.depth, b.depth),

@@ -32,7 +32,8 @@ _BLOCK = 64  # number of combinations between two reports of progress
 _ENOUGH = 3000  # smallest number of vertices of a skin that shows faults
 _MOVED_MM = 0.1  # vertices that move less count as resting
 _SHARED = 4  # a pair is checked if both expressions move at least this many common vertices
-# Sums of volume and of faces that count as equally bad, and the largest severity that is ignored.
+# _VOLUME mm3 of intersection are as bad as _FACES stretched or folded faces: both have severity 1.
+# _LEAST is the largest severity that is ignored.
 _VOLUME, _FACES, _LEAST = 100.0, 5.0, 0.1
 KINDS = ("volume", "stretched", "folded")
 _ALIKE = np.array([_VOLUME, _FACES, _FACES])  # equally bad sums, by kind
@@ -58,7 +59,8 @@ class CorrectiveOptions:
 
 @dataclass
 class Corrective:
-    """A combination, and the displacements of the skin with all its controls at 1."""
+    """A combination of controls, its faults, and the displacements that repair it with all controls
+    at 1."""
 
     controls: Controls
     displacement: Doubles  # [V, 3] displacements of the posed skin, in the file's unit
@@ -122,7 +124,7 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """The faults that a combination may have: those of its controls, and of pairs of them."""
+        """The faults that a combination may have, because its controls or their pairs have them."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)
@@ -143,7 +145,7 @@ class Search:
         ]
 
     def sums(self, combinations: Sequence[Controls], share: tuple[float, float]) -> list[FaultSums]:
-        """The faults of each combination that none of its parts has.
+        """The faults of each combination that none of its controls and pairs of controls has.
 
         Args:
             combinations: the combinations.
@@ -189,7 +191,7 @@ class Search:
 
 
 def _level(dna: Dna) -> int:
-    """The coarsest level whose skin has shapes and at least _ENOUGH vertices."""
+    """The coarsest LOD whose skin has shapes and at least _ENOUGH vertices."""
 
     def fine(lod: int) -> bool:
         skin = dna.meshes[skin_and_solids(dna, (), lod)[0]]
@@ -206,7 +208,7 @@ def severity(sums: FaultSums) -> float:
 def find_correctives(
     dna: Dna, options: CorrectiveOptions | None = None, progress: Progress | None = None
 ) -> Found:
-    """Find correctives for the worst pairs, for triples of them, and for combinations in options.
+    """Find correctives for the worst pairs and triples of controls, and for options.together.
 
     Args:
         dna: a face of shapes; it is not changed.
@@ -243,16 +245,17 @@ def find_correctives(
 def correct_again(
     rig: Dna, source: Dna, options: CorrectiveOptions, progress: Progress | None = None
 ) -> Dna:
-    """Check and repair the pairs of a finished rig once more by shapes. Returns the new face.
+    """Check the pairs of controls of a finished rig again, and repair them by blend shapes. Returns
+    the new face.
 
-    A rig's small errors matter where lips or lids touch. And turns of joints do not add up like the
-    shapes that were checked first. Existing correctives of pairs are extended; other pairs get new
-    ones.
+    A rig's small errors matter where lips or lids touch. And rotations of joints do not add up like
+    the shapes that were checked first. Existing correctives of pairs are extended; other pairs get
+    new ones.
 
     Args:
         rig: the rig of joints and shapes; it is not changed.
-        source: the face without found correctives; its own correctives are not changed.
-        options: options of the search. At most once_more pairs get new correctives.
+        source: the face before correctives were searched; its correctives are not changed.
+        options: options of the search. At most options.once_more pairs get new correctives.
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
@@ -278,17 +281,18 @@ def _named(search: Search, names: Sequence[str]) -> Controls:
 
 
 def values_of(sums: Sequence[FaultSums]) -> Doubles:
-    """float64[n, 3]: the sums of faults by KINDS."""
+    """float64[n, 3]: the sums of faults, one column for each of KINDS."""
     return np.array([[getattr(s, kind) for kind in KINDS] for s in sums], np.float64)
 
 
 def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     """Choose the combinations to repair, so that all kinds of faults decrease similarly.
 
-    A single measure would neglect a kind of fault, because pairs with much volume are not those
-    with many folds. For each kind, the chosen combinations hold a fraction of the total. The
-    smallest of the three fractions is maximised by weights of the kinds (Arora, Hazan and Kale,
-    "The Multiplicative Weights Update Method", 2012), which start with the weights of severity().
+    A single measure would neglect a kind of fault, because the pairs with large volumes differ from
+    the pairs with many folds. For each kind, the chosen combinations contain a fraction of all
+    faults of this kind. The smallest of the three fractions is maximised by weights of the kinds
+    (Arora, Hazan and Kale, "The Multiplicative Weights Update Method", 2012), which start with the
+    weights of severity().
 
     Args:
         sums: combination -> its faults.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Meshes and their motion by joints; independent of how a rig is made."""
+"""Computes meshes and their motion by joints, for all parts of rig authoring."""

@@ -17,7 +17,9 @@ from ...base.budget import Budget
 from .skeleton import STILL, Doubles, Ints, joint_levels, skin_entries, world_matrices
 
 _HELD = 1 << 14  # number of matrices that are computed at once
-# Work per item, in steps of the budget.
+# Estimated work in steps of the Budget. For each input: _OF_A_JOINT for each joint, and _OF_A_LEVEL
+# for each level of the joint hierarchy. _OF_A_WEIGHT: for each skin weight of a moving joint, and
+# for each delta of a blend shape.
 _OF_A_JOINT = 256
 _OF_A_LEVEL = 4096
 _OF_A_WEIGHT = 32
@@ -32,7 +34,7 @@ class Motion(NamedTuple):
 
 
 def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Motion]:
-    """Yields the motion of each given input. Inputs that move no joint have no joints.
+    """Yields a Motion for each input; the arrays of the Motion are empty if no joint moves.
 
     Args:
         dna: the face.
@@ -118,7 +120,7 @@ class Mover:
         """float64[V]: for each vertex, the sum of its weights times its joints' amounts.
 
         Args:
-            amounts: float64[joints].
+            amounts: float64[joints], a number for each joint.
         """
         weights = self._weight * amounts[self._joint]
         sums = np.bincount(self._vertex, weights=weights, minlength=len(self._positions))

@@ -25,8 +25,8 @@ def polygon_mesh(
     """A mesh without weights and shapes. Each pair of vertex and texture coordinate is a layout.
 
     Args:
-        positions: float64[V, 3].
-        normals: float64[V, 3].
+        positions: float64[V, 3], vertex positions.
+        normals: float64[V, 3], vertex normals.
         faces: vertex indices of each polygon.
         uvs: float64[T, 2], texture coordinates.
         uv_faces: indices into `uvs` of each polygon's corners.
@@ -54,10 +54,10 @@ def polygon_mesh(
 
 
 def vertex_normals(positions: Floats, faces: Sequence[Sequence[int]]) -> Floats:
-    """Unit normals [V, 3]: area-weighted means of the adjacent faces; +z for a vertex without area.
+    """Unit normals [V, 3]: area-weighted means of the adjacent faces; +z if the faces have no area.
 
     Args:
-        positions: float64[V, 3].
+        positions: float64[V, 3], vertex positions.
         faces: vertex indices of each polygon, counter-clockwise seen from outside.
     """
     normals = np.zeros_like(positions)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rigid motions of points: least squares fit, change of pivot, and partial rotations."""
+"""Computes rigid motions of points: least squares fit, change of pivot, partial rotations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """The least-squares rigid motion of points (Kabsch 1976).
 
     Args:
-        before, after: float64[n, 3].
+        before, after: float64[n, 3], positions of the points before and after the motion.
 
     Returns:
         Rotation [3, 3] and translation [3]: after is near rotation @ before + translation.
@@ -28,8 +28,8 @@ def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats,
     """Express a rigid motion as a rotation about a pivot and a shift of the pivot.
 
     Args:
-        pivot: [3].
-        rotation: [3, 3].
+        pivot: [3], the new centre of rotation.
+        rotation: [3, 3], the rotation matrix.
         translation: [3], the translation after a rotation about the origin.
     """
     return rotation, translation - pivot + rotation @ pivot
@@ -39,9 +39,9 @@ def rigid_way(points: Floats, pivot: Floats, rotation: Floats, shift: Floats) ->
     """float64[n, 3]: displacements of points by a rotation about a pivot and a shift.
 
     Args:
-        points: float64[n, 3].
-        pivot: [3].
-        rotation: [3, 3].
+        points: float64[n, 3], positions before the motion.
+        pivot: [3], the centre of rotation.
+        rotation: [3, 3], the rotation matrix.
         shift: [3], shift of the pivot.
     """
     way: Floats = pivot + shift + (points - pivot) @ rotation.T - points
@@ -52,8 +52,8 @@ def part_rotation(rotation: Floats, share: float) -> Floats:
     """The rotation about the same axis by a fraction of the angle (Rodrigues).
 
     Args:
-        rotation: [3, 3].
-        share: the fraction.
+        rotation: [3, 3], the rotation matrix.
+        share: the fraction of the angle.
     """
     angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
     axis = np.array(

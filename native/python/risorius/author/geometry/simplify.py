@@ -22,8 +22,8 @@ _STUCK = 1.5  # factor of the vertex budget above which seams of the texture are
 # _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
-# Exponent of the fraction of kept hair cards. It is below 1, because missing cards are more visible
-# than a coarser skin.
+# The fraction of kept hair cards is the fraction of kept vertices to this power. It is below 1, so
+# that more cards stay, because missing cards are more visible than a coarser skin.
 _THINNED = 0.6
 
 Floats = npt.NDArray[np.float32]
@@ -121,10 +121,10 @@ def fewer_triangles(
 ) -> Ints:
     """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
-    The simplification keeps texture coordinates and displacements by expressions beside the form.
-    Borders and seams stay in place. If seams prevent the reduction, they are welded, and each
-    vertex keeps one texture coordinate. Each connected piece keeps some vertices, or all small
-    pieces are removed.
+    The simplification preserves the shape of the surface, its texture coordinates and its
+    displacements by expressions. Borders and seams stay in place. If seams prevent the reduction,
+    they are welded, and each vertex keeps one texture coordinate. Each connected piece keeps some
+    vertices, or all small pieces are removed.
 
     Args:
         mesh: the mesh; it is not changed.
@@ -173,7 +173,7 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
     out = np.maximum(np.minimum(counts, _LEAST_OF_PIECE), np.round(share * counts))
     if share * counts[small].sum() < _GONE * small.sum():
         out[small] = 0
-    # Hair keeps an even selection of whole cards.
+    # Hair keeps whole cards, selected at equal steps.
     among = min(len(cards), round(share**_THINNED * len(cards)))
     out[cards] = 0
     stay = cards[np.arange(among) * len(cards) // max(1, among)]
@@ -182,12 +182,14 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
 
 
 def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: int) -> Ints:
-    """int64[n, 3]: simplify one piece as a whole. Welds texture seams if they block progress."""
+    """int64[n, 3]: triangles of one piece, simplified as a whole. Welds texture seams if they block
+    progress."""
     used, own = np.unique(triangles, return_inverse=True)
     triangles = own.reshape(-1, 3).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)[used]
     points = np.asarray(mesh.positions, np.float64)[places]
-    # Attributes are relative to the mesh' size, but the simplifier measures the piece's size.
+    # Attributes are relative to the mesh' size, but the simplifier compares them with the piece's
+    # size. So they are divided by the piece's size relative to the mesh.
     share = float(np.ptp(points, axis=0).max()) / _size(mesh)
     attributes = attributes[used] / np.float32(max(share, 1e-6))
     points = points.astype(np.float32)
@@ -203,7 +205,7 @@ def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: i
 def _fewer(
     points: Floats, attributes: Floats, triangles: Indices, places: Ints, vertices: int
 ) -> Indices:
-    """Triangles with at most `vertices` vertices, if the simplifier reaches that."""
+    """Simplified triangles. Borders and seams may keep them above `vertices` vertices."""
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):

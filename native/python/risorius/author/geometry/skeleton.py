@@ -26,7 +26,7 @@ def rotation_matrices(convention: Convention, angles: Doubles) -> Doubles:
 
     Args:
         convention: order, signs and unit of the angles.
-        angles: float64[..., 3].
+        angles: float64[..., 3], Euler angles about x, y and z in the convention's unit.
     """
     turned = angles * convention.signs * convention.radians
     out = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
@@ -89,7 +89,7 @@ def column_count(dna: Dna) -> int:
     """The number of inputs of joint groups and blend shape channels."""
     lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
     most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
-    # The file's own column count is not used, because no reader checks it against the groups.
+    # The file's own column count is not used, because no reader checks it against the joint groups.
     return max(most, len(dna.raw_control_names))
 
 
@@ -247,8 +247,8 @@ def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     """float64[V, 3]: vertices after linear blend skinning.
 
     Args:
-        positions: float64[V, 3].
-        weights: float64[V, joints].
+        positions: float64[V, 3], vertices before skinning.
+        weights: float64[V, joints], skin weights.
         motions: float64[joints, 3, 4], see column_motions().
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
@@ -262,7 +262,7 @@ class Influences:
         """Convert dense weights.
 
         Args:
-            weights: float64[V, joints].
+            weights: float64[V, joints], skin weights.
         """
         most = int((weights > 0).sum(axis=1).max(initial=1))
         self.joints = np.argsort(-weights, axis=1, kind="stable")[:, :most]  # int64[V, most]
@@ -272,8 +272,8 @@ class Influences:
         """float64[V, 3]: vertices after linear blend skinning, as skinned().
 
         Args:
-            positions: float64[V, 3].
-            motions: float64[joints, 3, 4].
+            positions: float64[V, 3], vertices before skinning.
+            motions: float64[joints, 3, 4], see column_motions().
         """
         flat = motions.reshape(len(motions), 12)
         blended = sum(
@@ -284,13 +284,13 @@ class Influences:
 
 
 class Skin:
-    """Vertices with skin weights, for poses in which few joints move: others cost nothing."""
+    """Vertices with skin weights, for poses of few moving joints. Joints at rest cost no time."""
 
     def __init__(self, positions: Doubles, weights: Doubles) -> None:
         """Prepare vertices.
 
         Args:
-            positions: float64[V, 3].
+            positions: float64[V, 3], vertices before skinning.
             weights: float64[V, joints]; the sum of each row is 1.
         """
         self._axes = np.ascontiguousarray(positions.T)
@@ -316,8 +316,8 @@ def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
 
     Args:
         wanted: float64[V, 3], positions after skinning.
-        weights: float64[V, joints].
-        motions: float64[joints, 3, 4].
+        weights: float64[V, joints], skin weights.
+        motions: float64[joints, 3, 4], see column_motions().
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     right = (wanted - blended[..., 3])[..., None]

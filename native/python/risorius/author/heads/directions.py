@@ -31,11 +31,14 @@ class Direction:
     """The orientation of a head in its file.
 
     Attributes:
-        left, up, front: float64[3], each along an axis. `left` is the side named left.
+        left, up, front: float64[3], each along an axis. `left` is the side that shape names call
+            left; without such names it follows from `up` and `front`.
         named: number of pairs of shape names that agree on `left`.
-        sure_up, sure_front: whether vertices decided it; otherwise it is the usual axis of formats.
+        sure_up, sure_front: True if the user or the shapes determine the axis, False if it is the
+            usual axis of file formats.
         inside_out: whether polygons face inwards, for example in a mirrored file.
-        turned: degrees between the named sides and the axis; 0 for small angles.
+        turned: angle in degrees between `left` and the line from the shapes named right to the
+            shapes named left; 0 for angles below 37 degrees.
     """
 
     left: Doubles
@@ -54,14 +57,14 @@ class Direction:
 
 
 def axis_of(word: str) -> Doubles:
-    """float64[3]: the direction of a word of AXES."""
+    """float64[3]: the unit vector of a word of AXES, such as "-z"."""
     out = np.zeros(3)
     out["xyz".index(word[1])] = 1.0 if word[0] == "+" else -1.0
     return out
 
 
 def word_of(axis: Doubles, said: Sequence[str] = ("+x", "+y", "+z")) -> str:
-    """The word for a direction, one of AXES or with other names of the axes.
+    """The signed name of an axis, such as "-z", or a name from `said`.
 
     Args:
         axis: float64[3], along an axis.
@@ -105,7 +108,7 @@ def find_direction(
 
 
 class _Look:
-    """The weighted middle and mean displacement of each shape."""
+    """Finds the axes of a head from the centre and the mean displacement of each shape."""
 
     def __init__(
         self,
@@ -215,7 +218,7 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Indices of the vertices near the shapes' middles, so without the back of the head."""
+        """Indices of the vertices near the centres of the shapes; excludes the back of the head."""
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle
@@ -223,7 +226,8 @@ class _Look:
         return np.flatnonzero(np.linalg.norm(away, axis=1) < reach)
 
     def _unlike(self, axis: Doubles) -> float:
-        """The mean distance of the mesh from its mirror image across an axis."""
+        """The mean distance of the mesh from its mirror image; the mirror is perpendicular to an
+        axis."""
         step = max(1, len(self.points) // _POINTS)
         points = self.points[::step] - (self.points.min(axis=0) + self.points.max(axis=0)) / 2
         other = points * (1 - 2 * np.abs(axis))
@@ -243,7 +247,7 @@ class _Look:
 
 
 def _sided(name: str, controls: Sequence[str]) -> tuple[str, str]:
-    """A key of a shape without its side, and the side: L, R or ""."""
+    """A name that a left shape shares with its right shape, and the shape's side: L, R or ""."""
     sides = {side_of(control) for control in controls}
     if len(sides) == 1 and sides <= {"L", "R"}:
         return "|".join(control[:-1] for control in controls), sides.pop()

@@ -22,7 +22,7 @@ _ROUND = 0.12  # largest standard deviation of a sphere's vertices from the radi
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere: indices of its vertices, its middle float64[3] and its radius."""
+    """A sphere: indices of its vertices, its centre float64[3] and its radius."""
 
     vertices: Ints
     middle: Doubles
@@ -84,7 +84,7 @@ def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None
     """Fit a sphere to vertices. Returns None if they are no sphere or less than a third of one.
 
     Args:
-        points: float64[V, 3].
+        points: float64[V, 3], vertex positions of the mesh.
         vertices: indices of the vertices.
         off: largest standard deviation from the radius, in radii.
     """

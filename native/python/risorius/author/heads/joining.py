@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joins the meshes of a head into one set of shapes: turned, scaled, sorted, with eyes and jaw."""
+"""Joins the meshes of a head to one upright face in cm or m, with joints of eyes and jaw."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FacePart:
         start, stop: range of its vertices.
         faces: range of its polygons.
         joint: name of the joint that the mesh follows.
-        material, source, polygons: as in HeadPart.
+        material, source, polygons: its material and its origin, see HeadPart.
     """
 
     name: str
@@ -144,12 +144,12 @@ class _Joining:
         return assign([name for name in names if "+" not in name], self.edited)
 
     def turn_and_size(self) -> None:
-        """Turn all parts upright, and scale them to the size of a face."""
+        """Turn all meshes of the head upright, and scale them to the size of a face."""
         self._turn()
         self._size()
 
     def take_standing(self) -> None:
-        """Keep the parts unchanged, because they are upright and have the right size."""
+        """Keep the meshes unchanged, because they are upright and have the right size."""
         self.left = 1
         points, shapes = self.face.mesh.positions, self.face.shapes
         self.height = face_height(points, shapes, self.became.controls)
@@ -185,7 +185,7 @@ class _Joining:
         return self._joined(hanging, turns)
 
     def _turn(self) -> None:
-        """Turn all parts so that x points to the left, y up and z to the front."""
+        """Rotate all meshes so that x points to the left, y up and z to the front."""
         face = self.face
         found = find_direction(face.mesh, face.shapes, self.became.controls, self.wishes)
         left = found.left
@@ -221,7 +221,7 @@ class _Joining:
         return out
 
     def _size(self) -> None:
-        """Scale all parts to the result's unit, and centre the face if it is far from x = 0."""
+        """Scale all meshes to the result's unit, and centre the face if it is far from x = 0."""
         wishes = self.wishes
         height = face_height(self.face.mesh.positions, self.face.shapes, self.became.controls)
         unit = wishes.unit or self.unit
@@ -270,7 +270,8 @@ class _Joining:
         return next((delta for delta in found if delta.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
-        """Side -> the weighted middle float64[3] of the vertices that a blink moves."""
+        """Side -> float64[3], the mean position of the vertices that a blink moves, weighted by
+        motion."""
         out = {}
         for name, controls in self.became.controls.items():
             delta = self.face.shapes.get(name)
@@ -299,7 +300,7 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Add a joint for the parts of the jaw. If jawOpen turns no jaw, they follow the head."""
+        """Add the jaw's joint. If jawOpen rotates nothing, the jaw's meshes follow the head."""
         turn = None
         if opening is not None:
             points, whole = self.face.mesh.positions, list(self.became.expressions)
@@ -347,12 +348,14 @@ class _Joining:
         return out
 
     def _in_order(self, names: Mapping[str, None]) -> list[str]:
-        """The names with those of the face's shapes first, in the file's order."""
+        """The names of all shapes: first the face's shapes, then others, both in the file's
+        order."""
         return list(dict.fromkeys([*self.face.shapes, *names]))
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """Append a mesh. Without texture coordinates, all corners get the same one."""
+    """Append a mesh. The corners of a mesh without texture coordinates all get the same
+    coordinate."""
     base = sum(map(len, uvs))
     own, uv_faces = mesh.uvs, mesh.uv_faces
     if not len(own) or not all(uv_faces):
@@ -363,7 +366,7 @@ def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
 
 
 def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: int = 1) -> HeadPart:
-    """A copy of a part, transformed.
+    """A transformed copy of a mesh with its shapes.
 
     Args:
         part: the part.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a head, their materials, and the user's settings for the head."""
+"""Defines the meshes of a head, their materials, and the user's settings for the head."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class HeadPart:
 
     @property
     def center(self) -> Doubles:
-        """float64[3]: the middle of the bounding box."""
+        """float64[3]: the centre of the bounding box."""
         points = self.mesh.positions
         return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2)
 
@@ -77,8 +77,8 @@ class Wishes:
     """The user's settings for a head; "" or 0 means that the value is guessed.
 
     Attributes:
-        mesh: name of the face's mesh.
-        rather: name of the face's mesh if the file has several heads.
+        mesh: name of the face's mesh; the file must contain it.
+        rather: name of the mesh that is preferred if the file has several heads.
         left: direction of the character's left, one of AXES.
         up: direction of the top, one of AXES.
         front: direction in which the face looks, one of AXES.
@@ -98,7 +98,7 @@ class Wishes:
 
 
 def meaning(name: str) -> tuple[str, ...]:
-    """A key that is equal for names with the same meaning: raw controls, expression, or name."""
+    """A tuple that is equal for names with the same meaning: raw controls, expression, or name."""
     controls = guess(name)
     if controls:
         return tuple(sorted(controls))
@@ -127,11 +127,10 @@ def first_vertices(part: HeadPart) -> Ints:
 
 
 def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[HeadPart]:
-    """Divide a part by labels of polygons. Vertices on a cut are duplicated.
+    """Divide a mesh by labels of its polygons. Vertices on a cut are duplicated.
 
     Args:
-        part: the part; it is not changed.
-        names: label -> name of the new part.
+        part: the mesh; it is not changed. names: label -> name of the new part.
         of_face: int64[polygons], label of each polygon; -1 leaves the polygon out.
     """
     out = []

@@ -54,7 +54,7 @@ def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
     Args:
         height: height of the face in the file's numbers.
         unit: unit that the format or the user states.
-        sure: whether the user states it; then it is kept.
+        sure: True if the user states the unit; then this unit is returned.
     """
     as_said = height * UNITS[unit]
     usual = f"a face is {_LEAST / 10:.0f} to {_MOST / 10:.0f} cm high"

@@ -26,22 +26,23 @@ _ALIKE = 3  # smallest number of common expressions of another head
 
 
 def moves(part: HeadPart) -> bool:
-    """Whether a shape of the part moves a vertex."""
+    """Whether at least one shape of the mesh moves a vertex."""
     size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
     return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
 
 
 def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
-    """Choose the mesh of the face: the named one, or the one with the most shape vertices.
+    """Choose the mesh of the face: the named mesh, or the mesh with most shapes times vertices.
 
     Args:
         where: name of the file in error messages.
         parts: all meshes.
-        wanted: name of the face's mesh, or "".
-        rather: name of the face's mesh if the file has several heads, or "".
+        wanted: name of the face's mesh, which must exist, or "".
+        rather: name of the mesh that is preferred if the file has several heads, or "".
 
     Raises:
-        ShapeFileError: no mesh moves, none has the name, or the file has several heads.
+        ShapeFileError: no mesh has shapes that move it, no such mesh has the wanted name, or the
+            file has several heads.
     """
     able = [part for part in parts if moves(part)]
     named = [part for part in able if part.source == wanted] if wanted else able
@@ -67,7 +68,7 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
 
 
 def is_other_head(face: HeadPart, part: HeadPart) -> bool:
-    """Whether a mesh with shapes is another head beside the face.
+    """Whether a mesh with shapes belongs to another head than the face.
 
     Args:
         face: the mesh of the face.
@@ -80,18 +81,18 @@ def is_other_head(face: HeadPart, part: HeadPart) -> bool:
 
 
 def is_coarse(part: HeadPart) -> bool:
-    """Whether the part's name denotes a coarser level of detail, such as LOD1."""
+    """Whether the mesh's name denotes a coarser level of detail, such as LOD1."""
     return _COARSE.search(part.name) is not None
 
 
 class Places:
-    """Places of a face's head and mouth; x points left, y up, z to the front."""
+    """Finds out whether meshes are near a face's head or in its mouth; x is left, y up, z front."""
 
     def __init__(self, face: HeadPart, height: float, mm: float, jaw_open: Doubles | None) -> None:
         """Measure a face.
 
         Args:
-            face: the face's mesh in the axes above, in any unit.
+            face: the face's mesh, upright and with x to the left, in any unit.
             height: height of the face in that unit.
             mm: length of the unit in mm.
             jaw_open: float64[V, 3], displacements of the shape that opens the mouth, or None.
@@ -132,7 +133,9 @@ class Places:
 
 
 def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
-    """The joint that a mesh without shapes follows. The mesh may be divided into upper and lower.
+    """The joint that a mesh without shapes follows.
+
+    A mesh of all teeth is divided into upper and lower teeth.
 
     Args:
         part: the mesh.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the pictures of materials beside a DNA file, with metadata that assigns them to meshes."""
+"""Makes texture files in a folder next to a DNA file, and metadata that assigns them to meshes."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _LOD = re.compile(r"_lod\d+_")
 
 @dataclass
 class Textures:
-    """Texture files beside a DNA file.
+    """Texture files in a folder next to a DNA file.
 
     Attributes:
         files: path -> bytes.
         names: (id() of a Material, role) -> file name.
-        notes: sentences on left-out parts and on the folder of the files.
+        notes: sentences on left-out parts of materials, and on the folder of the files.
     """
 
     files: dict[Path, bytes] = field(default_factory=dict)
@@ -85,7 +85,7 @@ def metadata_of(
     """The metadata of a DNA file that assigns textures to meshes.
 
     Args:
-        meshes: names of the meshes of all levels.
+        meshes: names of the meshes of all LODs.
         materials: name of a mesh of LOD 0 -> its material.
         textures: result of textures_of().
     """

@@ -27,18 +27,19 @@ _NONE = np.zeros(0, np.int64)
 _FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
 _LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
 _NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
-# Vertices that move more than _HELD of jawOpen's maximum are rigid; the lowest _CHIN are the chin.
+# Vertices that jawOpen moves by more than _HELD of its largest displacement count as rigid parts of
+# the jaw. The lowest fraction _CHIN of them is the chin.
 _HELD, _CHIN = 0.7, 0.4
 _FOLLOWS = 0.05  # smallest motion of the chin by a shape, relative to jawOpen
 
 
 @dataclass
 class Turn:
-    """A joint below the head and its motions.
+    """A child joint of the head, and its motions.
 
     Attributes:
         name: name of the joint.
-        position: float64[3].
+        position: float64[3], the joint's position at rest.
         motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
     """
 
@@ -63,12 +64,12 @@ class Eye:
 def take_eyes(
     parts: Sequence[HeadPart], height: float, lids: Mapping[str, Doubles]
 ) -> tuple[list[HeadPart], list[Eye]]:
-    """Find the eyes: two spheres in one or two meshes. Returns the other parts, and the eyes.
+    """Find the eyes: two spheres in one or two meshes. Returns the other meshes, and the eyes.
 
     Args:
         parts: parts of the head, upright and centred; x points to the left.
         height: height of the face.
-        lids: L or R -> float64[3], the middle of the vertices that a blink moves.
+        lids: L or R -> float64[3], the mean position of the vertices that a blink moves.
     """
     labels = [islands_of(part.mesh) for part in parts]
     found = [
@@ -88,7 +89,7 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a part that have the form and the size of eyes."""
+    """The islands of a mesh that have the form and the size of eyes."""
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
@@ -106,12 +107,12 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
 
 
 def _looks_out(points: Doubles, ball: Ball) -> bool:
-    """Whether a sphere has vertices at its front. A socket drawn as an eye's white has none."""
+    """Whether a sphere has vertices at its front. A hollow socket shaped like an eye has none."""
     return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
 
 
 def _is_squashed(part: HeadPart, ball: Ball) -> bool:
-    """Whether a shape deforms most of a sphere, for example lids that are part of a drawn eye."""
+    """Whether a shape deforms most of a sphere, such as a blink of a cartoon eye with lids."""
     before = part.mesh.positions[ball.vertices]
     for delta in part.shapes.values():
         own = delta[ball.vertices]
@@ -127,7 +128,8 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The largest pair of spheres that may be left and right eye, with their parts' indices."""
+    """The largest pair of spheres that may be left and right eye, each with the index of its
+    mesh."""
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
         for j, right in found:
@@ -157,10 +159,11 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give the islands of a part inside the eyes' spheres to the eyes. Returns the rest.
+    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns the other
+    islands as a mesh.
 
     Args:
-        part: the part.
+        part: the mesh.
         islands: int64[V], island of each vertex.
         eyes: both eyes.
         own: for each eye, a vertex of its sphere if the sphere belongs to this part.
@@ -200,7 +203,8 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         eye: the eye. Its parts keep only the shapes that do not turn it, such as a pupil's.
         controls: shape -> raw controls without prefix.
 
-    Returns: the joint, and name of a turning shape -> its largest displacement beside the rotation.
+    Returns: the joint; and for each shape that turns the eye, its name -> the largest distance of a
+        vertex from its position after the rotation alone.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}

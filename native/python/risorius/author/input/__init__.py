@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Heads with expressions, from files or from a program, as faces of blend shapes."""
+"""Reads heads with expressions from files or other programs, and makes faces of blend shapes."""

@@ -108,7 +108,8 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
 
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:
-    """Object number of the mesh with a name; with "", of the mesh with the most shape vertices."""
+    """Object number of the mesh with the wanted name; "": the mesh with most blend shape
+    vertices."""
     found = []
     for number, node in scene.of_kind("Geometry").items():
         if _class_of(node) != "Mesh":
@@ -125,7 +126,7 @@ def _class_of(node: Node) -> str:
 
 
 def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int, Node]]:
-    """Yields the child objects of a kind and class, in the file's order."""
+    """Yields the children of an object that have this kind and class (tag), in the file's order."""
     below = scene.children.get(parent, [])
     scene.budget.work(len(below), "connections")
     for number in below:
@@ -135,7 +136,7 @@ def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int
 
 
 def _shapes(scene: Scene, mesh: int) -> list[tuple[str, Node]]:
-    """Unique name and full target of each blend shape channel of a mesh."""
+    """Unique name, and target at full weight, of each blend shape channel of a mesh."""
     out: dict[str, Node] = {}
     for blend, _ in _below(scene, mesh, "Deformer", "BlendShape"):
         for channel, node in _below(scene, blend, "Deformer", "BlendShapeChannel"):
@@ -185,7 +186,8 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
 
 
 def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, Ints]:
-    """The first layer of texture coordinates, and the index of each corner; zeros if missing."""
+    """The first UV layer of a mesh, and for each corner its index in the layer; zeros if
+    missing."""
     layer = node.first("LayerElementUV")
     if layer is None:
         return np.zeros((1, 2)), np.zeros(count, np.int64)
@@ -283,12 +285,12 @@ def _product(scene: Scene, chain: Sequence[int]) -> Doubles:
 
 
 def _top_joint(scene: Scene, mesh: int) -> tuple[list[int], Doubles] | None:
-    """The joint of a mesh' skin nearest to the root, for the mesh' place in the bind pose.
+    """The joint nearest to the root among the joints of a mesh' skin; it places the mesh.
 
     This joint is used because the mesh' node and other joints may be posed.
 
     Returns: the joint with its ancestors, and the matrix float64[4, 4] from the mesh to the joint
-        in the bind pose; None if no skin states it.
+        in the bind pose; None if no skin of the mesh states this matrix.
     """
     found: tuple[list[int], Node] | None = None
     for skin, _ in _below(scene, mesh, "Deformer", "Skin"):
@@ -356,7 +358,7 @@ class _Transforms:
         return out
 
     def order(self) -> str:
-        """The order of a rotation's axes, the first one first."""
+        """The axes in the order in which a rotation is applied, such as XYZ: first about x."""
         number = self._rows.get("RotationOrder", [0])[-1]
         if not isinstance(number, int) or not 0 <= number < len(_ORDERS):
             raise _fail(

@@ -68,7 +68,7 @@ def _is(scene: Scene, number: int, kind: str) -> bool:
 
 
 def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
-    """int64[faces]: index of each polygon's material among those of the node; 0 if not stated."""
+    """int64[faces]: index of each polygon's material in the node's materials; 0 if unknown."""
     layer = mesh.first("LayerElementMaterial")
     found = layer.array("Materials") if layer is not None else np.zeros(0)
     if materials < 1:
@@ -79,7 +79,7 @@ def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
 
 
 def _material(scene: Scene, path: Path, number: int) -> Material:
-    """The parts of a material that a face keeps."""
+    """The name, the diffuse colour and the pictures of a material."""
     node = scene.objects[number]
     out = Material(object_name(node) or f"material{number}")
     values = properties(node).get("DiffuseColor", [])
@@ -96,7 +96,10 @@ def _material(scene: Scene, path: Path, number: int) -> Material:
 
 
 def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Material) -> None:
-    """Add the picture of a role, embedded or beside the file, to a material; otherwise a note."""
+    """Add the picture of a role to a material, or a note if the picture is not found.
+
+    The picture is embedded in the FBX, or in its folder, its .fbm folder or the folder textures.
+    """
     for video in scene.children.get(texture, []):
         content = scene.objects[video].first("Content") if _is(scene, video, "Video") else None
         data = b"".join(v for v in (content.values if content else []) if isinstance(v, bytes))

@@ -74,7 +74,7 @@ def open_document(path: Path) -> Document:
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
-    """Index of the mesh with a name; with "", of the mesh with the most morph target vertices."""
+    """Index of the mesh with the wanted name; "": the mesh with the most morph target vertices."""
     rows = document.json.get("meshes")
     found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):
@@ -89,7 +89,7 @@ def name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
 
     Args:
         document: the open file.
-        row: the mesh' table of the JSON.
+        row: the JSON object of the mesh.
         number: index of the mesh.
     """
     world = _World(document)
@@ -104,7 +104,7 @@ def primitives(document: Document, row: object, number: int) -> list[dict[str, A
 
     Args:
         document: the open file.
-        row: the mesh' table of the JSON.
+        row: the JSON object of the mesh.
         number: index of the mesh, for error messages.
 
     Raises:
@@ -307,7 +307,7 @@ def _uvs(
 
 
 def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The table of the colour texture of a primitive's material; empty if there is none."""
+    """The JSON object of the colour texture of a primitive's material; empty if there is none."""
     if "material" not in primitive:
         return {}
     material = document.item("materials", primitive["material"], "primitives.material")
@@ -333,8 +333,8 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
 def _node_matrix(document: Document, mesh: int) -> Doubles:
     """float64[4, 4]: matrix from a mesh to the world.
 
-    The matrix is that of the first node with the mesh, or of the skin's bind pose. It is the
-    identity if no node has the mesh.
+    It is the matrix of the first node with the mesh. If this node has a skin, the bind pose
+    determines the matrix. It is the identity if no node has the mesh.
     """
     world = _World(document)
     found = world.of_mesh(mesh)
@@ -376,7 +376,7 @@ class _World:
                     self._parents[child] = number
 
     def of_mesh(self, mesh: int) -> int:
-        """Index of the first node with a mesh; -1 if there is none."""
+        """Index of the first node that shows the mesh; -1 if no node shows it."""
         return next((n for n, row in enumerate(self.rows) if row.get("mesh") == mesh), -1)
 
     def above(self, node: int) -> list[int]:

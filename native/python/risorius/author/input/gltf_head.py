@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads all meshes of a glTF at the places of their nodes, divided by materials, and materials."""
+"""Reads all meshes of a glTF at the places of their nodes, and divides them by their materials."""
 
 from __future__ import annotations
 
@@ -63,7 +63,8 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
-    """Name of each node with a mesh, and the matrix float64[4, 4] from the first node to it."""
+    """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
+    such node to it. Skinned or unused meshes give one entry with the identity."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
@@ -130,7 +131,7 @@ def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> 
 
 
 def _material(document: Document, number: int, known: dict[int, Material]) -> Material | None:
-    """The parts of a material that a face keeps; None for a negative number."""
+    """The name, the base colour and the pictures of a material; None for a negative number."""
     if number < 0:
         return None
     if number not in known:
@@ -154,7 +155,7 @@ def _all_numbers(values: list[Any]) -> bool:
 
 
 def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Material) -> None:
-    """Add the picture of a role to a material, or a note if it cannot be read."""
+    """Add the picture of a role to a material, or a note if the picture cannot be read."""
     texture = document.item("textures", use.get("index"), f"{out.name}.{role}")
     extra = texture.get("extensions")
     extensions = extra if isinstance(extra, dict) else {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the expressions of a face's own shapes as a library of files beside its DNA file."""
+"""Makes a file for each expression that one shape of a face makes, in a folder next to its DNA."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .matching import PREFIX, Assignment
 
 
 def library_folder(dna: Path) -> Path:
-    """The folder of a face's library: anna_expressions beside anna.dna."""
+    """The folder of a face's expressions, next to its DNA file: anna_expressions for anna.dna."""
     return dna.with_name(dna.stem + "_expressions")
 
 
 def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
-    """Path -> bytes of a file for each expression of the shapes; expressions.load() reads them.
+    """Path -> bytes of the file for each expression in `became`; expressions.load() reads them.
 
     Args:
         became: result of matching.assign().
@@ -32,7 +32,7 @@ def library_files(became: Assignment, folder: Path) -> dict[Path, bytes]:
 
 
 def about_library(became: Assignment, folder: Path) -> list[str]:
-    """A sentence on the folder of the expressions; an empty list if there are none.
+    """A sentence on the folder of the expressions; an empty list if `became` has no expressions.
 
     Args:
         became: result of matching.assign().
@@ -43,7 +43,7 @@ def about_library(became: Assignment, folder: Path) -> list[str]:
 
 
 def _expression(name: str, controls: Sequence[str]) -> Expression:
-    """An expression that sets the controls of a shape, with the label and group of the library."""
+    """An expression that sets a shape's controls, with the default library's label and group."""
     own = expressions.load().get(name)
     weights: Mapping[str, float] = {PREFIX + control: 1.0 for control in controls}
     if own is None:

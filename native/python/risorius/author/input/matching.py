@@ -100,7 +100,7 @@ def guess(name: str) -> list[str]:
 
 
 def _guess(name: str, order: Sequence[str] | None) -> _Guess:
-    """The meaning of a name. Args: order  names of vocabularies, see vocabulary.find()."""
+    """The meaning of a name. Args: order: names of vocabularies, see vocabulary.find()."""
     said = vocabulary.find(name, order)
     words = tuple(_by_words(vocabulary.parts_of(name)[-1]))
     if said is None:
@@ -202,7 +202,7 @@ def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
 
 
 def own_control(name: str) -> str:
-    """The name of a shape's own control, if no other control has the name."""
+    """Name of the new control that a shape of unknown meaning gets, if this name is free."""
     return _own(name, "", ())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the mesh of a Wavefront OBJ file; vertices keep the file's order, as expressions need."""
+"""Reads the mesh of a Wavefront OBJ file. Vertices keep the file's order."""
 
 from __future__ import annotations
 

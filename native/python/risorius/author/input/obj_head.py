@@ -20,7 +20,7 @@ def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
     Raises:
-        ShapeFileError: no file name, or no single one, contains a word for neutral.
+        ShapeFileError: no word of _NEUTRAL is a file name or is part of exactly one file name.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:
@@ -73,6 +73,7 @@ def _is_known(name: str) -> bool:
 
 
 def _other(path: Path, count: int) -> ObjMesh | None:
-    """The mesh of a file if its number of vertices is not `count`; None if it is a shape."""
+    """The mesh of a file whose number of vertices is not `count`; None for a file with `count`
+    vertices, which is a shape."""
     mesh = read_obj(path)
     return mesh if len(mesh.positions) != count else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The user's meanings of shapes: the table [controls] of a spec or of a separate file.
+"""Reads and writes the user's meanings of shapes: the table [controls] of a spec or other file.
 
 A meaning is a raw control without prefix, or a list of raw controls; "=mouthFunnel" stands for the
 controls of an ARKit unit, "@aa" for an expression, and [] leaves the shape out. The tables of
@@ -37,7 +37,7 @@ class SaidMeaning(NamedTuple):
 
 
 def meaning_of(value: Said) -> SaidMeaning:
-    """The controls or the expression of a value of the table.
+    """The controls or the expression that an entry of the table [controls] means.
 
     Raises:
         GivenError: the ARKit unit is unknown, or the name of an expression is invalid.
@@ -102,7 +102,7 @@ def parse(content: str) -> dict[str, Said]:
 
 
 def row(name: str, value: Said) -> str:
-    """A line of the table.
+    """The line of the table [controls] for a shape.
 
     Args:
         name: name of the shape.
@@ -114,7 +114,7 @@ def row(name: str, value: Said) -> str:
 
 
 def text_of(said: Mapping[str, Said]) -> str:
-    """The text of a file with the table [controls]. Args: said  shape -> its meaning."""
+    """The text of a file with the table [controls]. Args: said: shape -> its meaning."""
     return "\n".join([f"[{TABLE}]", *(row(name, value) for name, value in said.items()), ""])
 
 

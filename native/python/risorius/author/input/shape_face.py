@@ -30,7 +30,7 @@ _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as restin
 
 @dataclass
 class ShapeSet:
-    """A mesh with y up and its expressions, in one unit. heads.joining joins several meshes."""
+    """A joined mesh (y is up) and its expressions, in one unit; `parts` are the original meshes."""
 
     name: str
     mesh: ObjMesh
@@ -44,7 +44,7 @@ class ShapeSet:
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Beginnings of the names of meshes that follow an eye's joint only."""
+        """Beginnings of the names of meshes that follow only the joint of an eye."""
         return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
 
 
@@ -133,7 +133,7 @@ def _key(delta: Doubles, length: Doubles, size: float) -> bytes:
 
 
 def take_combined(shapes: ShapeSet) -> MutableMapping[str, Doubles]:
-    """Remove and return the sculpts of combined expressions, whose names join names by +.
+    """Remove and return the sculpts of combined expressions, which are named like smile+jawOpen.
 
     Args:
         shapes: the mesh and its expressions; it is changed.
@@ -160,8 +160,8 @@ def combined_rows(
         controls: expression -> raw controls without prefix.
         raw: names of all raw controls.
 
-    Returns: for each sculpt, the indices of its raw controls and its displacements float64[V, 3]
-        minus those of its expressions and of its smaller combinations.
+    Returns: for each sculpt, the indices of its raw controls, and its displacements float64[V, 3]
+        without the displacements of its single expressions and of its smaller combinations.
 
     Raises:
         ShapeFileError: a combination names an unknown expression.
@@ -196,7 +196,7 @@ def make_shape_face(
 ) -> Dna:
     """Make a Dna with a mesh for each part and a blend shape for each control.
 
-    The joints are root and head, and those of eyes and jaw if the face has any.
+    The joints are root and head, and eyes and jaw if `shapes` has joints for them.
 
     Args:
         shapes: the mesh and its expressions.
@@ -277,7 +277,7 @@ def _add_meshes(
     deltas: Sequence[_Delta],
     go_on: Callable[[], object],
 ) -> None:
-    """Add a mesh with blend shape targets for each part."""
+    """Add a mesh with blend shape targets for each entry of `parts`."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
     joints, meshes = list(dna.joint_names), []
     targets: list[list[BlendShapeTarget]] = [[] for _ in parts]
@@ -337,8 +337,8 @@ def _shares(shapes: ShapeSet, expression: str, named: Sequence[str]) -> list[Dou
     """float64[V, 1] for each control: its fraction of an expression. The fractions sum to 1.
 
     Controls that end in L and R get the left and right half. Controls of lips such as ...UL and
-    ...DL get the upper and lower part, divided at the weighted middle of the displacements. The
-    edges are soft.
+    ...DL get the upper and lower part, divided at the mean height of the vertices, weighted by
+    their motion. The edges are soft.
     """
     if len(named) < 2:
         return [1.0] * len(named)

@@ -109,7 +109,7 @@ class Read:
 
 
 def read_spec(path: Path) -> Spec:
-    """Read a SPEC.toml. A head's own file or folder gives a spec with default options.
+    """Read a SPEC.toml. For a file or folder of a head, make a spec with default options.
 
     Args:
         path: the spec, a file of a head, or a folder of OBJ files.
@@ -149,7 +149,7 @@ def _spec_of(path: Path, table: dict[str, Any]) -> Spec:
 
 
 def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
-    """Read the options of a SPEC.toml without [source], [controls] and name.
+    """Read a SPEC.toml that contains only options: no [source], no [controls] and no name.
 
     Raises:
         ShapeFileError: as read_spec(), or the file has a source, controls or a name.

@@ -144,13 +144,13 @@ def run(args: argparse.Namespace) -> int:
     options = replace(options, kept=(*options.kept, *read.kept))
     source = dna
     if asked.most or asked.together:
-        say.line("looking for what goes wrong where expressions meet")
+        say.line("searching for faults of combined expressions")
         found = find_correctives(dna, asked, say)
         dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
         say.line("\n".join(as_found(found)))
     rig = make_joint_rig(dna, options, say)
     if dna is not source and options.shapes and asked.once_more:
-        say.line("looking once more at what joints and shapes do together")
+        say.line("searching again for faults, in the face of joints and shapes")
         rig.dna = correct_again(rig.dna, source, asked, say)
     if options.lighter:
         lighten(rig, source)  # limits deltas to those of the input; found correctives are not input
@@ -174,7 +174,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(spec: Spec, args: argparse.Namespace, say: _Clock) -> tuple[Read, dict[Path, bytes]]:
-    """The face of blend shapes to convert, and additional files to write: path -> bytes."""
+    """The blend shape face to convert to joints, and additional files to write: path -> bytes."""
     return (read_face(spec), {}) if args.onto is None else read_onto(args, say)
 
 
@@ -195,7 +195,10 @@ def _spec(args: argparse.Namespace) -> Spec:
 
 
 def as_names(became: Assignment) -> list[str]:
-    """Lines of the TOML table [controls] with the assigned names, and of a count as comment."""
+    """Lines of the TOML table [controls]: a row for each expression, with its assigned controls.
+
+    The last line is a comment with the number of expression names that the program knew.
+    """
     lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
         expression = became.expressions.get(name)
@@ -245,13 +248,13 @@ def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
 
 
 def _tolerance(text: str) -> tuple[float, str]:
-    """(number, "mm" or "%") of an argument. Raises: ArgumentTypeError: it is neither."""
+    """(number, unit "mm" or "%") of an argument. Raises: ArgumentTypeError: not in this form."""
     unit = "%" if text.endswith("%") else "mm"
     return number(0.0, 100.0 if unit == "%" else 1e6)(text.removesuffix(unit).strip()), unit
 
 
 class _Clock:
-    """Prints the current step, and its progress at every tenth."""
+    """Prints the name of each step, and its progress whenever another 10 % are done."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet, self._begin, self._last = quiet, time.monotonic(), -1.0
@@ -269,13 +272,15 @@ class _Clock:
 
 
 def opposites() -> tuple[tuple[str, str], ...]:
-    """Pairs of opposite controls, without prefix; correctives ignore combinations of both."""
+    """Pairs of opposite controls, without prefix; no corrective is made for such a pair."""
     pairs = load_exclusives().opposites
     return tuple((a.rpartition(".")[2], b.rpartition(".")[2]) for a, b in pairs)
 
 
 def as_found(found: Found) -> list[str]:
-    """Lines of text: faults of pairs of expressions before and after their correctives."""
+    """Lines of text: the volume in which surfaces penetrate each other, and the numbers of torn and
+    folded faces, over all pairs of expressions, first without and then with the correctives.
+    """
     a, b = found.before, found.after
     return [
         f"{found.looked_at:,} pairs of expressions, {found.faulty:,} of them wrong; "

@@ -99,7 +99,7 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
 
 
 def _head(path: Path) -> tuple[list[HeadPart], str]:
-    """The meshes of a head and the unit of its format. A DNA file can be a head."""
+    """The meshes of a head, and the length unit of its file. The file may be a DNA file."""
     if path.suffix.lower() != ".dna":
         return read_head(path)
     other = read(str(path), "dna")

@@ -38,7 +38,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _share(text: str, option: str) -> tuple[str, float]:
-    """(file, share) of FILE=SHARE; the last "=" separates. Without an option, FILE is (file, 1)."""
+    """(file, weight in the mix) of FILE=SHARE, split at the last "=".
+
+    If `option` is "", the text may be a FILE without a share; its weight is 1.
+    """
     name, equals, number = text.rpartition("=")
     try:
         share = finite_text(number if equals else "")

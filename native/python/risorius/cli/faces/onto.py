@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --onto: transfers the expressions of a template to a head without any."""
+"""risorius author --onto: transfers a template's expressions to a head without expressions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from ... import Dna, load
+from ... import load
 from ...anyhead.borrowing import lend_materials
 from ...anyhead.default import default_template
 from ...anyhead.landmarks.marks import landmarks_path, landmarks_text, read_landmarks
@@ -97,7 +97,7 @@ def check_arguments(args: argparse.Namespace) -> None:
         args: arguments of `risorius author`.
 
     Raises:
-        CommandLineError: names the option.
+        CommandLineError: options exclude each other; the error names one of them.
     """
     if args.onto is None:
         given = [name for name in _OWN if getattr(args, name) is not None]
@@ -118,7 +118,7 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def spec_of(args: argparse.Namespace) -> Spec:
-    """A spec of the head with the rig options of --rig.
+    """A spec of the head, with the rig options that the file of --rig contains.
 
     Args:
         args: checked arguments of `risorius author`.
@@ -151,7 +151,8 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
         if path is not None:
             fileio.check_writable(path)
     parts, unit = read_head(args.onto)
-    template = _template(args.spec, clock.line)
+    path = _template(args.spec, clock.line)
+    template = load(path)
     known = args.landmarks or landmarks_path(args.onto)
     marks = None
     if args.landmarks is not None or known.is_file():
@@ -169,17 +170,15 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     files = {}
     if args.write_landmarks is not None:
         files[args.write_landmarks] = landmarks_text(made.landmarks).encode()
-    if args.spec is not None:
-        own = {part.source for part in parts}
-        lend_materials(made.shapes.parts, template, args.spec, own)
+    lend_materials(made.shapes.parts, template, path, {part.source for part in parts})
     clock.line("making a face of blend shapes")
     read = shape_face(made, template, str(args.onto), clock)
     return replace(read, odd=made.notes + read.odd), files
 
 
-def _template(path: Path | None, say: Callable[[str], None]) -> Dna:
+def _template(path: Path | None, say: Callable[[str], None]) -> Path:
     if path is None:
         say("the template is the sample person")
         return default_template()
     require_regular(path)
-    return load(path)
+    return path

@@ -111,7 +111,11 @@ def run(args: argparse.Namespace) -> int:
 def _counts(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace
 ) -> dict[int, int]:
-    """Mesh index -> vertex count, for --mesh or all. Raises: CommandLineError: unknown mesh."""
+    """Mesh index -> vertex count, for the mesh of --mesh or for all meshes without this option.
+
+    Raises:
+        CommandLineError: the face lacks this mesh.
+    """
     if args.mesh is None:
         return {m: surface.vertex_counts[m] for m in surface.mesh_indices}
     names = list(dna.mesh_names)[: len(surface.vertex_counts)]
@@ -124,7 +128,7 @@ def _counts(
 def _mesh(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace, take: Performance
 ) -> int:
-    """Index of the mesh with the take's vertex count. Raises: InputError: no mesh has it."""
+    """Index of the mesh with the take's number of vertices. Raises: InputError: none has it."""
     counts = _counts(dna, surface, args)
     found = take.frames.shape[1]
     for mesh, count in counts.items():

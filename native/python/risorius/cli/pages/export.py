@@ -155,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_body(args: argparse.Namespace, out: Path) -> None:
-    """Raises: CommandLineError: options of a skeleton that exclude each other."""
+    """Check the options of the skeleton. Raises: CommandLineError: options exclude each other."""
     if args.no_skeleton and (args.vrm or args.humanoid or args.body):
         raise CommandLineError("--no-skeleton: a VRM, a humanoid, and a body have a skeleton")
     if args.body is None:

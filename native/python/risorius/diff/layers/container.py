@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Differences of the file's version, index, and layers that are kept as bytes."""
+"""Differences of the file's version, its index of layers, and the bytes of unknown layers."""
 
 from __future__ import annotations
 

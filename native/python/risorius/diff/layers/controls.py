@@ -87,7 +87,8 @@ def _psds(faces: Comparison, place: Place) -> None:
         ("A", pairs.only_a, rows_a, faces.controls.a[named.only_a]),
         ("B", pairs.only_b, rows_b, faces.controls.b[named.only_b]),
     ):
-        # Correctives that only one face has are reported above.
+        # Factors of correctives that only one face has are skipped, because `only_in` reports
+        # these correctives.
         left = left[~np.isin(rows[0][left], gone)]  # noqa: PLW2901
         both = zip(
             faces.controls.labels(rows[0][left]), faces.controls.labels(rows[1][left]), strict=True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Differences of layer defn: names, the skeleton, the lists of each LOD."""
+"""Differences of layer defn: names, the skeleton, the elements that each LOD lists."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _joints(faces: Comparison, place: Place) -> None:
 
 
 def _moved(place: Place, verb: str, kind: str, labels: list[str], a: Floats, b: Floats) -> None:
-    """Report a line for each joint, the largest motion first."""
+    """Report a line per joint whose neutral pose changed, the largest change first."""
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
     for i in np.argsort(-np.nan_to_num(apart, nan=np.inf), kind="stable").tolist():

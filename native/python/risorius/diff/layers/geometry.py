@@ -93,7 +93,7 @@ def _faces(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
 
 
 def rows_changed(offsets_a: Ints, a: Numbers, offsets_b: Ints, b: Numbers) -> Bools:
-    """Find the rows that differ in two lists of equally many rows, bool[rows].
+    """bool[rows]: which rows differ between two lists with the same number of rows.
 
     Args:
         offsets_a, offsets_b: int64[rows + 1], start of each row in `a` and `b`; empty for no rows.

@@ -19,7 +19,7 @@ from .spaces import Space
 
 
 class Place:
-    """The place of differences: a layer, a field and a prefix of each text."""
+    """The place of differences: a layer, a field, and a prefix of each reported text."""
 
     def __init__(self, faces: Comparison, layer: str, field: str = "", what: str = ""):
         self.faces, self.layer, self.field, self.what = faces, layer, field, what
@@ -117,7 +117,7 @@ def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> N
 
     Args:
         place: where the difference is reported.
-        space: the elements that the indices mean.
+        space: the elements to which the indices refer.
         a, b: int[n] and int[m], indices into the elements of A and of B.
     """
     x, y = space.in_a(a), space.in_b(b)
@@ -131,9 +131,9 @@ def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> s
 
     Args:
         place: place whose report shortens lists of names.
-        pairs: matched entries of `a` and `b`.
+        pairs: matched positions in the lists `a` and `b`.
         space: the elements with their common numbers.
-        a, b: int64[n] and int64[m], common numbers of the entries.
+        a, b: int64[n] and int64[m], the lists, as common numbers of the elements.
     """
     listed = place.faces.report.listed
     parts = []
@@ -161,7 +161,8 @@ def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None
 def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.LodMapping) -> None:
     """Report the elements that each LOD lists, if they differ.
 
-    Equal lists that are stored or shared in another way are reported as such.
+    If the lists are equal but the two files store them, or share them between LODs, differently,
+    this is reported.
 
     Args:
         place: where the difference is reported.

@@ -115,7 +115,8 @@ class Comparison:
 
     @cached_property
     def pose_controls(self) -> Space:
-        # A 2.4 file lacks the layer rbfe; there each pose writes a control of its own.
+        # A file of version 2.4 lacks the layer rbfe. In it each RBF pose sets one control, which
+        # has the pose's name.
         names = [
             dna.rbf_behavior_ext.pose_control_names or [p.name for p in dna.rbf_behavior.poses]
             for dna in (self.a, self.b)

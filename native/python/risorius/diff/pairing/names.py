@@ -23,16 +23,16 @@ def padded(names: Sequence[str], count: int) -> list[str]:
 def correctives(
     dna: risorius.Dna, which: str, raw: Space, ml: Space, pose_controls: Space
 ) -> list[str]:
-    """A label with the factors of each corrective, e.g.
-
-    "corrective jaw * smile"; "" for no factors.
+    """A label for each corrective, e.g. "corrective jaw * smile"; "" if it has no factors.
 
     Args:
-        which: "a" or "b", the face to which `dna` belongs.
+        dna: the face with the correctives.
+        which: "a" or "b", the face of the comparison that `dna` is.
         raw, ml, pose_controls: the other parts of the control vector.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Correctives are not matched yet, so A's and B's get different numbers.
+    # Labels are made before correctives are matched. So no corrective of A has a number that a
+    # corrective of B also has.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)
@@ -52,7 +52,13 @@ def correctives(
 
 
 def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
-    """Labels of correctives. factors[i]: (index if a corrective, label) of each factor of i."""
+    """Labels of correctives, e.g. "jaw * (brow * smile)".
+
+    A factor that is itself a corrective is written as its own factors in brackets.
+
+    Args:
+        factors: for each corrective, (control's index from the first corrective, label) per factor.
+    """
 
     def product(i: int, depth: int) -> str:
         parts = []
@@ -67,8 +73,8 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
     """Match the joints of faces a and b.
 
-    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then those
-    with the same index and neutral pose, count as renamed.
+    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then
+    unmatched joints with the same index and neutral pose, count as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)

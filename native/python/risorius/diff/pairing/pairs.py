@@ -73,7 +73,7 @@ def _rest(taken: Ints, count: int) -> Ints:
 
 
 def occurrence(keys: Ints) -> Ints:
-    """The number of earlier occurrences of each key, int64[n]."""
+    """int64[n]: for each element of `keys`, how many earlier elements are equal to it."""
     order = np.argsort(keys, kind="stable")
     run = keys[order]
     first = np.ones(len(keys), np.bool_)
@@ -85,16 +85,17 @@ def occurrence(keys: Ints) -> Ints:
 
 
 def together(parts: Sequence[Ints]) -> Ints:
-    """Join the keys of all parts and replace them by small numbers, equal for equal keys."""
+    """Join the lists and replace each integer by a small number from 0; equal ones stay equal."""
     _, small = np.unique(np.concatenate(parts), return_inverse=True)
     return small.reshape(-1).astype(np.int64)
 
 
 def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Match equal rows of several numbers, like `pair` for single numbers.
+    """Match equal rows of two tables of integers, as `pair` matches single numbers.
 
     Args:
-        a, b: columns of each list, int64[n] each and int64[m] each; equally many for both.
+        a, b: the columns of each table: int64[n] each in `a`, int64[m] each in `b`; both tables
+            have the same number of columns.
     """
     if all(len(x) == len(y) and np.array_equal(x, y) for x, y in zip(a, b, strict=True)):
         return pair(np.arange(len(a[0])), np.arange(len(b[0])))
@@ -140,10 +141,10 @@ def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
 
 
 def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Match sets of keys: equal sets first, then sets with the most common keys, then by index.
+    """Match sets of integers: first equal sets, then sets that share most integers, last by index.
 
     Args:
-        a, b: the keys of each set.
+        a, b: int64[...] per set, the integers of the set.
     """
     exact = pair_names([_name(keys) for keys in a], [_name(keys) for keys in b])
     votes = _votes(a, b, exact)

@@ -17,10 +17,9 @@ _OUTSIDE = 1 << 40  # numbers from here on stand for indices beyond the end of a
 class Space:
     """The elements of lists A and B with common numbers.
 
-    noun: noun for an element, e.g. "joint". names: names by number, A's elements first. a, b:
-        int64, the number of each element of A and B. pairs: the matched elements.
-    names: by number; first those of A, then those of B.
-    a, b: int64, the number of each element.
+    noun: noun for an element, e.g. "joint".
+    names: names by common number; A's names, then B's.
+    a, b: int64[elements of A], int64[elements of B], the common number of each element.
     pairs: the matched elements.
     """
 
@@ -68,7 +67,7 @@ def chain(noun: str, parts: Sequence[Space]) -> Space:
 
     Args:
         noun: noun for an element of the joined space.
-        parts: the spaces, in their order.
+        parts: the spaces, in the order in which they are joined.
     """
     first_a = np.cumsum([0] + [len(part.a) for part in parts])
     first_b = np.cumsum([0] + [len(part.b) for part in parts])

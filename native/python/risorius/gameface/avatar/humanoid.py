@@ -16,7 +16,8 @@ KINDS = ("minimal", "mixamo")
 _HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near the origin
 _STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Axes of Mixamo's bones, which TalkingHead's poses need. Columns: the bone's x, y (along it), z.
+# Axes of Mixamo's bones, because poses of the web player TalkingHead assume them. Columns: the
+# bone's x axis, its y axis (along the bone) and its z axis.
 _TURNS = {
     "": _STRAIGHT,
     "arm left": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
@@ -24,7 +25,8 @@ _TURNS = {
     "leg": ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
     "foot": ((-1, 0, 0), (0, -0.5, 0.75**0.5), (0, 0.75**0.5, 0.5)),
 }
-# bone: parent, Mixamo name, words in files, is needed, position as a fraction of head height, turn.
+# Parent, name in Mixamo, names in other files, whether VRM requires the bone, position as
+# fractions of the head's height, key of _TURNS.
 _Row = tuple[str, str, str, bool, tuple[float, float, float], str]
 _MIDDLE: Mapping[str, _Row] = {
     "hips": ("", "Hips", "hips hip pelvis", True, (0, 0.60, 0), ""),
@@ -59,7 +61,7 @@ class Bone:
         name: VRM 1.0 name.
         parent: VRM 1.0 name of the parent, "" for the hips.
         node: name of its node, which is Mixamo's name of the bone.
-        words: names in files, without separators and side.
+        words: names of the bone in files of other programs, without separators and side.
         side: "left", "right", or "".
         is_needed: whether VRM requires the bone.
         at: position as fractions of the head's height: to the left, up, to the front.
@@ -126,7 +128,7 @@ def bone_of(joint: str) -> str:
 
 def _plain(joint: str) -> tuple[str, str]:
     """A joint's name without separators and side, and its side."""
-    # Loaders drop the colon of mixamorig:Hips.
+    # Some glTF loaders drop the colon, so mixamorigHips is accepted as well as mixamorig:Hips.
     name = re.sub(r"^(mixamorig\d*_?|j_(bip|adj)_(c_)?)", "", re.sub(r"^.*:", "", joint.lower()))
     for side in _SIDES:
         short = side[0]
@@ -138,7 +140,7 @@ def _plain(joint: str) -> tuple[str, str]:
 
 
 def new_bone(name: str) -> str:
-    """The name of a bone in VRM 1.0. Args: name: in VRM 0.x, whose thumbs begin one part later."""
+    """The VRM 1.0 name of a bone; only thumb bones are renamed. Args: name: name in VRM 0.x."""
     for old, new in (("ThumbProximal", "ThumbMetacarpal"), ("ThumbIntermediate", "ThumbProximal")):
         if name.endswith(old):
             return name.removesuffix(old) + new
@@ -175,8 +177,10 @@ def place_of(name: str, head: Doubles, trunk: Doubles) -> Doubles:
 
     Args:
         name: name of the bone.
-        head: float64[3], the head's joint, y up; near the origin, the body is 1.5 m below it.
-        trunk: float64[3], the lowest of the face's own trunk joints, above which x and z continue.
+        head: float64[3], the head's joint, y up. If its height is not plausible above a ground at
+            y = 0, as for a head near the origin, the ground is assumed 1.5 m below it.
+        trunk: float64[3], the lowest trunk joint of the face; added bones of the body have their x
+            and z relative to it.
     """
     height, low = float(head[1]), 0.0
     if not _STANDING[0] <= height <= _STANDING[1]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Chains of nodes that swing, as VRM 1.0 and 0.x list them."""
+"""Writes swinging chains of nodes, such as strands of hair, as tables of VRM 1.0 and 0.x."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ EXTENSION = "VRMC_springBone"
 
 @dataclass(frozen=True)
 class Collider:
-    """A sphere, or a capsule, that chains do not enter.
+    """A sphere or capsule that chains do not enter.
 
     Attributes:
-        node: that it moves with.
-        offset: metres from the node to its centre, in the node's axes.
-        radius: metres.
-        tail: the other end of a capsule, as the offset; None for a sphere.
+        node: number of the node that moves the collider.
+        offset: metres from the node to the centre of the sphere, or to one end of the capsule, in
+            the node's axes.
+        radius: radius in metres.
+        tail: metres from the node to the other end of a capsule; None for a sphere.
     """
 
     node: int
@@ -29,19 +30,20 @@ class Collider:
 
 @dataclass(frozen=True)
 class Spring:
-    """A chain.
+    """A chain of nodes that swings.
 
     Attributes:
-        name: of it.
-        nodes: from the root to the tip; the tip moves no vertex.
-        colliders: numbers of colliders that it does not enter.
-        hit: metres, radius of a node against colliders.
-        stiffness: how strongly it returns to rest, 0 to 4.
-        drag: share of its motion that is lost, 0 to 1.
+        name: name of the chain.
+        nodes: numbers of its nodes, from the root to the tip; the tip moves no vertex.
+        colliders: indices of the colliders that the chain does not enter.
+        hit: radius in metres of a node when it meets a collider.
+        stiffness: how strongly the chain returns to rest, 0 to 4.
+        drag: share of the motion that is lost, 0 to 1.
         gravity: strength of gravity, 0 to 2.
         down: direction of gravity in the scene.
-        center: node whose motion is left out; -1 for none.
-        is_branch: it hangs on another chain, which in VRM 0.x takes it along.
+        center: number of a node whose motion does not swing the chain; -1 for none.
+        is_branch: whether the chain begins at a node of another chain; VRM 0.x lists only the
+            chain that it branches from.
     """
 
     name: str
@@ -62,14 +64,14 @@ class Springs:
 
     Attributes:
         springs: the chains.
-        colliders: that they name by number.
+        colliders: the colliders to which the indices of the chains refer.
     """
 
     springs: Sequence[Spring] = field(default_factory=list)
     colliders: Sequence[Collider] = field(default_factory=list)
 
     def joined(self, other: Springs) -> Springs:
-        """Both together. Args: other: whose colliders get the numbers behind these."""
+        """These chains and others in one object. Args: other: chains and colliders to append."""
         more = len(self.colliders)
         moved = [
             Spring(**{**vars(s), "colliders": [c + more for c in s.colliders]})
@@ -79,7 +81,7 @@ class Springs:
 
 
 def table_1(all_: Springs) -> dict[str, Any]:
-    """The extension VRMC_springBone. Args: all_: chains of the file."""
+    """The table of VRM 1.0's extension VRMC_springBone. Args: all_: chains of the file."""
     shapes = list[dict[str, Any]]()
     for one in all_.colliders:
         ball: dict[str, Any] = {"offset": list(one.offset), "radius": one.radius}
@@ -135,7 +137,10 @@ def table_0(all_: Springs) -> dict[str, Any]:
 
 
 def _balls(one: Collider) -> list[dict[str, Any]]:
-    """A collider as spheres: VRM 0.x has no capsules. Its z is Unity's, against glTF's."""
+    """A collider as spheres, because VRM 0.x has no capsules.
+
+    The z axis of VRM 0.x is opposite to the z axis of glTF.
+    """
     ends = [one.offset]
     if one.tail:
         middle = [(a + b) / 2 for a, b in zip(one.offset, one.tail, strict=True)]
@@ -144,5 +149,5 @@ def _balls(one: Collider) -> list[dict[str, Any]]:
 
 
 def _groups(all_: Springs) -> list[tuple[int, ...]]:
-    """The sets of colliders that chains name."""
+    """The sets of collider indices that chains use; each set is listed once."""
     return list(dict.fromkeys(tuple(s.colliders) for s in all_.springs if s.colliders))

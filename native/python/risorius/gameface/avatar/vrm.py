@@ -32,18 +32,19 @@ _OLD_TITLES = {
 _OLD_FIRST = {"auto": "Auto", "both": "Both", "thirdPersonOnly": "ThirdPersonOnly"}
 # a straight line from (0, 0) to (1, 1) in Unity's curve format
 _STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]
-# VRM 0.x names the first two thumb bones one part further out.
+# VRM 1.0 name of a thumb bone -> VRM 0.x name, in which the first bone is called proximal.
 _OLD_THUMB = {"ThumbMetacarpal": "ThumbProximal", "ThumbProximal": "ThumbIntermediate"}
 
 
 @dataclass(frozen=True)
 class Manner:
-    """Values that are measured at the face.
+    """Values of VRM expressions that are measured on the exported face.
 
     Attributes:
         look: preset lookLeft, lookRight, lookUp or lookDown -> rotation of the eyes in degrees;
             presets that do not turn the eyes are absent.
-        held: preset -> kinds of KINDS that it overrides.
+        held: preset -> keys of KINDS; a VRM viewer fades out presets of these kinds while the
+            preset is on.
     """
 
     look: Mapping[str, float] = field(default_factory=dict)
@@ -52,7 +53,7 @@ class Manner:
 
 @dataclass(frozen=True)
 class Shown:
-    """A mesh of the file, its morph targets, and whether the wearer sees it.
+    """A mesh of the file, its morph targets, and whether the avatar's wearer sees the mesh.
 
     Attributes:
         node, mesh: numbers of its node and mesh.
@@ -74,11 +75,12 @@ class Avatar:
         bones: VRM name of a bone -> number of its node.
         eyes: offset in metres from the head's joint to the midpoint of the eyes.
         meshes: the meshes of the file.
-        own: names of targets that become custom expressions.
-        said: the licence fields.
-        manner: the measured values.
-        plain: number of a material -> what VRM 0.x says of it, where a body has said so.
-        springs: chains that swing.
+        own: names of morph targets that become custom expressions.
+        said: the licence fields, from `licence.checked`.
+        manner: the measured values of expressions.
+        plain: number of a material -> its row of VRM 0.x's materialProperties, for materials that
+            have such a row in the body's file.
+        springs: chains that swing, with their colliders.
     """
 
     bones: Mapping[str, int]
@@ -91,7 +93,7 @@ class Avatar:
     springs: Springs = field(default_factory=Springs)
 
     def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
-        """The meshes that have a target, and its index in each."""
+        """The meshes that have the morph target `name`, and its index in each of them."""
         for shown in self.meshes:
             if name in shown.targets:
                 yield shown, shown.targets.index(name)
@@ -142,7 +144,7 @@ def _expression(avatar: Avatar, name: str) -> dict[str, Any]:
 
 
 def _ranges(manner: Manner) -> Iterator[tuple[str, float]]:
-    """Keys of the look-at ranges, and the rotation in degrees at which the expression is at 1."""
+    """Name of each VRM look-at range, and the eye rotation in degrees that gives weight 1."""
     sideways = [manner.look[n] for n in ("lookLeft", "lookRight") if n in manner.look]
     if sideways:
         mean = sum(sideways) / len(sideways)
@@ -159,7 +161,7 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
     eyes = avatar.eyes
     first: dict[str, Any] = {
         "firstPersonBone": avatar.bones["head"],
-        # Unity's z, which is against glTF's.
+        # VRM 0.x uses Unity's z axis, which is opposite to glTF's.
         "firstPersonBoneOffset": {"x": eyes[0], "y": eyes[1], "z": -eyes[2]},
         "meshAnnotations": [
             {"mesh": s.mesh, "firstPersonFlag": _OLD_FIRST[s.first]} for s in avatar.meshes

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A character of the user's own, which a game face is hung on."""
+"""Reads the user's character from glTF or VRM, so that a game face is exported on that body."""

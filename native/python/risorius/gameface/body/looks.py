@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Materials, textures and pictures of a body, copied as they are into another file."""
+"""Copies materials, textures and pictures of a body unchanged into the exported file."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ _OF_VRM_1 = "VRMC_materials_"
 
 
 class Looks:
-    """The materials that meshes use, with their textures; the others are left out.
+    """Copies the materials that meshes use, and the textures of these materials.
 
     Attributes:
-        textures: number of a texture in the body's file -> its number in the result.
+        textures: number of a texture in the body's file -> its number in the exported file.
     """
 
     def __init__(self, document: Document, glb: Glb, *, is_old: bool) -> None:
-        """Of a file.
+        """Copy nothing yet; `material` copies a material when it is first requested.
 
         Args:
-            document: of the body.
-            glb: gets the materials.
-            is_old: the result is a VRM 0.x, whose programs do not read materials of VRM 1.0.
+            document: the file of the body.
+            glb: the exported file, which receives the materials.
+            is_old: whether the exported file is a VRM 0.x; then VRM 1.0's extensions of materials
+                are left out, because programs for VRM 0.x do not read them.
         """
         self._document, self._glb, self._is_old = document, glb, is_old
         self._materials = dict[int, int]()
@@ -39,13 +40,13 @@ class Looks:
         self._required = set(map(str, required)) if isinstance(required, list) else set()
 
     def material(self, number: int) -> int:
-        """The number of a material in the result.
+        """The number of a material in the exported file, to which the first call copies it.
 
         Args:
-            number: its number in the file.
+            number: number of the material in the body's file.
 
         Raises:
-            AnimationFileError: it refers to a texture or a picture that is not there.
+            AnimationFileError: the material refers to a texture or picture that does not exist.
         """
         if number not in self._materials:
             at = f"materials[{number}]"
@@ -59,11 +60,11 @@ class Looks:
         return self._materials[number]
 
     def renumbered(self, properties: Mapping[str, Any], place: str) -> dict[str, Any]:
-        """What VRM 0.x says of a material, with the textures of the result.
+        """A row of VRM 0.x's materialProperties, with numbers of textures in the exported file.
 
         Args:
-            properties: a row of materialProperties.
-            place: its name in errors.
+            properties: the row in the body's file.
+            place: name of the row for errors.
         """
         out = copy.deepcopy(dict(properties))
         named = out.get("textureProperties")
@@ -75,11 +76,11 @@ class Looks:
         return out
 
     def materials(self) -> dict[int, int]:
-        """Number of a material in the file -> its number in the result."""
+        """Number of a copied material in the body's file -> its number in the exported file."""
         return dict(self._materials)
 
     def _renumber(self, table: dict[str, Any], at: str, depth: int) -> None:
-        """Change the numbers of textures in a material; extensions of extensions have some too."""
+        """Replace the numbers of textures in a material's table and all tables nested in it."""
         if depth > _DEEPEST:
             raise self._document.fail(at, "a material was expected, it is nested too deeply")
         for key, value in table.items():

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of a body as its skin shows them at rest: nodes then need neither scale nor turn."""
+"""Reads the meshes of a body, with vertices in the scene's coordinates.
+
+A mesh with a skin is read in the rest pose of its joints. So the exported nodes of the meshes need
+neither scale nor rotation.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +30,12 @@ class Piece:
     """A primitive of a mesh.
 
     Attributes:
-        values: attribute -> float32[V, n], JOINTS as uint16; positions in metres of the scene.
-        indices: int64[n], corners in the order of the file; None: each vertex once.
-        mode: of glTF: 4 for triangles.
-        material: number in the file; -1 for none.
-        targets: for each morph target attribute -> float32[V, 3].
+        values: name of an attribute -> float32[V, n], or uint16[V, 4] for JOINTS; positions are in
+            the scene, in metres.
+        indices: int64[n], the vertex of each corner; None: each vertex is used once, in order.
+        mode: glTF's code of the primitive's kind, e.g. 4 for triangles.
+        material: number of its material in the body's file; -1 for none.
+        targets: for each morph target, name of an attribute -> float32[V, 3], change at weight 1.
     """
 
     values: dict[str, npt.NDArray[Any]]
@@ -42,12 +47,12 @@ class Piece:
 
 @dataclass
 class BodyMesh:
-    """A mesh at a node.
+    """The mesh of a node.
 
     Attributes:
-        name: of the node, or of the mesh.
-        also: the mesh's own name.
-        joints: numbers of the nodes that its skin turns about.
+        name: name of the node; the mesh's name if the node has none.
+        also: name of the mesh.
+        joints: numbers of the nodes that are the joints of its skin.
         pieces: its primitives.
         targets: names of its morph targets.
     """
@@ -60,26 +65,26 @@ class BodyMesh:
 
 
 class Meshes:
-    """Reads meshes at their nodes; primitives that share their lists are read once."""
+    """Reads the meshes of nodes; primitives that share their accessors are read once per node."""
 
     def __init__(self, document: Document, world: Mapping[int, Doubles]) -> None:
-        """Of a file.
+        """Prepare for reading.
 
         Args:
-            document: of the body.
+            document: the file of the body.
             world: number of a node -> float64[4, 4] from the node to the scene, in metres.
         """
         self._document, self._world = document, world
         self._known: dict[str, tuple[dict[str, Any], list[dict[str, Any]], bool]] = {}
 
     def joints(self, node: int) -> list[int]:
-        """The nodes that the skin of a node's mesh turns about; the node itself without a skin.
+        """The joints of the skin of a node's mesh; the node itself if the mesh has no skin.
 
         Args:
             node: number of a node with a mesh.
 
         Raises:
-            AnimationFileError: no such skin, or joints outside of the scene.
+            AnimationFileError: the skin does not exist, or its joints are outside of the scene.
         """
         row = self._document.json["nodes"][node]
         if "skin" not in row:
@@ -95,14 +100,14 @@ class Meshes:
         return joints
 
     def read(self, node: int) -> BodyMesh:
-        """The mesh of a node.
+        """Read the mesh of a node.
 
         Args:
-            node: its number.
+            node: number of the node.
 
         Raises:
-            AnimationFileError: damaged lists, with the place in the file.
-            BudgetError: more numbers than a file of this size may hold.
+            AnimationFileError: the mesh is damaged; the error names the place in the file.
+            BudgetError: the mesh is too large in proportion to the file.
         """
         document = self._document
         row = document.json["nodes"][node]
@@ -122,7 +127,7 @@ class Meshes:
         return BodyMesh(name, also, joints, pieces, target_names(mesh, count))
 
     def _moves(self, node: int, joints: Sequence[int]) -> Doubles:
-        """float64[joints, 4, 4] from the mesh's numbers to the scene."""
+        """float64[joints, 4, 4], per joint the matrix from the mesh's coordinates to the scene."""
         world = np.stack([self._world[joint] for joint in joints])
         row = self._document.json["nodes"][node]
         skin = self._document.json["skins"][row["skin"]] if "skin" in row else {}
@@ -211,7 +216,7 @@ class Meshes:
 
 
 class _Lists:
-    """The lists of a primitive, also of one that Draco packed."""
+    """Reads the attributes and triangles of a primitive, whether or not Draco compressed them."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], at: str) -> None:
         self._document, self._primitive, self._at = document, primitive, at
@@ -222,7 +227,7 @@ class _Lists:
         self._numbers: Mapping[str, Any] = numbers if isinstance(numbers, dict) else {}
 
     def rows(self, name: str, at: str) -> Doubles:
-        """float64[V, n] of an attribute."""
+        """float64[V, n], the values of an attribute."""
         document, index = self._document, self._primitive["attributes"][name]
         accessor = document.item("accessors", index, at)
         kind = accessor.get("type")
@@ -240,7 +245,7 @@ class _Lists:
         return document.rows(index, at, kind, COORDINATES)
 
     def indices(self, count: int) -> Ints | None:
-        """int64[n] of the corners."""
+        """int64[n], the vertex of each corner; None if the primitive has no indices."""
         if self._packed is not None:
             found = self._packed.triangles.ravel()
         elif "indices" in self._primitive:
@@ -257,7 +262,7 @@ class _Lists:
 
 
 def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at: str) -> Doubles:
-    """float64[V, 4, 4] of each vertex. The weights in `values` become shares of 1."""
+    """float64[V, 4, 4], the skin's matrix of each vertex; normalises the weights in `values`."""
     count = len(values["POSITION"])
     sets = [name[8:] for name in values if name.startswith("WEIGHTS_")]
     sets = [number for number in sets if f"JOINTS_{number}" in values]
@@ -287,7 +292,10 @@ def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at:
 
 
 def _cofactors(linear: Doubles) -> Doubles:
-    """float64[V, 3, 3] that turns normals; a matrix without an inverse has one too."""
+    """float64[V, 3, 3], the cofactor matrices, which transform normals.
+
+    Unlike an inverse, a cofactor matrix exists even if a matrix is singular.
+    """
     a, b, c = linear[:, 0], linear[:, 1], linear[:, 2]
     out = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(out * np.where(np.linalg.det(linear) < 0, -1.0, 1.0)[:, None, None])
@@ -302,8 +310,8 @@ def target_names(mesh: Mapping[str, Any], count: int) -> list[str]:
     """The names of a mesh's morph targets.
 
     Args:
-        mesh: its table; extras.targetNames of the mesh, or of its first primitive, are the names.
-        count: how many targets there are; a target without a name gets one.
+        mesh: table of the mesh; extras.targetNames in it or in its first primitive has the names.
+        count: number of targets; if the number of names differs, names are made up.
     """
     rows = mesh.get("primitives")
     first = rows[0] if isinstance(rows, list) and rows and isinstance(rows[0], dict) else {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A character in glTF or VRM: skeleton, meshes and bones, upright, in metres, facing along z."""
+"""Reads a character from glTF or VRM: skeleton, meshes and bones, in metres, facing along +z."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TALLEST = 20.0  # units from feet to head: a taller body is in centimetres
 _HANGING = 25.0  # degrees below the horizontal of an arm that is no T-pose
 _OWN_FACE = 3  # targets with names of expressions that make a face
 
-# What older ARKit rigs and VRoid call expressions.
+# Names of expressions in older ARKit rigs and in VRoid.
 _OLDER = (
     "mouthSmile_L", "mouthSmile_R", "eyeBlink_L", "eyeBlink_R", "joy", "sorrow", "a", "i", "u", "e",
     "o", "Fcl_MTH_A", "Fcl_MTH_I", "Fcl_MTH_U", "Fcl_EYE_Close", "Fcl_ALL_Joy",
@@ -38,21 +38,21 @@ _OLDER = (
 
 @dataclass
 class Body:
-    """A body.
+    """A character's body; its scene is in metres and faces along +z.
 
     Attributes:
         document: the file.
-        names: of its nodes.
-        parents: of each node, -1 for a root; parents stand before their children.
-        places: float64[n, 3], metres.
-        turns: float64[n, 3, 3], from each node's axes to those of the scene.
-        of_node: number of a node in the file -> its place in these lists.
-        bones: name in VRM 1.0 -> its place in these lists.
-        meshes: their joints are numbers of nodes in the file.
-        scale: metres of a unit of the file.
-        to_scene: float64[4, 4], from the scene of the file to this one.
-        world: number of a node -> float64[4, 4] to this scene.
-        others: names to leave out that are meshes of the face.
+        names: names of its n nodes.
+        parents: index of each node's parent, -1 for a root; parents come before their children.
+        places: float64[n, 3], positions of the nodes in metres.
+        turns: float64[n, 3, 3], rotation from each node's axes to the scene's.
+        of_node: number of a node in the file -> index in the lists above.
+        bones: VRM 1.0 name of a bone -> index in the lists above.
+        meshes: its meshes, whose joints are numbers of nodes in the file.
+        scale: metres per unit of the file.
+        to_scene: float64[4, 4], matrix from the file's scene to the body's scene.
+        world: number of a node in the file -> float64[4, 4], from the node to the body's scene.
+        others: names that the user excludes and that only meshes of the face have.
         notes: sentences for the user.
     """
 
@@ -71,10 +71,12 @@ class Body:
     notes: list[str] = field(default_factory=list)
 
     def above(self, name: str) -> int:
-        """The node of the nearest bone above a bone, or of the head's parent.
+        """Index of the node to which a bone of the face is attached.
+
+        It is the nearest ancestor bone that the body has; if there is none, the head's parent.
 
         Args:
-            name: of a bone in VRM 1.0.
+            name: VRM 1.0 name of the bone.
         """
         bone = humanoid.parent_of(name, list(self.bones))
         return self.bones[bone] if bone else max(0, self.parents[self.bones["head"]])
@@ -83,19 +85,19 @@ class Body:
 def read_body(
     path: Path, *, scale: float | None, without: Sequence[str], faces: Set[str], needs_all: bool
 ) -> Body:
-    """A body.
+    """Read a body from a file.
 
     Args:
-        path: of a .glb, .gltf or .vrm.
-        scale: metres of a unit of the file; None: 0.01 if the body is taller than 20 units, else 1.
+        path: path of a .glb, .gltf or .vrm.
+        scale: metres per unit of the file; None: 0.01 if the body is taller than 20 units, else 1.
         without: names of meshes, or of their nodes, that are left out.
-        faces: names of the face's meshes, which `without` may name too.
-        needs_all: each bone that a VRM needs must be there, else the head alone.
+        faces: names of the face's meshes, which `without` may also contain.
+        needs_all: True: all bones that VRM requires must exist; False: only the head.
 
     Raises:
-        GameFaceError: no skeleton, bones are missing, no mesh has a name in `without`.
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more numbers than a file of this size may hold.
+        GameFaceError: no skeleton, bones are missing, or a name in `without` is unknown.
+        AnimationFileError: the file is damaged; the error names the place in the file.
+        BudgetError: the content is too large in proportion to the file.
     """
     document = _opened(path)
     tree = find_tree(document)
@@ -145,9 +147,9 @@ def _opened(path: Path) -> Document:
 def _kept(
     document: Document, holders: list[int], without: Sequence[str], faces: Set[str]
 ) -> tuple[list[int], list[str]]:
-    """The nodes whose meshes stay, and the names that are meshes of the face.
+    """The nodes whose meshes are exported, and the names in `without` that are face meshes.
 
-    Raises: GameFaceError: no mesh has a name.
+    Raises: GameFaceError: a name in `without` is no mesh of the body or the face.
     """
     rows, names = document.json["nodes"], dict[int, tuple[str, str]]()
     for number in holders:
@@ -172,7 +174,7 @@ def _scale_of(at: Mapping[str, Doubles]) -> float:
 
 
 def _facing(at: Mapping[str, Doubles], name: str) -> float:
-    """1 for a body that looks along z, -1 for one that looks against z, as VRM 0.x has it."""
+    """1 for a body that faces along +z, -1 for one that faces along -z, as VRM 0.x prescribes."""
     if "hips" in at and not at["head"][1] > at["hips"][1]:
         raise GameFaceError(
             f"{name}: a body that stands upright along y was expected, its head is not above its "
@@ -186,7 +188,10 @@ def _facing(at: Mapping[str, Doubles], name: str) -> float:
 
 
 class _Nodes:
-    """The nodes that the result has: all but those that hold a mesh, or a camera, and no bone."""
+    """The nodes to export: bones, joints, and all nodes without a mesh or a camera.
+
+    Parents of exported nodes and of meshes without a skin are exported too.
+    """
 
     def __init__(
         self, document: Document, tree: Tree, world: Mapping[int, Doubles], bones: dict[str, int],
@@ -210,13 +215,13 @@ class _Nodes:
 
 
 def _rotation(matrix: Doubles) -> Doubles:
-    """The rotation of a matrix that also scales."""
+    """The rotation part of a matrix that rotates and scales."""
     if not abs(np.linalg.det(matrix)) > 1e-30:
         return np.eye(3)
     left, _, right = np.linalg.svd(matrix)
     sign = np.sign(np.linalg.det(left @ right))
     out = np.asarray((left * [1.0, 1.0, sign]) @ right, np.float64)
-    # Digits behind the twelfth are those of the products above a node.
+    # Products of the parents' matrices leave rounding errors, which hide exact 0 and 1.
     return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
 
 
@@ -258,5 +263,5 @@ def _quoted(name: str) -> str:
 
 
 def _plain(name: str) -> str:
-    """A target's name without what VRoid and others put before it."""
+    """A target's name in lower case, without the text up to the last dot, such as "Face."."""
     return name.rpartition(".")[2].lower()

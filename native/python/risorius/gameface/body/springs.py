@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The springs of a body that is a VRM, such as those of a skirt, by the nodes of the result."""
+"""Reads the swinging chains of a VRM body, such as a skirt, for the nodes of the exported file."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ Doubles = npt.NDArray[np.float64]
 
 
 def springs_of(body: Body, places: Doubles, turns: Doubles, flip: Doubles) -> Springs:
-    """The chains and colliders of a body, none if it is no VRM.
+    """The chains and colliders of a body; none if the body is no VRM.
 
     Args:
-        body: with its file.
-        places, turns: float64[n, 3] and float64[n, 3, 3] of its nodes in the result.
-        flip: float64[3], 1 or -1, from the body's axes to those of the result.
+        body: the body, with its file.
+        places, turns: float64[n, 3] and float64[n, 3, 3], positions in metres and rotations of its
+            nodes in the exported file.
+        flip: float64[3], 1 or -1 per axis; -1 where the exported file's axis is opposite.
 
     Raises:
-        AnimationFileError: a spring refers to a node or a collider that is not there.
+        AnimationFileError: a spring refers to a node or collider that does not exist.
     """
     extensions = body.document.json.get("extensions")
     tables = extensions if isinstance(extensions, dict) else {}
@@ -43,7 +44,7 @@ class _Reader:
         self._down = np.diag(body.to_scene)[:3] / body.scale * flip
 
     def new(self, table: Mapping[str, Any]) -> Springs:
-        """Of VRM 1.0."""
+        """Read the chains from VRM 1.0's table VRMC_springBone."""
         at = "VRMC_springBone"
         colliders = [
             self._collider(row, f"{at}.colliders[{i}]")
@@ -72,7 +73,7 @@ class _Reader:
         return Springs(out, colliders)
 
     def old(self, table: Mapping[str, Any]) -> Springs:
-        """Of VRM 0.x: each bone with all that hangs on it."""
+        """Read VRM 0.x's table secondaryAnimation: listed bones swing with all nodes below them."""
         at, colliders, groups = "VRM.secondaryAnimation", list[Collider](), list[list[int]]()
         for i, row in enumerate(_rows(table, "colliderGroups")):
             place, group = f"{at}.colliderGroups[{i}]", list[int]()
@@ -102,7 +103,10 @@ class _Reader:
         return Springs(out, colliders)
 
     def _branches(self, spring: Spring) -> Iterator[Spring]:
-        """A chain along first children, and chains of the others, which VRM 0.x does not name."""
+        """A chain along the first child of each node, and a branch from every other child.
+
+        VRM 0.x lists only the first node of a tree that swings.
+        """
         below = dict[int, list[int]]()
         for node, parent in enumerate(self._body.parents):
             below.setdefault(parent, []).append(node)
@@ -137,12 +141,12 @@ class _Reader:
         return Collider(own, ends[0], radius * self._size(node), ends[1] if tail else None)
 
     def _moved(self, node: Any, offset: list[float], own: int) -> list[float]:
-        """A place beside a node of the file as the result's node has it."""
+        """An offset from a node of the file, converted to the axes of the exported node `own`."""
         at = (self._body.world[node] @ [*offset, 1.0])[:3] - self._body.places[own]
         return list(map(float, self._turns[own].T @ (at * self._flip)))
 
     def _size(self, node: Any) -> float:
-        """Metres of a unit of a node."""
+        """Metres per unit of a node's axes."""
         return float(np.cbrt(abs(np.linalg.det(self._body.world[node][:3, :3]))))
 
     def _node(self, node: object, place: str) -> int:
@@ -154,7 +158,7 @@ class _Reader:
     def _named(
         self, row: Mapping[str, Any], groups: list[list[int]], count: int, place: str
     ) -> list[int]:
-        """The colliders of the groups that a chain names."""
+        """Indices of the colliders in the groups to which a chain's row refers."""
         found = row.get("colliderGroups")
         out = list[int]()
         for group in found if isinstance(found, list) else []:
@@ -175,7 +179,7 @@ class _Reader:
             raise self._body.document.fail(f"{place}.{key}", str(error)) from None
 
     def _vector(self, value: object, place: str) -> list[float]:
-        """Three numbers, in a list or as x, y and z."""
+        """Three numbers, from a list or from a table with the keys x, y and z."""
         if isinstance(value, dict):
             value = [value.get(axis, 0.0) for axis in "xyz"]
         table = {"offset": value} if value is not None else {}
@@ -186,7 +190,7 @@ class _Reader:
 
 
 def _rows(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    """The tables in a list of a table."""
+    """The tables in the list `table[key]`; other items of the list become empty tables."""
     found = table.get(key)
     return (
         [row if isinstance(row, dict) else {} for row in found] if isinstance(found, list) else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The nodes of a body: where each stands in the scene, and which of them are bones."""
+"""Finds the nodes of a body, their positions in the scene, and the nodes that are bones."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Tree:
     """The nodes of the scene.
 
     Attributes:
-        order: numbers of the nodes in the file, each behind its parent.
+        order: numbers of the nodes in the file, parents before their children.
         above: number of a node -> number of its parent, -1 for a root.
-        world: number of a node -> float64[4, 4] from the node to the scene.
+        world: number of a node -> float64[4, 4], matrix from the node to the scene.
     """
 
     order: list[int]
@@ -37,11 +37,11 @@ def find_tree(document: Document) -> Tree:
     """The nodes of the first scene, or all nodes if the file has no scene.
 
     Args:
-        document: of the body.
+        document: the file of the body.
 
     Raises:
-        AnimationFileError: no nodes, a node that hangs on itself or on two others, a place that is
-            no list of numbers.
+        AnimationFileError: there are no nodes, a node has two parents or is its own ancestor, or a
+            position is not a list of numbers.
     """
     rows = document.json.get("nodes")
     if not isinstance(rows, list) or not rows:
@@ -101,9 +101,10 @@ def bones_of(document: Document, tree: Tree, joints: set[int]) -> dict[str, int]
     """The bones of a humanoid: name in VRM 1.0 -> number of the node.
 
     Args:
-        document: of the body; its VRM extension says its bones.
-        tree: its nodes.
-        joints: nodes that a skin turns about; without a VRM extension their names say the bones.
+        document: the file of the body, whose VRM extension lists the bones.
+        tree: the nodes of the file.
+        joints: nodes that are joints of a skin. If the file has no VRM extension, the names of
+            nodes decide; `joints` and their ancestors are preferred to other nodes.
     """
     found = {name: node for name, node in _said(document) if node in tree.above}
     if found:
@@ -129,7 +130,7 @@ def _chain(tree: Tree, number: int) -> list[int]:
 
 
 def _said(document: Document) -> list[tuple[str, int]]:
-    """Bones and nodes of the VRM extension."""
+    """(VRM 1.0 name of a bone, number of its node) for each bone in the file's VRM extension."""
     extensions = document.json.get("extensions")
     tables = extensions if isinstance(extensions, dict) else {}
     out = list[tuple[str, int]]()

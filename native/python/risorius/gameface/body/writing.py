@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A body in the lists of a glTF: its nodes, skins and meshes."""
+"""Writes the meshes, skins and materials of a body into the exported glTF."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _FLIP = np.array([-1.0, 1.0, -1.0])
 
 @dataclass
 class Put:
-    """The meshes, materials and springs of a body in a file.
+    """The meshes, materials and springs of a body in the exported file.
 
     Attributes:
-        meshes: with the numbers of their nodes and meshes.
-        plain: VRM 0.x's rows of materials, by the number of the material.
-        springs: of a body that is a VRM.
+        meshes: the meshes, with the numbers of their nodes and meshes.
+        plain: number of a material -> its row of VRM 0.x's materialProperties.
+        springs: swinging chains; none if the body is no VRM.
     """
 
     meshes: list[Shown] = field(default_factory=list)
@@ -38,11 +38,11 @@ class Put:
 
 
 def frames(body: Body, version: str) -> tuple[Doubles, Doubles]:
-    """float64[n, 3] and float64[n, 3, 3], where nodes are and how they are turned in a file.
+    """float64[n, 3], float64[n, 3, 3]: positions in metres and rotations of the exported nodes.
 
     Args:
-        body: upright, facing along z.
-        version: of VRM; in 0.x a body faces against z and no node is turned.
+        body: the body, facing along +z.
+        version: VRM version; in "0.x" the body faces along -z, and no node is rotated.
     """
     if version == "0.x":
         return body.places * _FLIP, np.tile(np.eye(3), (len(body.names), 1, 1))
@@ -50,17 +50,17 @@ def frames(body: Body, version: str) -> tuple[Doubles, Doubles]:
 
 
 def put_meshes(body: Body, glb: Glb, names: list[str], version: str, below: list[int]) -> Put:
-    """Add the meshes of a body, whose nodes are the first of the file.
+    """Add the meshes of a body to a file whose first nodes are the nodes of the body.
 
     Args:
-        body: that is written.
-        glb: gets nodes, skins, meshes and materials.
-        names: of the meshes' nodes.
-        version: of VRM; "" for none.
-        below: gets the numbers of the meshes' nodes.
+        body: the body to write.
+        glb: the file, to which nodes, skins, meshes and materials are added.
+        names: for each mesh, the name of its node.
+        version: VRM version; "" for a plain glTF.
+        below: list to which the numbers of the meshes' nodes are added.
 
     Raises:
-        AnimationFileError: a material refers to a texture that is not there.
+        AnimationFileError: a material refers to a texture that does not exist.
     """
     looks = Looks(body.document, glb, is_old=version == "0.x")
     places, turns = frames(body, version)
@@ -82,7 +82,7 @@ def put_meshes(body: Body, glb: Glb, names: list[str], version: str, below: list
 
 
 def _plain(body: Body, glb: Glb, looks: Looks) -> dict[int, dict[str, Any]]:
-    """The rows of materialProperties of a body that is a VRM 0.x itself."""
+    """Number of a material -> its row of materialProperties, if the body's file is a VRM 0.x."""
     extensions = body.document.json.get("extensions")
     own = extensions.get("VRM") if isinstance(extensions, dict) else None
     rows = own.get("materialProperties") if isinstance(own, dict) else None
@@ -109,7 +109,7 @@ class _Writer:
         self._targets = dict[int, list[dict[str, int]]]()
 
     def skin(self, joints: list[int]) -> int:
-        """The number of a skin that turns about these nodes of the file."""
+        """The number of the exported skin with these joints. Args: joints: nodes of the body."""
         own = tuple(self._body.of_node[joint] for joint in joints)
         skins = self._glb.table.setdefault("skins", [])
         if own not in self._skins:
@@ -155,6 +155,6 @@ class _Writer:
         return self._glb.vertices(rows, bounds=name == "POSITION")
 
     def _turned(self, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Rows of vectors in the axes of the result."""
+        """Rows of vectors in the axes of the exported file."""
         flip = np.r_[self._flip, 1.0][: rows.shape[1]]
         return np.ascontiguousarray(rows * flip, "<f4")

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Joints in long hair: cards that hang are gathered by direction, and each bundle gets a chain."""
+"""Adds swinging joints to long hair.
+
+Hanging hair cards are grouped into bundles by their direction from the head's centre, and each
+bundle gets one chain of joints.
+"""
 
 from __future__ import annotations
 
@@ -34,9 +38,9 @@ class Hair:
 
     Attributes:
         points: float64[V, 3], metres, y up.
-        rows: int64[V], equal where vertices are one point.
-        triangles: int64[T, 3].
-        joints, weights: int64 and float64[V, 4].
+        rows: int64[V], a number per vertex; vertices at one point of the face have equal numbers.
+        triangles: int64[T, 3], vertices of each triangle.
+        joints, weights: int64[V, 4], float64[V, 4], the skin weights of each vertex.
     """
 
     points: Doubles
@@ -48,13 +52,14 @@ class Hair:
 
 @dataclass(frozen=True)
 class Chains:
-    """Joints that swing.
+    """Chains of joints that swing, and a sphere in the head that they do not enter.
 
     Attributes:
-        joints: of each chain, from the root to the tip, which moves no vertex.
-        centre: float64[3], metres, of a sphere in the head.
-        radius: metres, of that sphere.
-        hit: metres, radius of a joint against the sphere.
+        joints: per chain, the indices of its joints from the root to the tip; the tip moves no
+            vertex.
+        centre: float64[3], centre of the sphere in metres.
+        radius: radius of the sphere in metres.
+        hit: radius of a joint in metres when it meets the sphere.
     """
 
     joints: list[list[int]] = field(default_factory=list)
@@ -65,13 +70,14 @@ class Chains:
 
 @dataclass(frozen=True)
 class Cards:
-    """Cards of a mesh.
+    """The hair cards of a mesh.
 
     Attributes:
         of_vertex: int64[V], the card of each vertex.
-        root, tip: float64[cards], heights in metres.
-        middle, roots: float64[cards, 3], metres.
-        hangs: bool[cards], whether it swings.
+        root, tip: float64[cards], heights of each card's highest and lowest vertex in metres.
+        middle: float64[cards, 3], mean of each card's vertices in metres.
+        roots: float64[cards, 3], the highest vertex of each card in metres.
+        hangs: bool[cards], whether the card is long and narrow enough to swing.
     """
 
     of_vertex: Ints
@@ -83,11 +89,11 @@ class Cards:
 
 
 def is_long(points: Doubles, triangles: Ints) -> bool:
-    """Whether a card hangs farther than HANGS below its root.
+    """Whether a mesh of hair has a card that hangs farther than HANGS below its root.
 
     Args:
         points: float64[V, 3], metres, y up.
-        triangles: int64[T, 3].
+        triangles: int64[T, 3], vertices of each triangle.
     """
     return len(triangles) > 0 and bool(
         find_cards(points, np.arange(len(points)), triangles).hangs.any()
@@ -95,14 +101,17 @@ def is_long(points: Doubles, triangles: Ints) -> bool:
 
 
 def add_chains(skeleton: Skeleton, hairs: Sequence[Hair]) -> tuple[Skeleton, Chains, list[Hair]]:
-    """A skeleton with chains in long hair, which hang on the head.
+    """Add chains of joints for long hair below the head's joint.
 
-    The weights of a card pass from the head at its root to the chain. All vertices stay where they
-    are as long as no joint moves.
+    The root of a card keeps the head's weight; towards the tip the weight passes to the chain. No
+    vertex moves until a joint does.
 
     Args:
-        skeleton: of the face.
-        hairs: its meshes of long hair.
+        skeleton: joints of the face.
+        hairs: the face's meshes of long hair.
+
+    Returns:
+        The extended skeleton, its chains, and the meshes with changed skin weights.
     """
     cards = [find_cards(hair.points, hair.rows, hair.triangles) for hair in hairs]
     chains = Chains(centre=skeleton.places[skeleton.head])
@@ -134,12 +143,12 @@ def add_chains(skeleton: Skeleton, hairs: Sequence[Hair]) -> tuple[Skeleton, Cha
 
 
 def find_cards(points: Doubles, rows: Ints, triangles: Ints) -> Cards:
-    """The pieces of a mesh that are not connected to each other.
+    """Split a mesh into cards: pieces that are not connected to each other.
 
     Args:
         points: float64[V, 3], metres, y up.
-        rows: int64[V], equal where vertices are one point.
-        triangles: int64[T, 3].
+        rows: int64[V], a number per vertex; equal numbers connect vertices at one point.
+        triangles: int64[T, 3], vertices of each triangle.
     """
     _, place = np.unique(rows, return_inverse=True)
     corners = place[triangles]
@@ -167,13 +176,17 @@ def find_cards(points: Doubles, rows: Ints, triangles: Ints) -> Cards:
 
 
 def _bundle(away: Doubles) -> Ints:
-    """int64[n], the sector about the vertical of directions from the centre."""
+    """int64[n], the bundle of each card: the sector about the y axis of its direction `away`.
+
+    Args:
+        away: float64[n, 3], from the head's centre to the middle of each card.
+    """
     angle = np.arctan2(away[:, 0], away[:, 2])
     return np.rint(angle / (2 * np.pi) * _BUNDLES).astype(np.int64) % _BUNDLES
 
 
 def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
-    """The centre and radius of a sphere through the roots of hair."""
+    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots."""
     guess = head + np.array([0.0, 0.07, 0.0])
     if len(roots) < _FEWEST:
         return guess, 0.08
@@ -189,7 +202,10 @@ def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
 def _line(
     hairs: Sequence[Hair], cards: Sequence[Cards], members: Sequence[npt.NDArray[np.bool_]]
 ) -> Doubles:
-    """float64[n, 3], the joints of a bundle, at even heights: each amid the hair that is there."""
+    """float64[n, 3], joints of a bundle at evenly spaced heights.
+
+    Each joint is at the mean position of the bundle's hair near its height.
+    """
     picked = list(zip(hairs, cards, members, strict=True))
     top = float(np.mean(np.concatenate([one.root[member] for _, one, member in picked])))
     low = float(np.percentile(np.concatenate([one.tip[member] for _, one, member in picked]), 25))
@@ -206,7 +222,7 @@ def _line(
 def _woven(
     hair: Hair, cards: Cards, member: npt.NDArray[np.bool_], chain: list[int], heights: Doubles
 ) -> Hair:
-    """Hair whose cards of a bundle hang on its chain."""
+    """Hair in which the cards of one bundle have skin weights of the bundle's chain."""
     vertices = np.flatnonzero(member[cards.of_vertex])
     if not len(vertices):
         return hair
@@ -222,7 +238,7 @@ def _woven(
     dense = np.zeros((len(vertices), max(INFLUENCES, chain[-1] + 1)))
     pulled = np.zeros_like(dense)
     for number, weight in ((upper, (1 - part) * share), (lower, part * share)):
-        # Above the first joint, which is number -1, the head holds the hair.
+        # Number -1 means hair above the first joint, which keeps the weights of the head.
         np.add.at(pulled, (every, np.array(chain)[number]), np.where(number < 0, 0.0, weight))
     for k in range(hair.joints.shape[1]):
         np.add.at(dense, (every, hair.joints[vertices, k]), hair.weights[vertices, k])

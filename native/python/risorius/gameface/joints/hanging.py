@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face's joints on the bones of a body."""
+"""Attaches the joints of a face to the bones of a body."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ _DEEP = 0.03  # metres
 
 
 def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
-    """The joints of a face where the body has them, and float64[3] metres that the face moves.
+    """Move the joints of a face onto a body; also returns float64[3], the face's motion in metres.
 
-    The middle of the eyes meets the middle of the body's eye bones, else the head meets the head
-    bone. The heads also meet in depth if the eye bones lie deeper in the head, or less deep, by
-    more than 3 cm. The root of the face becomes the node below the body's neck.
+    The midpoint of the face's eyes is moved to the midpoint of the body's eye bones. If the face or
+    the body has no eye bones, the head joint is moved to the head bone. The head joints also decide
+    the depth if the body's eye bones are more than 3 cm deeper or less deep in the head. The face's
+    root is replaced by the node above the body's neck.
 
     Args:
-        skeleton: of the face alone.
-        body: with its bones.
+        skeleton: joints of the face alone.
+        body: the body with its bones.
 
     Raises:
         GameFaceError: the face has no joint of a head.
@@ -54,6 +55,6 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
 
 
 def _apart(skeleton: Skeleton, body: Body, names: Sequence[str]) -> Doubles:
-    """float64[3], from the middle of some joints of the face to the middle of the body's bones."""
+    """float64[3], from the mean of the face's joints `names` to the mean of these body bones."""
     here = skeleton.places[[skeleton.bones[n] for n in names]].mean(axis=0)
     return np.asarray(body.places[[body.bones[n] for n in names]].mean(axis=0) - here)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Nodes of a glTF that move and turn, and do not scale."""
+"""Makes glTF nodes with translation and rotation, without scale."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Doubles = npt.NDArray[np.float64]
 
 
 def node_of(name: str, away: Doubles, turn: Doubles, above: Doubles) -> dict[str, Any]:
-    """A node.
+    """The JSON table of a node.
 
     Args:
-        name: of it.
-        away: float64[3], metres from the node above it, in the axes of the scene.
-        turn: float64[3, 3], from its axes to those of the scene.
-        above: float64[3, 3], the same of the node above it.
+        name: name of the node.
+        away: float64[3], metres from the parent to the node, in the scene's axes.
+        turn: float64[3, 3], rotation from the node's axes to the scene's.
+        above: float64[3, 3], rotation from the parent's axes to the scene's.
     """
     node: dict[str, Any] = {"name": name, "translation": (above.T @ away).tolist()}
     quaternion = _quaternion(above.T @ turn)
@@ -35,11 +35,11 @@ def add_nodes(
     """Add the nodes of a tree to an empty list.
 
     Args:
-        nodes: gets them.
-        names: of the nodes.
-        parents: of each node, before it; -1 for a root.
-        places: float64[n, 3], metres.
-        turns: float64[n, 3, 3], from each node's axes to those of the scene.
+        nodes: empty list that receives the tables of the nodes.
+        names: names of the nodes.
+        parents: index of each node's parent, which comes before the node; -1 for a root.
+        places: float64[n, 3], positions in the scene in metres.
+        turns: float64[n, 3, 3], rotation from each node's axes to the scene's.
     """
     for i, name in enumerate(names):
         above = parents[i]
@@ -51,7 +51,7 @@ def add_nodes(
 
 
 def _quaternion(turn: Doubles) -> list[float]:
-    """x, y, z, w of a rotation matrix."""
+    """The quaternion (x, y, z, w) of a rotation matrix."""
     x, y, z = np.diag(turn)
     squares = np.array([1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z])
     largest = int(squares.argmax())  # the others are divided by it

@@ -20,7 +20,7 @@ from ..errors import GameFaceError
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# Patterns of joint names in files; the first joint that matches counts.
+# Bone -> pattern of joint names in files; the first matching joint of a file is used.
 _JOINTS = {
     "neck": re.compile(r"neck([_.]?0?1)?$"),
     "head": re.compile(r"head$"),
@@ -36,14 +36,16 @@ class Skeleton:
     """The joints of the exported file.
 
     Attributes:
-    names: names of the joints, the root first, parents before children.
-    parents: index of each parent, -1 for the root.
-    places: float64[n, 3], positions in metres in glTF's axes.
-    of_joint: int64[joints of the DNA file], the joint here that each one follows.
-    head: index of the head's joint, which also takes vertices without a joint.
-    turns: float64[n, 3, 3], rotation from each joint's axes to glTF's.
-    bones: VRM name of a bone -> index of its joint here.
-    hooks: joint -> node of a body that it hangs on; the root is that node itself.
+        names: names of the n joints, the root first, parents before children.
+        parents: index of each parent, -1 for the root.
+        places: float64[n, 3], positions in metres in glTF's axes.
+        of_joint: int64[joints of the DNA file], index of the exported joint with which each of
+            them moves.
+        head: index of the head's joint, which also moves vertices without a joint.
+        turns: float64[n, 3, 3], rotation from each joint's axes to glTF's.
+        bones: VRM name of a bone -> index of its joint.
+        hooks: joint -> node of the body that becomes its parent; for the root, the node that
+            replaces it.
     """
 
     names: list[str]
@@ -95,7 +97,7 @@ def find_skeleton(
             humanoid.place_of(name, world[found["head"]], world[trunk]) if made else world[own]
         )
         turns.append(humanoid.turn_of(name) if is_turned else np.eye(3))
-    # for joints that follow none of the bones
+    # Joints of the file that are below no exported bone move with this joint.
     rest = number.get(humanoid.parent_of("neck", bones), 0)
     return Skeleton(
         [ROOT.get(kind, "Root"), *(humanoid.BONES[name].node for name in bones)],

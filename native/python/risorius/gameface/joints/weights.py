@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joints of a vertex that every client takes."""
+"""Reduces skin weights to the number of joints per vertex that all glTF viewers support."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ INFLUENCES = 4
 
 
 def strongest(dense: Doubles) -> tuple[Ints, Doubles]:
-    """int64 and float64[V, INFLUENCES]: joints and shares of 1, in steps of 1 / 255.
+    """int64[V, INFLUENCES], float64[V, INFLUENCES]: the strongest joints and their weights.
+
+    Weights are multiples of 1 / 255 and add up to 1.
 
     Args:
-        dense: float64[V, joints], INFLUENCES joints or more; each row has a weight above 0.
+        dense: float64[V, joints], all weights, for at least INFLUENCES joints; each vertex has a
+            weight above 0.
     """
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(dense, joints, axis=1)

@@ -38,7 +38,7 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
         column: from 1, or its header, for errors.
 
     Raises:
-        AnimationFileError: another form, 60 minutes or seconds.
+        AnimationFileError: not of this form; more than 23 hours, 59 minutes or 59 seconds.
     """
     match = _FORM.fullmatch(text.strip())
     if match is None:
@@ -62,8 +62,9 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 def infer_base(codes: Sequence[Timecode]) -> int | None:
     """Frames per second that the timecodes count, or None if it cannot be inferred.
 
-    A rate measured from the timecodes wins. If they never reach the next second, or lost too many
-    rows around it, the largest frame number decides, provided that only one usual rate fits it.
+    A rate measured from the timecodes wins. It cannot be measured if the timecodes never reach the
+    next second, or if too many rows are lost around each new second. Then the largest frame number
+    decides, provided that only one usual rate fits it.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
@@ -75,7 +76,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # At 60 frames per second, a take of 2 s would have frame numbers above 29.
+    # A take of 2 s without frame numbers above 29 has 30 frames per second, not 60.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -84,10 +85,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """Infers the base from the drop of the frame number at each new second, or None.
+    """Infers the frames per second from the frame number's drop at each new second, or None.
 
-    The frame number then drops by the base minus one step. Lost rows make it drop by less, so that
-    an unusual base is accepted only if several drops agree or no rows are lost.
+    The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
+    unusual rate is accepted only if several drops agree or no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -108,7 +109,7 @@ def _measured(
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
-    """Seconds of each timecode since midnight before the first; later midnights are counted.
+    """Seconds from the midnight before the first timecode to each timecode, also over midnights.
 
     Args:
         codes: from `parse`, in the order of the frames.
@@ -124,8 +125,8 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by more than 12 hours is midnight; smaller ones are rows out of order, and are
-    # kept.
+    # A step back by more than 12 hours is midnight. A smaller step back is a row out of order, and
+    # its time is not changed here.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

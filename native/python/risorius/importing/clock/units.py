@@ -39,32 +39,34 @@ _WORDS = (
     "unixtime unixtimestamp frametime sampletime"
 ).split()
 _FRAME_NUMBERS = "frame frames framenumber frameindex frameid frameno framenr".split()
-# Units that are a header on their own, because they are not names of curves or mouth shapes.
+# Units that are recognised as a whole header. Other units, such as "h", could be the name of a
+# curve or a mouth shape.
 _ALONE = "s sec secs second seconds ms msec millis milliseconds us microseconds nanoseconds".split()
 _NAMES: dict[str, str] = {
     **{word + unit: of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    # last, so that "times" does not mean "time" in the unit "s"
+    # These entries are last and replace earlier ones: "times" is not "time" with the unit "s".
     **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
-# Texts in brackets after a frame number that are no unit.
+# Texts in brackets in the header of frame numbers, as in "frame (no)", that are no unit of time.
 _NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
 _BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
-# Times without a unit are seconds if their median step is at most this number, because keys can be
-# 4 s apart. Larger steps are ms, us or ns if they are usual steps (_STEPS) in that unit.
+# Times without a unit are seconds if their median step is at most this number, because keyframes
+# can be 4 s apart. Larger steps are ms, us or ns if they are usual steps (_STEPS) in that unit.
 _LONGEST_STEP = 4.0
 # Smallest and largest usual step of a capture in milliseconds: 250 and 5 frames per second.
 _STEPS = (4.0, 200.0)
 _LEAST_ROWS = 8  # number of rows from which a unit is inferred from even steps
-# Smallest time since 1970 in each unit: a date after 1973.
+# Unit, and the number above which times in this unit are dates, counted from 1970. Each limit is a
+# date in 1973.
 _DATES = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))
 _LONGEST = 1e8  # seconds; a larger start time is a date
 
 
 class TimeName(NamedTuple):
-    """The unit of time in a header."""
+    """The unit of time that the header of a column names."""
 
     unit: str
     """One of UNITS, FRAMES, or "" if the header names none."""
@@ -73,7 +75,7 @@ class TimeName(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """The caller's options on time; None leaves a value to the file."""
+    """The caller's options on time; None: the value comes from the file."""
 
     rate: float | None = None
     """Frames per second of the file."""
@@ -182,14 +184,14 @@ def seconds_of(
 
 
 def _shown(values: Doubles, name: str, column: str | None) -> str:
-    """Infers the unit from the size and steps of times. Raises: AnimationFileError: none fits."""
+    """Infers the unit of times from their size and steps. Raises: AnimationFileError: none fits."""
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
         if np.isfinite(smallest) and smallest > least:
             return unit
     steps = np.diff(values)
     steps = np.sort(steps[steps > 0.0])
-    # the lower middle, because a single gap may be large
+    # the median step; of two middle steps the smaller one, because the other may be a gap
     step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0
     if step <= _LONGEST_STEP:
         return "s"

@@ -2,7 +2,7 @@
 """Reads glTF meshes packed with Draco (KHR_draco_mesh_compression); needs the package DracoPy.
 
 Vertices are in the order of the packed data. Draco never packs morph targets; the glTF extension
-requires writers to keep their vertices in the same order.
+requires that the vertices of morph targets are in the same order.
 """
 
 from __future__ import annotations

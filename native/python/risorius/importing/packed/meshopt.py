@@ -72,8 +72,8 @@ def packing_of(view: Mapping[str, Any]) -> Packing | None:
 def unpacked(packed: bytes, packing: Packing) -> bytes:
     """The packing.size bytes of a buffer view, unpacked.
 
-    packed: the bytes of the buffer.
-        packed: the bytes in the file.
+    Args:
+        packed: the compressed bytes of the buffer view.
         packing: from packing_of.
 
     Raises:

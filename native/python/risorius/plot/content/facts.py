@@ -18,7 +18,7 @@ from .regions import REGIONS, regions_of
 
 @dataclass(frozen=True)
 class Lod:
-    """One LOD: number of joints per region, and numbers of evaluated parts."""
+    """One LOD: joints per region, and numbers of coefficients, channels and maps evaluated."""
 
     joints: dict[str, int]
     coefficients: int

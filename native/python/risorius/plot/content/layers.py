@@ -33,7 +33,7 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of the file. `key` is its four letters in the index table, or empty."""
+    """A part of the file. `key` is a layer's four-letter code in the file's index, else ""."""
 
     key: str
     title: str
@@ -43,7 +43,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """Numbers of network controls, RBF poses and networks, which newer layers state."""
+    """Numbers that only the layers of newer files state: network controls, RBF poses, networks."""
 
     ml_controls: int
     rbf_poses: int
@@ -74,7 +74,7 @@ class _Bytes:
         return count
 
     def skip_list(self, depth: int) -> None:
-        """Skips a list of u16 if depth is 1, else a list of lists one level less deep."""
+        """Skips lists of u16. Args: depth: 1 for a list of u16, 2 for a list of such lists."""
         count = self.u32()
         if depth == 1:
             self.skip(2 * count)

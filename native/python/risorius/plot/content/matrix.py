@@ -40,7 +40,7 @@ class Block:
 
 
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
-    """The region of each joint group: the region of most joints that it moves.
+    """The region of each joint group: the region to which most joints of the group belong.
 
     Args:
         dna: the face.
@@ -55,10 +55,15 @@ def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
 
 
 def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
-    """(rows, columns) that contain all coefficients of dna; at least 9 per joint and `controls`."""
+    """(rows, columns) of a matrix that contains all coefficients of the joint groups.
+
+    Args:
+        dna: the face; the matrix has at least 9 rows per joint.
+        controls: smallest number of columns.
+    """
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
-        # Converted to 64 bits, because -1 as an unsigned 16-bit number would be 65,535.
+        # Indices are converted to 64 bits, because `initial`, -1, would be 65,535 in 16 bits.
         rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
         columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
     return rows, columns

@@ -71,5 +71,5 @@ def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]
-    # "other" is the result only if no joint has a named region.
+    # The last of REGIONS, "other", does not take part in the vote.
     return max(named, key=lambda region: votes[region]) if named else "other"

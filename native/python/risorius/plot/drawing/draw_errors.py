@@ -49,7 +49,7 @@ def colors(errors: Floats, most: float) -> Floats:
 
 
 def height(count: int, width: float) -> float:
-    """The height in inches that the pictures need.
+    """Height in inches of the drawing of several expressions.
 
     Args:
         count: number of expressions.

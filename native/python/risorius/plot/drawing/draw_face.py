@@ -18,7 +18,8 @@ from .paper import MUTED, Canvas, heading, rgb
 
 Floats = npt.NDArray[np.float64]
 
-# Names of transparent films and hair, which would hide the face because they are drawn opaque.
+# Beginnings of names of meshes that are left out: films and hair would hide the face,
+# because the renderer draws everything opaque.
 _FILMS = (
     "eyeshell",
     "cornea",
@@ -65,7 +66,7 @@ def scene(facts: Facts, lod: int) -> Scene:
 
 
 def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]]:
-    """Names and meshes of a LOD without transparent films, unless it has nothing else."""
+    """Names and meshes of a LOD, without films and hair; all meshes if no others remain."""
     wanted = listed(dna.lod_mesh_mapping, lod).tolist()
     found = [(dna.mesh_names[i], dna.meshes[i]) for i in wanted if i < len(dna.meshes)]
     solid = [(name, mesh) for name, mesh in found if not name.lower().startswith(_FILMS)]
@@ -102,7 +103,7 @@ def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
     if not len(seen.joints) and not len(seen.shape.triangles):
         canvas.say("This file has neither meshes nor joints.")
         return
-    # The face looks to the left of the side view.
+    # In the side view, the face looks to the left.
     side = _turned(seen, np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], float))
     frames = [frame_of(seen), frame_of(side)]
     bottom, top = min(f[2] for f in frames), max(f[3] for f in frames)
@@ -135,7 +136,7 @@ def _words(seen: Scene) -> str:
 
 
 def frame_of(seen: Scene) -> tuple[float, float, float, float]:
-    """(left, right, bottom, top) that contain the meshes, and the joints near them."""
+    """(left, right, bottom, top) of a frame around the meshes and the joints near the meshes."""
     used = seen.shape.points[np.unique(seen.shape.triangles)]
     joints = seen.joints[seen.shown]
     if len(used):

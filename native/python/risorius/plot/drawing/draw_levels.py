@@ -17,7 +17,7 @@ _HEAD = 0.62  # inches above a picture, for its title
 
 
 def height(count: int, width: float) -> float:
-    """The height in inches that the pictures need.
+    """Height in inches of the drawing of several LODs.
 
     Args:
         count: number of LODs.

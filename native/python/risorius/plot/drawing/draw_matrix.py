@@ -78,7 +78,7 @@ def _draw_kinds(axes: Axes, facts: Facts, columns: int) -> None:
     for edge in edges[1:-1]:
         axes.axvline(edge, color=INK, linewidth=0.9)
     for title, count in kinds:
-        # A kind with too few columns has no name.
+        # The name of a kind with few columns would overlap its neighbours, so it is left out.
         if count > 0.12 * columns:
             axes.annotate(
                 title, (at + count / 2, 0), (0, -20), axes.get_xaxis_transform(), "offset points",

@@ -57,7 +57,7 @@ def settings() -> Iterator[None]:
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
-        # For letters that the font lacks a box is drawn, without a warning.
+        # Matplotlib draws a box for a letter that the font lacks; it should not warn as well.
         warnings.filterwarnings("ignore", "Glyph")
         log.setLevel(logging.ERROR)
         try:
@@ -73,7 +73,7 @@ def rgb(region: str) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Canvas:
-    """A figure, or a part of one, and its size in inches, in which drawings measure distances."""
+    """A figure, or a part of one, with its size in inches. Drawings place their axes in inches."""
 
     figure: FigureBase
     width: float
@@ -83,7 +83,7 @@ class Canvas:
         """Adds axes that show only their lower and left line.
 
         Args:
-            left, bottom: lower left corner of the axes, in inches from that of the canvas.
+            left, bottom: lower left corner of the axes, in inches from the canvas's corner.
             width, height: size of the axes in inches.
         """
         part = (left / self.width, bottom / self.height, width / self.width, height / self.height)

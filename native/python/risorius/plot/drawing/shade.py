@@ -26,8 +26,11 @@ _BATCH = 1 << 20  # pixels per batch, which limits the memory to about 150 MB
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles with points and normals in view axes. paint: float64[V], a lightness with 1 for
-    clay, or float64[V, 3], a colour; both are multiplied by the clay's colour."""
+    """Triangles to render, with points and normals in view axes.
+
+    paint: float64[V], a lightness per vertex, 1 for plain clay, or float64[V, 3], a colour. The
+    colour of clay is multiplied by it.
+    """
 
     points: Floats
     normals: Floats
@@ -157,7 +160,7 @@ def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tupl
 
 
 def _slopes(corners: Floats) -> Floats:
-    """float64[F, 3, 3]: a, b, c of each corner's weight a x + b y + c; NaN for slivers."""
+    """float64[F, 3, 3]: a, b, c of a corner's barycentric weight a x + b y + c; NaN for slivers."""
     ahead, behind = np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
     along = ahead[:, :, 1] - behind[:, :, 1]
     across = behind[:, :, 0] - ahead[:, :, 0]
@@ -170,7 +173,7 @@ def _slopes(corners: Floats) -> Floats:
 def _rows(
     screen: Floats, triangles: Ints, slopes: Floats, size: tuple[int, int]
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """The rows of pixels of all triangles: triangle, y, first x, number of pixels of each."""
+    """The rows of pixels of all triangles: triangle, y, first x and number of pixels per row."""
     high, wide = size
     y = screen[triangles, 1]
     first = np.clip(np.ceil(y.min(axis=1, initial=high)), 0, high).astype(np.int64)
@@ -187,7 +190,7 @@ def _rows(
         low = np.where(along > 0, np.maximum(low, edge), low)
         end = np.where(along < 0, np.minimum(end, edge), end)
         end = np.where((along == 0) & (rest < -1e-9), -1.0, end)
-    # Extends slightly beyond the edge, so that no gap opens between adjacent triangles.
+    # Each row extends by 1e-6 pixels beyond the edge, so that adjacent triangles leave no gap.
     low = np.ceil(np.minimum(low, wide) - 1e-6).astype(np.int64)
     pixels = np.floor(np.maximum(end, -1) + 1e-6).astype(np.int64) - low + 1
     kept = pixels > 0

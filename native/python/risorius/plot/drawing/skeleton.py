@@ -78,7 +78,8 @@ def world_positions(dna: risorius.Dna) -> Floats:
     positions, turns = _rows(dna.neutral_joint_translations, len(above)), rotations(dna)
     done = above == np.arange(len(above))
     while not done.all():
-        # All joints of one generation together, because a face's hierarchy is wide and shallow.
+        # All joints at the same depth are computed at once. This takes few rounds, because a face's
+        # hierarchy is wide and shallow.
         ready = ~done & done[above]
         if not ready.any():
             break  # parents form a cycle: their joints keep local positions
