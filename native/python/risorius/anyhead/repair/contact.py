@@ -222,17 +222,19 @@ class Contacts:
             return deepest, out
         for solid, triangles in zip(posed, self.bodies.triangles, strict=True):
             tree = ClosestPoints(solid, np.ascontiguousarray(triangles, np.int32))
-            triangle, shares, distance = tree.nearest(points)
+            found, shares, distance = tree.nearest(points, farthest=_INSIDE)
+            near = np.flatnonzero(found >= 0)
+            triangle, shares, distance = found[near].astype(np.int64), shares[near], distance[near]
             surface = Surface(solid, triangles)
             normals = surface.normals()[triangles[triangle]]
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-            arm = points - surface.at(triangle.astype(np.int64), shares)
+            arm = points[near] - surface.at(triangle, shares)
             # Excludes points next to the open border of gums, because these points are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
-            deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
-            deepest[deeper], out[deeper] = distance[deeper], normal[deeper]
+            deeper: Mask = inside & (distance > deepest[near])
+            deepest[near[deeper]], out[near[deeper]] = distance[deeper], normal[deeper]
         return deepest, out
 
 
