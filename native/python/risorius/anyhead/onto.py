@@ -49,7 +49,7 @@ FIT_VERTICES = 12_000  # joints are fitted to a head simplified to this, see Rig
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
 # Progress after each step, 0 to 1.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.8
-_COMPLETE, _WHOLE, _MENDED = 0.83, 0.85, 0.97
+_COMPLETE, _WHOLE, _MENDED, _JOINED = 0.83, 0.85, 0.97, 0.99
 
 
 @dataclass(frozen=True)
@@ -140,12 +140,12 @@ def onto(
     del carried
     mended = _mended(target, fitted, head, ways, o, _part(progress, _WHOLE, _MENDED), tell)
     del ways
-    every = head_parts(fitted, _of_length(mended, single=True), _part(progress, _MENDED, 1.0))
+    every = head_parts(fitted, _of_length(mended, single=True), _part(progress, _MENDED, _JOINED))
     every[0].shapes.update(_of_length(mended, single=False))
     names = {name: [name] for name in source.controls}
     unchanged = Wishes(mesh=every[0].source)
     joining = partial(join, where, every, "cm", unchanged, names, stands=True)
-    joined = patiently(joining, lambda: _at(progress, 1.0))
+    joined = patiently(joining, lambda: _at(progress, _JOINED))
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
     joint = head.found.pose.place(_JOINT)[0]

@@ -217,7 +217,8 @@ class Made:
         _set_skin(made, rows)
         self.meshes.append(made)
         if self.whole:
-            options = replace(self.options, shapes=False)
+            between = self.options.between and wanted.small
+            options = replace(self.options, shapes=False, between=between)
             (part,) = split_mesh(mesh, [at])
             _, left = _finish_mesh(self.ways, part, rows[at], own, options)
             left.name, left.lod, left.vertices = name, lod, len(kept)

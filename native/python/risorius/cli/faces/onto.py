@@ -173,6 +173,7 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     lend_materials(made.shapes.parts, template, path, {part.source for part in parts})
     clock.line("making a face of blend shapes")
     read = shape_face(made, template, str(args.onto), clock)
+    clock.line("making joints, skin weights and shapes")
     return replace(read, odd=made.notes + read.odd), files
 
 
