@@ -8,14 +8,13 @@ from risorius.author import (
     FitOptions,
     LodOptions,
     RigOptions,
-    fewer,
     make_joint_rig,
     meshes,
 )
-from risorius.author import wanted as wanted_module
 from risorius.author.correctives import add_correctives
-from risorius.author.geometry import blocks, sparse
+from risorius.author.geometry import blocks, fewer, sparse
 from risorius.author.geometry import skeleton as sk
+from risorius.author.geometry import wanted as wanted_module
 from risorius.author.input import shape_face
 from risorius.author.measure import posed_meshes
 from support import face_shapes

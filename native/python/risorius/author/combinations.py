@@ -18,9 +18,9 @@ import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
 from ..rigs.rotation import Convention
-from .fewer import Fewer
 from .geometry import skeleton as sk
 from .geometry.blocks import blocks_of, joined_targets, split_mesh
+from .geometry.fewer import Fewer
 from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
@@ -119,7 +119,7 @@ class _Skin:
 class Combinations:
     """The correctives of a face, sorted by the number of their controls."""
 
-    def __init__(self, work: Work, options: RigOptions, fewer: Fewer | None = None) -> None:
+    def __init__(self, work: Work, options: RigOptions, fewer: Fewer[Work] | None = None) -> None:
         """Prepare the solution.
 
         Args:

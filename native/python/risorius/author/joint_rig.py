@@ -18,12 +18,13 @@ from ..base.errors import ArgumentError
 from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
 from .combinations import Combination, Combinations
-from .fewer import fewer_vertices
 from .fitting import FitOptions, Progress, fit_joints
 from .geometry import skeleton as sk
 from .geometry.blocks import LARGE
+from .geometry.fewer import fewer_vertices
 from .geometry.simplify import Floats
 from .geometry.skeleton import Doubles
+from .geometry.wanted import Wanted, joined_displacements
 from .level_meshes import LevelMeshes, level_meshes
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .lighter import Lightened, deltas_of, within_deltas
@@ -32,7 +33,6 @@ from .naming import joint_names
 from .parents import choose_parents, joint_motions, room_for_second, second_joints
 from .pivots import Pivot, find_pivots
 from .reference import Reference, reference_of, refit
-from .wanted import Wanted, joined_displacements
 from .work import (
     MM,
     Joints,

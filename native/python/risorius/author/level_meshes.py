@@ -12,10 +12,10 @@ import numpy as np
 from .. import Mesh, _native
 from ..base.patience import patiently
 from .geometry.blocks import LARGE
-from .geometry.simplify import Floats, attributes_of, fan_triangles, fewer_triangles, pieces_of
+from .geometry.simplify import Floats, fan_triangles, fewer_triangles, pieces_of
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted, known_attributes
 from .levels import LodOptions, mesh_budget, vertex_budgets
-from .wanted import Wanted
 from .work import Work, listed_meshes
 
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
@@ -98,20 +98,6 @@ def level_meshes(
         out.triangles |= made
         out.count = lod + 1
     return out
-
-
-def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats:
-    """The attributes of a mesh for the simplification, computed at the first use.
-
-    Args:
-        known: mesh -> attributes.
-        m: the mesh.
-        wanted: its displacements.
-    """
-    if m not in known:
-        some = wanted.at(wanted.evenly())
-        known[m] = attributes_of(wanted.mesh, some, wanted.blocks())
-    return known[m]
 
 
 class _Skin:

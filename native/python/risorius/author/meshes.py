@@ -11,17 +11,17 @@ import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
 from .between import Between, Ways
-from .fewer import Fewer
 from .geometry import skeleton as sk
 from .geometry.blocks import LARGE, SparseWeights, joined_targets, split_mesh
+from .geometry.fewer import Fewer
 from .geometry.simplify import simplified
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted
 from .level_meshes import LevelMeshes
 from .level_weights import inherited, level_weights
 from .levels import level_name
 from .lighter import count_deltas
 from .reference import Reference
-from .wanted import Wanted
 from .work import (
     MM,
     Level,
@@ -47,7 +47,7 @@ class Made:
         like: Reference | None = None,
         *,
         whole: bool = True,
-        fewer: Fewer | None = None,
+        fewer: Fewer[Work] | None = None,
         go_on: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare an empty list of meshes.

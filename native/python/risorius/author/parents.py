@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .geometry.skeleton import Doubles, Ints, matrices_of_vectors
-from .wanted import Wanted
+from .geometry.wanted import Wanted
 from .work import (
     Joints,
     Work,

@@ -24,7 +24,7 @@ from .fitting import fit_motions
 from .geometry import skeleton as sk
 from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
-from .wanted import Wanted, joined_displacements
+from .geometry.wanted import Wanted, joined_displacements
 from .work import Joints, RigOptions, Work, given, joined_positions
 
 _FORMAT = 2

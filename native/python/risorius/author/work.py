@@ -16,9 +16,9 @@ from .fitting import FitOptions, JointFit
 from .geometry import skeleton as sk
 from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted
 from .levels import LodOptions
 from .pivots import Pivot
-from .wanted import Wanted
 
 MM = {"cm": 10.0, "m": 1000.0}
 # Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than

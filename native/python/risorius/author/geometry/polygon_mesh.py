@@ -32,8 +32,6 @@ def polygon_mesh(
         uv_faces: indices into `uvs` of each polygon's corners.
     """
     sizes = np.fromiter(map(len, faces), np.int64, len(faces))
-    if [len(face) for face in uv_faces] != sizes.tolist():
-        raise ValueError("faces and uv_faces of equal sizes were expected")
     vertices, places = (
         np.fromiter(itertools.chain.from_iterable(of), np.int64, int(sizes.sum()))
         for of in (faces, uv_faces)

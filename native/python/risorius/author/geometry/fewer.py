@@ -7,19 +7,19 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Generic, TypeVar
 
 import numpy as np
 
-from .. import Dna, Mesh, _native
-from ..base.patience import patiently
-from .geometry import skeleton as sk
-from .geometry.blocks import SparseWeights, split_mesh
-from .geometry.simplify import Floats, fan_triangles, fewer_triangles, simplified
-from .geometry.skeleton import Doubles, Ints
-from .level_meshes import known_attributes
-from .wanted import Wanted
-from .work import Work
+from ... import Dna, Mesh, _native
+from ...base.patience import patiently
+from . import skeleton as sk
+from .blocks import SparseWeights, split_mesh
+from .simplify import Floats, fan_triangles, fewer_triangles, simplified
+from .skeleton import Doubles, Ints
+from .wanted import Face, Wanted, known_attributes
 
+F = TypeVar("F", bound=Face)
 _SMALL = 2000  # vertices: smaller meshes are not simplified
 _FACING = 0.4  # least cosine between the normals of a vertex and of its place when simplified
 
@@ -59,7 +59,7 @@ class Simplified:
 
 
 @dataclass
-class Fewer:
+class Fewer(Generic[F]):
     """A face for the fit of joints, whose large meshes are simplified.
 
     Attributes:
@@ -69,21 +69,21 @@ class Fewer:
         made: the simplified meshes with weights on the new joints; empty before these are known.
     """
 
-    work: Work
+    work: F
     wanted: dict[int, Wanted]
     meshes: dict[int, Simplified]
     made: dict[int, Mesh] = field(default_factory=dict)
 
 
 def fewer_vertices(
-    work: Work,
+    work: F,
     shaped: Sequence[int],
     wanted: Mapping[int, Wanted],
     most: int,
     attributes: dict[int, Floats],
     levels: Mapping[tuple[int, int], Ints],
     go_on: Callable[[], None],
-) -> Fewer | None:
+) -> Fewer[F] | None:
     """Simplify meshes for the fit of joints. Returns None if they have few vertices.
 
     Args:

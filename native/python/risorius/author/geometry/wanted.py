@@ -4,17 +4,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .. import Mesh
-from .geometry import skeleton as sk
-from .geometry.blocks import LARGE, blocks_of, split_mesh
-from .geometry.skeleton import Doubles, Ints
+from ... import Dna, Mesh
+from . import skeleton as sk
+from .blocks import LARGE, blocks_of, split_mesh
+from .simplify import Floats, attributes_of
+from .skeleton import Doubles, Ints
 
-if TYPE_CHECKING:
-    from .work import Work
+
+class Face(Protocol):
+    """The part of author.work.Work that the displacements depend on."""
+
+    source: Dna
+    columns: list[int]
+    motions: Doubles
 
 
 class Block(NamedTuple):
@@ -46,7 +52,7 @@ class Wanted:
             one coordinate.
     """
 
-    def __init__(self, work: Work, mesh: Mesh, go_on: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, work: Face, mesh: Mesh, go_on: Callable[[], None] = lambda: None) -> None:
         """Look at all displacements once.
 
         Args:
@@ -111,7 +117,7 @@ class Wanted:
         return np.arange(0, len(self), -(-len(self) // LARGE) if len(self) else 1)
 
 
-def _by_joints(work: Work, block: Block) -> float:
+def _by_joints(work: Face, block: Block) -> float:
     positions = np.asarray(block.mesh.positions, np.float64)
     weights = sk.dense_weights(block.mesh, len(work.source.joint_names))
     far = 0.0
@@ -124,7 +130,7 @@ def _by_joints(work: Work, block: Block) -> float:
     return far
 
 
-def displacements(work: Work, mesh: Mesh) -> Doubles:
+def displacements(work: Face, mesh: Mesh) -> Doubles:
     """float64[C, V, 3]: displacement of the vertices with each input at 1.
 
     Args:
@@ -155,3 +161,17 @@ def joined_displacements(wanted: Mapping[int, Wanted], meshes: Sequence[int]) ->
     """
     every = [wanted[m].at(np.arange(len(wanted[m]))) for m in meshes]
     return np.concatenate(every, axis=1)
+
+
+def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats:
+    """The attributes of a mesh for the simplification, computed at the first use.
+
+    Args:
+        known: mesh -> attributes.
+        m: the mesh.
+        wanted: its displacements.
+    """
+    if m not in known:
+        some = wanted.at(wanted.evenly())
+        known[m] = attributes_of(wanted.mesh, some, wanted.blocks())
+    return known[m]
