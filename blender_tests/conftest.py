@@ -33,7 +33,7 @@ def installed():
 def kept_wheels():
     """Keep the files of wheels, which Blender deletes when an extension is disabled.
 
-    Unpacking them again takes longer than most tests; test_extension.py tests it in other
+    Unpacking them again takes longer than most tests; test_extension.py tests the deletion in other
     processes.
     """
     import addon_utils
@@ -102,9 +102,9 @@ def _repository(installed):
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or posed bones with real keys.
+    """The mode of the face: Direct mode, or posed bones with a shape key for each channel.
 
-    Test files about frames replace this fixture and add the mode with one live key.
+    Test files about frames replace this fixture and add the mode with one live shape key.
     """
     return request.param
 

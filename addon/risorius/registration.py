@@ -108,7 +108,9 @@ def _window_properties() -> dict[str, object]:
         "risorius_search": bpy.props.StringProperty(
             name="Search",
             translation_context=tables.CONTEXT,
-            description="Show only the controls with these words: smile, open mouth, kiss, frown",
+            description=(
+                "Show only the controls with these words, such as smile, open mouth, kiss or frown"
+            ),
             options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
         ),
         "risorius_only_used": bpy.props.BoolProperty(

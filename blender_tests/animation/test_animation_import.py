@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clips become actions, strips or layers of the controls at any rate, and are exported again."""
+"""Tests that clips are imported as actions, strips or layers, and exported again, at any rate."""
 
 import hashlib
 import importlib.util
@@ -247,7 +247,7 @@ EXPECTED = (JAW, PULL, BROW, "CTRL_expressions.eyeLookUpL")
 
 @pytest.fixture
 def capture(tmp_path):
-    """A take in Live Link Face's form, with one lost row.
+    """A CSV file in the format of Live Link Face, with one lost row.
 
     It has 30 rows per second; its timecodes count 60 frames per second.
     """
@@ -298,8 +298,8 @@ def test_a_capture_lands_on_whole_frames_of_the_scene(rig, capture, fps, fps_bas
         assert np.array_equal(frames, np.rint(frames))
         assert (np.diff(frames) > 0).all()
         assert len(frames) <= 2 * 39
-    # At whole frames the curve equals straight lines between the rows of the file; it is constant
-    # outside.
+    # At whole frames the jaw's F-curve equals straight lines between the rows of the CSV file.
+    # Before the first row and after the last row it is constant.
     rows = np.array([0, 1, 2, 4, *range(5, 40)])
     jaw = next(c for c in curves if "jawOpen" in c.data_path)
     for frame in range(-1, int(40 / 30 * fps) + 3):
@@ -565,7 +565,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 
 def _gives_the_face_back(rig, last):
-    """Check that the face follows its sliders before and after a voice."""
+    """Check that the face shows the slider values before and after, but not during a voice."""
     scene.set_controls(rig, mouthCornerPullL=0.6)
     present = scene.submodule("scene.see_why.present")
     shown = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of animation on a face: it shows the values of risorius.Mixer and of Blender's NLA."""
+"""Tests that a face with layers of animation shows the values of risorius.Mixer and of the NLA."""
 
 import bpy
 import numpy as np
@@ -306,7 +306,7 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
 
 
 def _key_weights(controls, name, *values):
-    """An action with a key for the weight of each layer, which no object plays."""
+    """An action that no object uses, with a keyframe for the weight of each layer."""
     data = controls.animation_data_create()
     data.action = action = bpy.data.actions.new(name)
     for place, value in enumerate(values):
@@ -659,7 +659,7 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
 def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
     """A catalogue file is replaced, not rewritten, so that other readers never see half of it.
 
-    It keeps its old catalogues, and stays a link if it is a link.
+    The file keeps its old catalogues. If it is a symbolic link, it remains one.
     """
     shared, link = tmp_path / "shared.txt", tmp_path / "blender_assets.cats.txt"
     old = "VERSION 1\n\n6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a12:Props:Props\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh with the vertices of a face, moved in any way, gives curves of the face's controls."""
+"""Tests that a moving mesh with the vertices of a face gives curves of the face's controls."""
 
 import bpy
 import numpy as np

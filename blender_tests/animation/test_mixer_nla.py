@@ -29,7 +29,7 @@ def new_curve(action, path, index=0):
 
 
 def keys(curve, frames, values):
-    """Replace all keys of a curve by linear keys."""
+    """Replace all keyframes of an F-curve by linear keyframes."""
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     pairs = np.column_stack([frames, values]).ravel()
@@ -207,7 +207,7 @@ STACKS = {
         ),
     ],
 }
-# Strip number -> channels that it lacks, which is the mask of its layer.
+# Strip number -> channels that the strip's action lacks. The mask of its layer excludes them too.
 LACKS = {2: ("b",), 3: ("a", "d")}
 
 

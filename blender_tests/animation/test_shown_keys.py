@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a face are visible in Blender's animation editors, which show only selected items."""
+"""Tests that keyframes of a face are visible in editors that show only selected items."""
 
 import bpy
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a voice: the fewest that its curves need, or one on every frame if chosen."""
+"""Tests keyframes made from speech: the fewest that its curves need, or one on every frame."""
 
 import bpy
 import numpy as np
@@ -82,7 +82,7 @@ def test_a_voice_has_as_few_keys_as_its_curves_need(rig):
 
 
 def test_a_layer_shows_the_voice_at_every_frame(rig):
-    """Layers, export and bake read curves with handles as exactly as straight lines."""
+    """Layers, export and bake read F-curves with Bezier handles as exactly as straight lines."""
     wanted = speech.animate(heard(), rate=24.0).curve(JAW)
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers

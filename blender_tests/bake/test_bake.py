@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked faces move like the live ones, by plain actions only, and can be made live again."""
+"""Tests that baked faces move like unbaked faces, by actions only, and can be unbaked."""
 
 import addon_utils
 import bpy

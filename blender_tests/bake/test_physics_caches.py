@@ -77,7 +77,7 @@ def test_each_frame_in_a_process_of_its_own(dna_file, tmp_path):
 
 
 def test_a_render_with_motion_blur_has_the_face_of_every_part_of_a_frame(mode, dna_file, tmp_path):
-    """Tested with cloth: between two frames Blender shows the mean of its places at both."""
+    """Tested with cloth, which Blender interpolates between the places at two whole frames."""
     _face, item = _baked(dna_file, mode)
     setup, seen = bpy.context.scene, {}
     setup.render.engine, setup.cycles.samples, setup.cycles.device = "CYCLES", 1, "CPU"

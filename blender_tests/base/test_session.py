@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Session entries are emptied by the events that they name."""
+"""Tests that each entry of the add-on's session is emptied by the events that it names."""
 
 import ctypes
 import gc

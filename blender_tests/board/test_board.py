@@ -19,7 +19,8 @@ GUI = [
     "CTRL_L_eye.ty",
     "CTRL_L_brow.ty",
 ]
-# input, output, from, to, slope, cut: a bent line, both halves of axes, a range in degrees
+# Rows (input, output, from, to, slope, cut) of the GUI table. Input 0 has two rows with different
+# slopes, inputs 3 and 4 drive different outputs up and down, and input 5 is in degrees.
 ROWS = [
     (0, 0, 0.0, 0.5, 0.5, 0.0),
     (0, 0, 0.5, 1.0, 1.5, -0.5),
@@ -70,7 +71,10 @@ def put(rig, **places):
 
 
 def raw_by_rows(gui, count=11):
-    """Raw controls from ROWS; of rows with one input and output, the first matching row counts."""
+    """Raw controls computed from ROWS.
+
+    Of rows with the same input and output, only the first whose range contains the input counts.
+    """
     raw, done = np.zeros(count), set()
     for control, out, low, high, slope, cut in ROWS:
         value = gui.get(GUI[control], 0.0)

@@ -50,7 +50,7 @@ def _corners(item):
 
 @pytest.fixture
 def window(monkeypatch):
-    """Make the import behave as in a window."""
+    """Make the import behave as in a Blender with a window, although the test has none."""
     fake = SimpleNamespace(app=SimpleNamespace(background=False))
     monkeypatch.setattr(scene.submodule("ui.file.import_operators"), "bpy", fake)
 

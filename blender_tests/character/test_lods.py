@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Levels of detail: chosen for viewport and renders, or by distance.
 
-They are combined with objects that the user hides.
+Objects that the user hides stay hidden at every level.
 """
 
 import bpy

@@ -60,7 +60,7 @@ def _pose(rig, bone, turn):
 
 
 def _wanted(dna, neck=None, head=None, **sliders):
-    """The channels that the evaluator gives for rotations about the armature's axes."""
+    """Blend shape channel values for rotations of neck and head about the armature's axes."""
     rig = risorius.Rig(dna)
     raw = rig.initial_raw_controls.copy()
     names = list(rig.raw_control_names)

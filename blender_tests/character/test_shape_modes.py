@@ -130,7 +130,7 @@ def test_the_order_of_keys_returns(dna_file):
 
 @pytest.mark.parametrize("name", ["jaw", "pull_l"])
 def test_a_moved_basis_does_not_make_keys_edited(dna_file, name):
-    """Edit mode on the basis moves the keys; rounding is no edit of the keys."""
+    """If edit mode moves the basis, other shape keys move too; this does not mark them edited."""
     rig = scene.load(dna_file, "KEYS")
     _move_in_edit_mode(_head(rig), range(0, 100, 3))
     _same_in_both_modes(rig)
@@ -202,7 +202,7 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """Differences between the oracle's vertices with one channel overridden, and Blender's."""
+    """Differences between the oracle's vertices, with one channel at `value`, and Blender's."""
     import risorius
     from support import oracle
 

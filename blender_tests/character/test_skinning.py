@@ -23,7 +23,10 @@ GOLDEN = ROOT / "tests" / "data" / "golden"
 
 @pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or posed bones with one live key or with real keys."""
+    """The mode of the face: Direct mode, or posed bones with one of two kinds of shape keys.
+
+    LIVE has one live shape key per mesh, KEYS has a shape key for each channel.
+    """
     return request.param
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export Game Face: writes the active face as glTF, or reports one sentence."""
+"""Tests that Export Game Face writes the active face as glTF, or an error of one sentence."""
 
 import json
 import struct

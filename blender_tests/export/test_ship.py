@@ -79,7 +79,7 @@ def _partner(points, wanted):
 
 
 def _error(film, wanted):
-    """The largest coordinate difference of two films, as a share of the head's size.
+    """The largest coordinate difference of vertices in all frames, as a share of the head's size.
 
     Imported vertices are matched to the wanted ones at the first frame.
     """

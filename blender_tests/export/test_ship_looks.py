@@ -74,7 +74,8 @@ def _everything():
     """The state that an export must keep: datablocks, users of materials, visibility."""
     kinds = ("objects", "meshes", "scenes", "actions", "shape_keys", "armatures", "images")
     found = {k: sorted(x.name for x in getattr(bpy.data, k)) for k in kinds}
-    # Users of materials only, because 4.2 counts a copied material twice at its images.
+    # Users are compared only for materials, because Blender 4.2 counts a copied material twice as
+    # a user of its images.
     found["materials"] = sorted((x.name, x.users) for x in bpy.data.materials)
     found["layers"] = {m.name: [y.name for y in m.uv_layers] for m in bpy.data.meshes}
     found["slots"] = {o.name: [s.material.name for s in o.material_slots] for o in bpy.data.objects}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Export Web Page writes the face with edits, animation and sound, or reports one sentence."""
+"""Tests that Export Web Page writes the face with edits, animation and sound, or an error."""
 
 import base64
 import gzip
@@ -47,7 +47,7 @@ def test_the_page_holds_what_the_face_does_and_says(dna_file, tmp_path, sound, m
     stage.render.fps = 24
     path = tmp_path / "face.html"
     strips = scene.submodule("scene.base.compat").strips_of(stage)
-    # A Blender without audio support makes no strip; then the page is silent.
+    # A Blender without audio support cannot add a sound strip; then the page has no sound.
     heard = bpy.app.build_options.audaspace
     if heard:
         strips.new_sound("voice", str(sound), 1, 5)

@@ -264,7 +264,7 @@ def test_blenders_own_operators_apply_the_assets(rig):
     controls = posed(rig)
     controls.pose.apply_pose_from_action(action)
     goal = {JAW: joy[JAW], LEFT: joy[LEFT], RIGHT: joy[RIGHT]}
-    # The expression moves no brow of this face, so the asset does not contain the region.
+    # The expression moves no brow of this face, so the asset has no values for the brow region.
     assert values(rig) == pytest.approx({**START, **goal}, abs=1e-6)
     start(rig)
     controls.pose.blend_pose_from_action(action, blend_factor=0.5)
@@ -358,7 +358,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
 
 @pytest.fixture
 def kept(rig):
-    """The folder of pictures, emptied before and after the test."""
+    """The folder with cached pictures of expressions, emptied before and after the test."""
     folder = scene.submodule("scene.expressions.library").own_folder("thumbnails")
     for path in folder.iterdir():
         path.unlink()

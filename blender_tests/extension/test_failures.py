@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad files give one sentence and leave no data behind; a missing wheel gives a sentence."""
+"""Tests that bad files and a missing wheel give an error sentence, and leave no data behind."""
 
 import builtins
 import io
@@ -267,7 +267,7 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
 
 
 def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
-    """Tests the status bar and Esc with the operator's task, without a window."""
+    """Tests the texts of the status bar, and Esc, by running the operator's task without window."""
     import risorius_people as sample
 
     operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character

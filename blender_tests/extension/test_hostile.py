@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hostile files give one sentence; the scene and the memory are as before."""
+"""Tests that hostile files give one error sentence, and leave scene and memory unchanged."""
 
 import gc
 import hashlib

@@ -110,7 +110,7 @@ def _value(what):
 
 
 def _panels():
-    """Draw all panels of the tab whose poll succeeds."""
+    """Draw all panels of the sidebar tab whose poll succeeds."""
     for panel in bpy.types.Panel.__subclasses__():
         ours = getattr(panel, "bl_category", "") == "Risorius" and panel.is_registered
         if ours and getattr(panel, "poll", lambda _context: True)(bpy.context):

@@ -98,7 +98,7 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
 
 
 def _only_these_changed(source, out, step):
-    """Check that three values differ by given distances, and all others not in a bit."""
+    """Check that three vertices differ by multiples of `step`, and that all else is identical."""
     old, new = risorius.load(str(source)), risorius.load(str(out))
     one, two = old.meshes[0], new.meshes[0]
     moved = oracle.to_blender(new, (two.positions.astype(float) - one.positions))
@@ -176,7 +176,7 @@ def test_what_is_not_asked_for_is_not_written(dna_file, tmp_path):
 
 
 def test_a_basis_edit_by_edit_mode_is_no_edit_of_keys(dna_file, tmp_path):
-    """Blender moves the keys and rounds; only the neutral positions may change."""
+    """Blender moves all shape keys along and rounds; only neutral positions may be exported."""
     import bmesh
 
     rig = scene.load(dna_file, "KEYS")
@@ -224,7 +224,8 @@ def test_edited_joints(tmp_path):
         again = scene.load(out)
         for name, matrix in wanted.items():
             got = np.array(again.data.bones[name].matrix_local)
-            # Blender stores a bone as two float32 ends, here 4 cm apart at a height of 1.7 m.
+            # The axes are inexact, because Blender stores the ends of a bone as float32; here they
+            # are 4 cm apart at a height of 1.7 m.
             np.testing.assert_allclose(got[:3, :3], matrix[:3, :3], atol=3e-5)
             np.testing.assert_allclose(got[:3, 3], matrix[:3, 3], atol=1e-6 * size)
         said = next(x for x in _report().splitlines() if x.startswith("Joint FACIAL_L_Eye: "))

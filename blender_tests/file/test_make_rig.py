@@ -16,7 +16,7 @@ _SUPPORT = Path(__file__).parents[2] / "tests" / "python" / "support"
 
 
 def _supporting(name):
-    """Load a module of the package's tests under the name by which others import it."""
+    """Load a module of tests/python/support under the name by which other modules import it."""
     spec = importlib.util.spec_from_file_location(name, _SUPPORT / f"{name}.py")
     sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sys.modules[name])
@@ -69,7 +69,7 @@ def made_face():
 
 
 def shape(item, name):
-    """Vertices with a single key active, without the object's location."""
+    """Vertices of one shape key, with the object's rotation and scale but not its location."""
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)
@@ -234,7 +234,7 @@ def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
 
 @pytest.fixture
 def whole_head():
-    """A head that looks along +Y: teeth with the same keys, eyes, hair, and a distant cube."""
+    """A head that looks along +Y; teeth with the same shape keys; eyes, hair, and a far cube."""
     armature = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     bpy.context.scene.collection.objects.link(armature)
     armature.rotation_euler = (0.0, 0.0, np.pi)

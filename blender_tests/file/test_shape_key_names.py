@@ -115,7 +115,10 @@ def test_what_is_said_is_undone(head):
 
 
 def test_a_picture_shows_where_a_key_moves_the_head(head):
-    """A picture shows the motion for any orientation; the sample man shows the assignment."""
+    """The picture of a shape key colours moved vertices, whatever the head's orientation.
+
+    A picture of the sample man shows the expression to which the key is assigned.
+    """
     _SAY(becomes="jawOpen")
     shown = scene.submodule("scene.shape_keys.pictures")
     head.rotation_euler.z = np.pi / 2

@@ -17,7 +17,7 @@ NOISELESS = 1.01 / 255
 
 @pytest.fixture(params=["AUTO", "KEYS"])
 def mode(request):
-    """The mode of the face: Direct mode, or posed bones with real keys."""
+    """The mode of the face: Direct mode, or posed bones with a shape key per channel."""
     return request.param
 
 

@@ -77,8 +77,8 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-# How far a strand may leave its card: in widths of a card, in rows of 2 cm, and the distance in
-# metres by which tips separate along each axis.
+# How far strands may leave their cards: ASIDE in widths of a card, ALONG in rows of a card (2 cm).
+# APART is the additional distance of the tips of strands in any direction, in metres.
 ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
 
 
@@ -204,8 +204,8 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis of a coil is straight, like the card; its inclination and its distance from other
-        # axes are smaller than the coil.
+        # The axis of a coil is nearly parallel to the straight card, so that the radius is measured
+        # from the mean of the coil's points.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000
         assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS

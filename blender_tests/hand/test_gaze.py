@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes that look at a target, with lids; blinks; rotations of a body."""
+"""Tests eyes that look at a target, lids that follow them, blinks, and rotations of a body."""
 
 import math
 
@@ -213,7 +213,7 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A rotated body with base, neck and head bones at the places of the face's."""
+    """A rotated body with base, neck and head bones at the places of the face's bones."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)

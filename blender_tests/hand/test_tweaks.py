@@ -255,7 +255,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """Rotations are keyed by I or auto-key, or not before the frame changes; a bake has them."""
+    """Rotations go into the tweak with and without keyframes, and a bake contains them."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)
@@ -385,7 +385,7 @@ def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):
-    """After an import all keys of a take are selected, so such a selection is ignored."""
+    """A selection of all keys is not proposed as range, because an import selects all keys."""
     proposed = scene.submodule("ui.hand.operators").proposed_range
     points = scene.curves(scene.controls(rig))[0].keyframe_points
     for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):

@@ -41,7 +41,7 @@ def test_our_words_have_a_context_of_their_own(german):
 
 
 def test_properties_that_blenders_types_get_have_the_context_too():
-    """Properties of Blender's own types need the context too, so that texts are found."""
+    """Our properties on Blender's types need the translation context, or they stay English."""
     ours = [
         prop
         for kind in (bpy.types.Object, bpy.types.WindowManager, bpy.types.Scene)

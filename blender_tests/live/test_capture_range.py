@@ -164,7 +164,7 @@ def test_live_capture_follows_the_range_and_teaches_it(rig, rom):
     assert jaw.keyframe_points[1].co[1] == 1.0
     with pytest.raises(RuntimeError, match="a take of at least 2 s was expected"):
         bpy.ops.risorius.learn_range_live()
-    # The stored values are as received, without the earlier range.
+    # Learning uses the received values, before they are rescaled by the earlier range.
     session, frame = session_of(rig), session_of(rig).recent[-1]
     session.recent.clear()
     for n, height in enumerate(bump(150, 60, 0.65)):

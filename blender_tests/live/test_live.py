@@ -67,7 +67,7 @@ def session_of(rig):
 
 
 def tick_until(rig, frames):
-    """Run the timer until a number of faces of the subject has arrived."""
+    """Wait until this number of faces of the subject has arrived, then run the timer once."""
     module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:

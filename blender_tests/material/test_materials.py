@@ -25,7 +25,7 @@ def _materials(rig):
 
 
 def _shown(material):
-    """The input socket for the colour of a surface, or for the roughness of a film."""
+    """The socket for the colour of a material, or for the roughness of a clear film."""
     shader = looks.principled(material)
     if shader is not None:
         return shader.inputs["Base Color"]
@@ -50,7 +50,7 @@ def kinds_file(tmp_path):
 
 @pytest.mark.parametrize("kind", ["teeth", "tongue", "gums"])
 def test_what_lies_deep_in_a_mouth_is_dark_without_shadows(tmp_path, kind):
-    """Otherwise molars look like a white wall behind the corner of an open mouth."""
+    """Without this darkening, molars look like a white wall behind the corner of an open mouth."""
     face = small_face()
     mesh = looks.copy_mesh(face.meshes[1], scale=2.0)
     points = mesh.positions.copy()
@@ -121,7 +121,7 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
         shader = looks.principled(_materials(scene.load(_save(tmp_path, small_face())))["head"])
         # The weight depends on the distance from an open border.
         assert shader.inputs["Subsurface Weight"].is_linked
-        # How far light scatters in the palest skin; in dark skin it is less.
+        # Scattering distance of light in the palest skin, in Blender units; dark skin has less.
         far = shader.inputs["Subsurface Scale"].links[0].from_node
         scales.append(far.inputs[1].default_value)
     assert scales[1] == pytest.approx(3 * scales[0], rel=1e-4)
@@ -133,7 +133,10 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
 
 
 def _mapped(label, metadata=None):
-    """A face whose second map has this name; only browDownL moves it, by half, and no bone."""
+    """A face whose second animated map has this name, and gets half the value of browDownL.
+
+    browDownL drives no other map and no bone.
+    """
     center = np.array([0.0, 158.0, 2.0])
     head = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
     face = looks.set_meshes(small_face(), {"head_lod0_mesh": head})
@@ -203,7 +206,10 @@ OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 
 
 def _write_maps(folder, wrinkle, mask_left):
-    """Write base and wrinkle maps with MetaHuman's names, and a mask with half of red set."""
+    """Write base and wrinkle maps with MetaHuman's names, and a mask for half of the face.
+
+    The mask's red channel is 1 in the left half of the image if `mask_left`, else in the right.
+    """
     folder.mkdir()
     looks.write_image(folder / "head_color_map.png", np.full((16, 16, 3), 0.6, np.float32))
     looks.write_image(folder / "head_normal_map.png", looks.halves([0.5, 0.5, 1], [0.5, 0.5, 1]))
@@ -580,7 +586,7 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """Drivers for the maps of a duplicate are sums without Python expressions.
+    """Drivers of the animated maps of a duplicated face are sums without Python expressions.
 
     scene/upkeep/duplicates.py makes them.
     """

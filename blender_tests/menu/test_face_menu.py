@@ -8,7 +8,8 @@ import pytest
 from support import scene
 from support.layout import Recorder
 
-# Operators that need an item of a panel, list or handle, or belong to an open dialog.
+# Operators that the menu lacks, because they need an item of a panel, list or handle, or belong to
+# an open dialog.
 ELSEWHERE = {
     *("apply_pose_asset", "blend_pose_asset", "blend_expression", "delete_expression"),
     *("rename_expression", "star_expression", "update_expression", "render_thumbnails"),

@@ -27,7 +27,7 @@ def why(name):
 
 
 def raw_with(rig, path, **values):
-    """Raw controls of the sliders, float32[R], with some values replaced by name endings."""
+    """Raw controls of the sliders, float32[R]. values: end of a control's name -> other value."""
     raw = scene.raw_of(rig, path)
     names = risorius.load(str(path)).raw_control_names
     for end, value in values.items():

@@ -193,7 +193,7 @@ def key_edited_on_live(_rig, head):
 
 
 def basis_edited(_rig, head):
-    """Edit the rest form itself."""
+    """Move vertices of the basis shape key, which stores the neutral form."""
     points = head.data.shape_keys.reference_key.points
     for point in points[:20]:
         point.co.y -= 0.03
@@ -270,7 +270,10 @@ WHOLE_FACE = [rest_position, other_inheritance, bone_constraint]
 
 @contextmanager
 def _row(change):
-    """Add the row's name to a failure. All rows use one scene, because each change is undone."""
+    """Add the name of the tested change to an assertion that fails.
+
+    All changes are tested in one scene, because each is undone.
+    """
     try:
         yield
     except AssertionError as error:
@@ -344,7 +347,7 @@ def live_renamed(_rig, head):
 
 
 def live_moved(_rig, head):
-    """Move the live key to another place in the list."""
+    """Move the live key to another place in the list of shape keys."""
     _own_key(head)
     bpy.context.view_layer.objects.active = head
     head.active_shape_key_index = len(head.data.shape_keys.key_blocks) - 1
@@ -395,7 +398,7 @@ def test_a_mesh_stays_direct_through_an_edit(pair):
 
 
 def test_an_edited_rest_form(pair):
-    """A script's edit of the rest form becomes visible with the next update, in Live mode."""
+    """A script's edit of the basis shape key shows after the next update, as in Live mode."""
     pair.edit(basis_edited)
     pair.check()
     assert both_ways.is_direct(pair.direct)
@@ -427,7 +430,7 @@ def _noted(function, read):
 
 
 def test_a_deleted_live_key(pair):
-    """Without its live key, a Live face has no channels on the mesh, but joints still move it."""
+    """If the live key is deleted, joints still move the mesh in Live mode, but shapes do not."""
     pair.edit(live_deleted)
     pair.check()
 
@@ -466,7 +469,10 @@ def test_a_mesh_that_is_worked_on_is_live(pair):
 
 
 def _work(rig, mode, named):
-    """Enter a mode with the head mesh and leave it. Args: named whether the plan names it."""
+    """Enter a mode with the head mesh and leave it.
+
+    Args: named: whether the plan must state the head as a mesh that is not in Direct mode.
+    """
     head = scene.meshes(rig)[0]
     _mode(head, mode)
     both_ways.settle()
@@ -483,7 +489,7 @@ def _work(rig, mode, named):
 
 
 def test_vertices_moved_in_edit_mode(pair):
-    """Edit mode shows and stores the rest form."""
+    """In edit mode, the mesh shows the basis shape key, and moved vertices are stored in it."""
     for rig in pair.each():
         head = scene.meshes(rig)[0]
         head.active_shape_key_index = 0

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys a few controls and the head bone of a face."""
+"""Sets keyframes of a few controls and of the head bone of a face."""
 
 from . import scene
 
 
 def animate(rig, with_head=True):
-    """Key three controls and the head bone from frame 1 to 10; returns the control armature."""
+    """Set keyframes of three controls and the head bone at frames 1, 5 and 10.
+
+    Returns the control armature.
+    """
     controls, bone = scene.controls(rig), scene.face(rig)
     for frame, jaw, pull, turn in ((1, 0.0, 1.0, 0.0), (5, 1.0, 0.2, 0.4), (10, 0.3, 0.6, -0.3)):
         for end, value in (("jawOpen", jaw), ("mouthCornerPullL", pull), ("eyeLookUpL", jaw)):

@@ -10,12 +10,15 @@ NEAR = 1e-5  # tolerated distance, relative to the face's size
 
 
 def plan(rig):
-    """The last conditions.Plan of a face: which meshes have finished positions."""
+    """The last conditions.Plan of a face: the meshes whose positions the add-on computes."""
     return scene.submodule("scene.skinning.conditions").known(rig)
 
 
 def is_direct(rig, *numbers):
-    """Whether meshes of a face, by default all, have finished positions and disabled modifiers."""
+    """Whether meshes of a face are in Direct mode and have a disabled armature modifier.
+
+    Args: numbers: DNA indices of the meshes; empty: all meshes.
+    """
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
     off = all(not m.modifiers[0].show_viewport for m in wanted)

@@ -89,7 +89,7 @@ def _three_layers(rig):
 
 
 def layers(dna, _folder):
-    """Layer weights have keys in the assigned and in another action; one has a driver."""
+    """Layer weights have keyframes in the assigned action and in another one, or a driver."""
     item = _three_layers(scene.load(dna, "LIVE"))
     other = _empty_action(item, "Other")
     _key_weight(item, 0, {1: 0.2, 20: 0.9})
@@ -250,7 +250,7 @@ def _bake(item, kind):
 
 
 def shape_modes(dna, _folder):
-    """One face has live shape keys, the other one real keys; each has a key of the user."""
+    """One face has live shape keys, the other a shape key per channel; both have a user's key."""
     for mode in ("LIVE", "KEYS"):
         rig = scene.load(dna, mode)
         item = scene.controls(rig)
@@ -290,7 +290,7 @@ def overridden_live(dna, folder):
 
 
 def overridden_keys(dna, folder):
-    """The face is an override of a linked face with real shape keys, with layers and keys."""
+    """The face is an override of a linked face in the mode KEYS, with layers and keyframes."""
     _overridden(dna, folder, "KEYS")
 
 

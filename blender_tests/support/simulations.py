@@ -13,7 +13,7 @@ FREE = 2e-3  # tolerance relative to the mesh's size if some cloth is free
 
 
 def film(item, frames=FRAMES):
-    """A film: frame -> evaluated vertices of a mesh at this frame."""
+    """Record a mesh: frame -> evaluated vertices at this frame (here called a film)."""
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
@@ -54,7 +54,7 @@ def cloth(item, pinned=1.0):
 
 
 def mean_places(places):
-    """Film that `trail` should give. Args: places  film of the vertices before the modifier."""
+    """The film that `trail` should give. places: film of the vertices before the modifier."""
     found, state = {}, None
     for frame in sorted(places):
         state = places[frame] if state is None else (state + places[frame]) / 2
@@ -63,7 +63,7 @@ def mean_places(places):
 
 
 def trail(item):
-    """Add simulation nodes; in each step, their vertices move halfway to the modifier's input."""
+    """Add simulation nodes that move vertices halfway to the modifier's input in each step."""
     tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

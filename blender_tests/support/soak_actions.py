@@ -466,7 +466,7 @@ class World:
         return worst
 
     def calm(self):
-        """Before a sample of memory: restore the first number of characters, save and reload."""
+        """Before a sample of memory: restore the initial number of characters, save and reload."""
         while len(self.rigs()) > self.characters:
             self._delete(self.rigs()[-1])
         while len(self.rigs()) < self.characters:

@@ -114,7 +114,7 @@ def _far(before, now):
 
 
 def _try(rigs, hats, steps):
-    """Do steps on the first face; after each, all faces and hats must be as before."""
+    """Do steps on the first face; after each, all faces and attached empties must be as before."""
     first = rigs[0]
     wanted, whole = {}, {}
     for jaw in (0.2, 0.7):
@@ -180,7 +180,7 @@ def test_the_main_steps_on_a_face_on_a_body_with_keys_of_its_own(small_file, tmp
 
 
 def _on_a_body(path):
-    """(armature, controls) of a face with real shape keys on the only bone of a rotated body."""
+    """(armature, controls) of a face in the mode KEYS on the only bone of a rotated body."""
     rig = scene.load(path, "KEYS")
     controls = scene.controls(rig)
     controls.scale = (1.5, 1.5, 1.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that characters of older files are updated to the present form, newer ones not."""
+"""Tests that characters of older add-on versions are updated, and newer ones left unchanged."""
 
 import bpy
 import numpy as np

@@ -13,8 +13,8 @@ import pytest
 from support import past
 
 NEAR = 1e-5  # tolerance as a share of a mesh's size
-# Files whose first face is never in Direct mode, because of keyed joints, real shape keys, or an
-# override.
+# Files whose first face is never in Direct mode, because of keyframes of joints, a shape key per
+# channel, or an override.
 ORDINARY = ("baked_result", "baked_controls", "overridden_live", "overridden_keys")
 
 MAKERS = sorted(p.name for p in past.DATA.iterdir() if p.is_dir())
@@ -37,7 +37,7 @@ def folder_of(maker, tmp_path):
 
 
 def assert_same(found, wanted, where):
-    """Check that two films are equal bit for bit."""
+    """Check that two recordings made by past.film are equal bit for bit."""
     assert found.keys() == wanted.keys(), where
     for name, values in wanted.items():
         flat = np.ascontiguousarray(found[name]).ravel()
@@ -46,7 +46,7 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Compare the vertices of films in Direct and in Live mode; Live mode remains set."""
+    """Compare the vertices of all frames in Direct and in Live mode; Live mode remains set."""
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")
     films = {}

@@ -28,7 +28,7 @@ from risorius_people.source import FACE_UNITS, TARGETS, BaseMesh, Source, fetch
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-HEADS, COMPONENTS, SEED = 1600, 40, 56
+HEADS, COMPONENTS, SEED = 1600, 120, 56
 STYLISED = 0.25  # fraction of heads with features stronger than those of people
 # Limits in decimetres on the base mesh: triangles below y = CUT or beyond |x| = WIDE are left out.
 CUT, WIDE = 5.75, 0.95

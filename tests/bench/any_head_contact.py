@@ -19,24 +19,27 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import risorius
 from risorius._native import ClosestPoints
 from risorius.anyhead.default import default_template
-from risorius.anyhead.fittings import Bodies, complete, sort_parts
+from risorius.anyhead.fittings import Bodies, Fittings, complete, sort_parts
+from risorius.anyhead.fittings.lower_teeth import jaw_by_teeth
 from risorius.anyhead.laying import lay
-from risorius.anyhead.onto import OntoOptions, whole_ways
+from risorius.anyhead.onto import whole_ways
 from risorius.anyhead.reading import read_head
-from risorius.anyhead.repair import repair
+from risorius.anyhead.repair import Repaired, repair
 from risorius.anyhead.repair.contact import Contacts
 from risorius.anyhead.repair.repairing import Repairing, closing_pose
-from risorius.anyhead.repair.report import Faults
-from risorius.anyhead.standing import stand
+from risorius.anyhead.repair.report import Faults, Report
+from risorius.anyhead.standing import Standing, stand
 from risorius.anyhead.surface import Surface
-from risorius.anyhead.transfer.template import read_template
+from risorius.anyhead.transfer.template import TemplateFace, read_template
 from risorius.anyhead.transfer.transfer import TransferOptions, transfer
+from risorius.author.heads.parts import Wishes
 from risorius.base.errors import RisoriusError
 
 VIEWS = ((0, 0), (-25, 0), (25, 0), (0, 15), (0, -15))  # degrees to the side and up
@@ -94,22 +97,42 @@ def table(name, rows):
         print(f"| {name} {when} | {cells} | {values[-1]} |", flush=True)
 
 
-def measure(path, template, source, options):
-    parts, unit = read_head(path)
-    head = stand(path.name, parts, unit, options.wishes, options.marks)
+@dataclass
+class Made:
+    """A head with expressions before and after their repair."""
+
+    target: Surface
+    fitted: Fittings
+    singles: dict
+    pairs: dict
+    out: Repaired
+    seconds: float  # CPU seconds of the repair
+
+    @property
+    def report(self) -> Report:
+        return self.out.report
+
+
+def repaired(head: Standing, template, source: TemplateFace, strength: float = 1.0) -> Made:
+    """The template's expressions on a head that stands, before and after repair.
+
+    Args:
+        template: the DNA file.
+        source: the same, read by read_template.
+    """
     found = sort_parts(head.parts)
     target = Surface.of_polygons(found.face.mesh.positions, found.face.mesh.faces)
     laid = lay(source, target, head.found)
-    carried = transfer(source, target, laid.points, laid.trust, TransferOptions(options.strength))
-    ways = whole_ways(carried.ways)
+    jaw = None if laid.jaw is None else jaw_by_teeth(laid.jaw, template, found)
+    options = TransferOptions(strength)
+    ways = whole_ways(transfer(source, target, laid.points, laid.trust, options, None, jaw).ways)
     fitted = complete(found, template, laid.points)
     singles = {pose[0]: way for pose, way in ways.items() if len(pose) == 1}
     pairs = {pose: way for pose, way in ways.items() if len(pose) > 1}
     began = time.process_time()
     faces = fitted.face.mesh.faces
     out = repair(target, faces, fitted, head.found.landmarks, laid, singles, pairs)
-    took = time.process_time() - began
-    return target, fitted, head, (singles, pairs), out, took
+    return Made(target, fitted, singles, pairs, out, time.process_time() - began)
 
 
 def main():
@@ -124,13 +147,12 @@ def main():
     print("| " + " | ".join(HEADS) + " |\n|" + "---|" * len(HEADS))
     for path in args.heads:
         try:
-            target, fitted, head, before, out, took = measure(
-                path, template, source, OntoOptions(args.strength)
-            )
+            head = stand(path.name, *read_head(path), Wishes(), None)
+            made = repaired(head, template, source, args.strength)
         except RisoriusError as error:
             print(f"| {path.stem} | {error} |")
             continue
-        singles, pairs = before
+        target, fitted, singles, pairs = made.target, made.fitted, made.singles, made.pairs
         work = Repairing(
             target, fitted.face.mesh.faces, fitted, head.found.landmarks, singles,
             closing_pose(singles, pairs),
@@ -139,11 +161,11 @@ def main():
         contacts = Contacts(target, fitted.face.mesh.faces, bodies)
         rows = [
             row_of(target, fitted, *ways, work, contacts, bodies, args.deepest)
-            for ways in ((singles, pairs), (out.expressions, out.combinations))
+            for ways in ((singles, pairs), (made.out.expressions, made.out.combinations))
         ]
         table(path.stem, rows)
-        print(f"<!-- {len(target.points):,} vertices, {took:.0f} CPU s: "
-              f"{'; '.join([*fitted.notes, *out.report.notes])} -->", flush=True)  # fmt: skip
+        print(f"<!-- {len(target.points):,} vertices, {made.seconds:.0f} CPU s: "
+              f"{'; '.join([*fitted.notes, *made.report.notes])} -->", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -30,13 +30,13 @@ _HEAD = struct.calcsize("<IIIB")
 
 
 def _raw_record(name: bytes, values: bytes) -> bytes:
-    """An FBX record whose end is counted from its begin; _placed() makes it a file position."""
+    """An FBX record whose end offset counts from its beginning; _placed() corrects the offset."""
     size = _HEAD + len(name) + len(values)
     return struct.pack("<IIIB", size, 1, len(values), len(name)) + name + values
 
 
 def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
-    """`head` and a record that contains others, whose ends become positions in the file."""
+    """`head` and a record that contains `inner`; its end offsets count from the file's begin."""
     start = len(head) + _HEAD + len(name)
     out, at = [], 0
     while at < len(inner):
@@ -113,7 +113,10 @@ def deep_json(path: Path) -> None:
 
 
 def laughs(path: Path) -> None:
-    """Rhubarb XML with nested entities that expand to 10^9 texts; comment marks hide them."""
+    """Rhubarb XML with nested entities that expand to 10^9 texts.
+
+    Comment marks around the entities deceive a reader that removes comments by a text search.
+    """
     entities = ['<!ENTITY a0 "lol">']
     entities += [f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10)]
     path.write_text(

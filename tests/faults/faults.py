@@ -147,7 +147,7 @@ def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longe
 def _signalled(
     group: str, what: signal.Signals, rounds: int, names: Sequence[str]
 ) -> Iterator[Row]:
-    """Send a signal at random moments; the target must then be the complete old or new file."""
+    """Send a signal at random moments; the output file must then be the complete old or new one."""
     draw = random.Random(20)
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
@@ -190,7 +190,7 @@ def _interrupted(done: Done) -> list[str]:
 
 
 def kills(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """After kill -9, no target is incomplete, and the next run removes temporary files."""
+    """After kill -9, no output file is incomplete, and the next run removes temporary files."""
     yield from _signalled("kill", signal.SIGKILL, rounds, names)
 
 
@@ -339,7 +339,7 @@ def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
 
 
 def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
-    """Several processes write the same file, fill the same cache, or run the same batch."""
+    """Processes that run at once and write the same files must all succeed, with equal results."""
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:
             room = Room.make(Path(text))
@@ -383,7 +383,7 @@ def _batches(rounds: int) -> Row:
 
 
 def mutations(rounds: int, names: Sequence[str] = (), seed: int | None = None) -> Iterator[Row]:
-    """Mutated inputs, new in each run, give a result or a sentence within the limits."""
+    """Mutated inputs, new in each run, give a result or an error sentence within all limits."""
     drawn = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"mutations: --seed {drawn} repeats them", flush=True)
     yield from trials(5 * rounds, drawn, tuple(names))

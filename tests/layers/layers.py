@@ -21,7 +21,11 @@ CODE_FROM_TEXT = {"exec", "eval", "run_module", "run_path"}
 
 
 class Use(NamedTuple):
-    """An import or include: of a file of the same part, of a name outside it, or an unclear one."""
+    """An import or include.
+
+    It names a file of the same part of the project, or something outside this part, or its name
+    cannot be read from the code.
+    """
 
     kind: str  # "inside", "outside" or "unreadable"
     name: str  # the file's path, the outside name, or the line as it is written

@@ -122,7 +122,7 @@ def _frozen(file: _File) -> set[str]:
 
 
 def _statements(body: list[ast.stmt], inside: str = "") -> Iterator[tuple[str, ast.stmt]]:
-    """(prefix, statement) of each statement that runs on import; prefix: names of its classes."""
+    """(prefix, statement) of each statement that runs on import; prefix: the classes around it."""
     for node in body:
         yield inside, node
         if isinstance(node, ast.ClassDef):

@@ -86,7 +86,7 @@ def room(path: str) -> str | None:
 
 
 def findings(texts: Mapping[str, str]) -> tuple[list[str], set[str]]:
-    """Forbidden phrases in files outside rooms_to_rewrite; entries of this list with phrases."""
+    """(phrases found outside rooms_to_rewrite, entries of that list with phrases found)."""
     out, open_rooms = [], set()
     for path, text in texts.items():
         entry = room(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that the words of words.toml are defined in one place, and that the check can fail."""
+"""Tests that each entry of words.toml is defined in only one file, and that the check can fail."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Finds second definitions of things that words.toml lists as words."""
+"""Finds functions, constants and tables that must be defined only once, but are defined twice.
+
+words.toml lists them: an entry (word) has a pattern of the definition, and the file that has it.
+"""
 
 from __future__ import annotations
 

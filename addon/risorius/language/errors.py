@@ -22,6 +22,9 @@ from . import tables
 _SLOT = re.compile(r"\{(\w+)\}")
 _DEEPEST = 4  # messages inside a message: a file, a row, a cell, a reason
 _MOST_PLACES = 5  # most places, such as a file and a line, before a message
+_AND = " and "  # the row with the word before the last name of a list
+_LISTS = ("controls", "materials", "meshes", "names")  # values that may be such lists
+_SEVERAL = "changes"  # a value with a list of texts that have rows of their own
 _LONGEST = 1000  # letters of a message; the time grows faster than its length
 
 
@@ -70,13 +73,26 @@ def best(message: str, language: str, depth: int) -> _Found:
         for row in rows(language):
             match = row.piece in rest and row.pattern.fullmatch(rest)
             if match:
-                inside = {k: best(v, language, depth + 1) for k, v in match.groupdict().items()}
+                values = match.groupdict().items()
+                inside = {k: _value(k, v, language, depth + 1) for k, v in values}
                 before = [best(place, language, depth + 1) for place in parts[:places]]
                 letters = row.letters + sum(f.letters for f in (*inside.values(), *before))
                 if letters > found.letters:
                     text = row.translation.format(**{k: f.text for k, f in inside.items()})
                     found = _Found(": ".join([*(f.text for f in before), text]), letters)
     return found
+
+
+def _value(name: str, value: str, language: str, depth: int) -> _Found:
+    """Translate a value of a message; in a list of names only the word before the last name."""
+    if name == _SEVERAL:
+        each = [best(part, language, depth) for part in value.split(", ")]
+        return _Found(", ".join(f.text for f in each), sum(f.letters for f in each))
+    found = best(value, language, depth)
+    others, word, last = value.rpartition(_AND)
+    if found.letters or not word or name not in _LISTS:
+        return found
+    return _Found(others + tables.error_rows(language).get(_AND, _AND) + last)
 
 
 @cache

@@ -18,9 +18,20 @@ from .words import of_error, say
 
 _NO_FACE = "Select a face first."
 MODES = (
-    ("AUTO", "Direct", "Finished positions, without posed bones: fastest; Live where needed"),
+    (
+        "AUTO",
+        "Direct",
+        (
+            "Fastest: vertices get their final positions, bones are not "
+            "posed. The face uses Live if needed"
+        ),
+    ),
     ("LIVE", "Live", "One shape key per mesh below the armature modifier; bones are posed"),
-    ("KEYS", "Shape Keys", "Every channel is a real, driven shape key: editable, exportable"),
+    (
+        "KEYS",
+        "Shape Keys",
+        "Every channel is a real shape key with a driver: editable and exportable",
+    ),
 )
 
 
@@ -130,7 +141,9 @@ class FaceOperator(OperatorBase):
             cls.poll_message_set(say(_NO_FACE))
             return False
         if cls.whole_face and runtime.of(rig) is None:
-            cls.poll_message_set(say("This face has lost the text that holds its DNA."))
+            cls.poll_message_set(
+                say("The text data-block with the DNA data of this face is missing.")
+            )
             return False
         if parts.BAKED in rig and not cls.baked_too:
             cls.poll_message_set(say("This face is baked: choose Back to Live first."))

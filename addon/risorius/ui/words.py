@@ -151,8 +151,11 @@ def of_error(error: Exception) -> str:
 
 
 def local(text: str) -> str:
-    """Translate a Sentence; other text stays unchanged."""
-    return say(text) if isinstance(text, Sentence) else text
+    """Translate a Sentence, or a note or error of the package; other text stays unchanged."""
+    if isinstance(text, Sentence):
+        return say(text)
+    follow_language()
+    return errors.local(text, _language["given"])
 
 
 def mark(text: str) -> str:

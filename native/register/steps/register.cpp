@@ -25,15 +25,20 @@ struct CoarseStep {
   int rounds;
   steps::Counting counting;
 };
-constexpr std::array<CoarseStep, 8> kCoarse{{
+/// Steps that turn and stretch a template whose start only comes from pairs.
+constexpr std::array<CoarseStep, 3> kFar{{
     {300, 10, 3, {30, 150, 60, 0.7, false}},
     {100, 5, 4, {30, 150, 50, 0.5, true}},
     {30, 2, 4, {30, 150, 40, 0.4, true}},
-    {10, 1, 4, {30, 120, 30, 0.3, true}},
-    {3, 0.3, 4, {20, 80, 20, 0.2, true}},
-    {1, 0.1, 4, {20, 60, 15, 0.2, true}},
-    {0.3, 0.05, 4, {20, 40, 10, 0.1, true}},
-    {0.1, 0.03, 4, {20, 30, 10, 0.1, true}},
+}};
+/// Steps that change a start little, because it is usually more accurate along the surface than
+/// matches are: only places where the surface bends alike are matched.
+constexpr std::array<CoarseStep, 5> kNear{{
+    {100, 1, 4, {30, 720, 30, 0.3, true}},
+    {30, 0.3, 4, {20, 480, 20, 0.2, true}},
+    {10, 0.1, 4, {20, 360, 15, 0.2, true}},
+    {3, 0.05, 4, {20, 240, 10, 0.1, true}},
+    {1, 0.03, 4, {20, 180, 10, 0.1, true}},
 }};
 
 /// Settings of a fine step. stiffness: of the motions; farthest: largest distance of a match in mm;
@@ -74,7 +79,8 @@ class Laying {
         options_(options),
         progress_(progress) {}
 
-  core::Result<Points> coarse(const Points& start) const;
+  /// In: far  whether the start comes from pairs alone
+  core::Result<Points> coarse(const Points& start, bool far) const;
   core::Result<Points> fine(const Points& base) const;
   steps::Matcher const& matcher() const { return matcher_; }
 
@@ -98,15 +104,16 @@ core::Unexpected unsolvable() {
               "the template does not fit the target: the equations have no solution");
 }
 
-core::Result<Points> Laying::coarse(const Points& start) const {
+core::Result<Points> Laying::coarse(const Points& start, bool far) const {
+  std::vector<CoarseStep> all(kNear.begin(), kNear.end());
+  if (far) all.insert(all.begin(), kFar.begin(), kFar.end());
   const steps::Nodes nodes = steps::spread(graph_, start, options_.nodes);
   steps::Coarse coarse(nodes, start);
   Points now = start;
   double done = 0;
-  for (const CoarseStep& step : kCoarse) {
+  for (const CoarseStep& step : all) {
     for (int round = 0; round < step.rounds; ++round) {
-      if (!go_on(kPrepared +
-                 (kCoarsely - kPrepared) * done / static_cast<double>(kCoarse.size()))) {
+      if (!go_on(kPrepared + (kCoarsely - kPrepared) * done / static_cast<double>(all.size()))) {
         return stopped();
       }
       const Points normals = steps::vertex_normals(now, templ_.triangles);
@@ -205,7 +212,7 @@ core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
       steps::looks_of(form, options.trusted, near.value().samples.spacing, options.threads);
   const Laying laying(templ, near.value(), looks, landmarks_of(pairs, scale, options.noise),
                       options, progress);
-  auto coarse = laying.coarse(form.points);
+  auto coarse = laying.coarse(form.points, start.empty());
   if (!coarse) return std::move(coarse).propagate();
   auto fine = laying.fine(coarse.value());
   if (!fine) return std::move(fine).propagate();

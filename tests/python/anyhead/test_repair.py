@@ -13,6 +13,7 @@ from risorius.anyhead.eyes.eyelids import find_eyelids
 from risorius.anyhead.fittings import Bodies, sort_parts
 from risorius.anyhead.repair import repair
 from risorius.anyhead.repair.contact import Contacts
+from risorius.anyhead.repair.lips import Lips
 from risorius.anyhead.surface import Surface
 from risorius.author.heads.turning import look_turn
 
@@ -201,3 +202,14 @@ def test_a_face_without_eyes_and_lips_stays_as_it_is(head, skin):
     out = repair(skin, head.faces, bare, None, None, ways, {})
     assert np.array_equal(out.expressions["browDownL"], ways["browDownL"])
     assert out.report.rows == {}
+
+
+def test_lips_that_a_triangle_connects_are_counted_as_welded(head, skin):
+    corners = np.stack([Corners.points[f"mouth_corner_{side}"] for side in "RL"])
+    assert Lips(skin, head.ways, corners).welded() == 0
+    lips = Lips(skin, head.ways, corners)
+    upper, lower = (np.unique(triangles) for triangles in (lips._upper, lips._lower))
+    above = upper[np.abs(skin.points[upper] - [0, MOUTH, 9]).sum(axis=1).argsort()[:2]]
+    below = lower[np.abs(skin.points[lower] - [0, MOUTH, 9]).sum(axis=1).argmin()]
+    welded = Surface(skin.points, np.concatenate([skin.triangles, [[*above, below]]]))
+    assert Lips(welded, head.ways, corners).welded() == 1

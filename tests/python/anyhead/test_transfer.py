@@ -22,7 +22,7 @@ NAMES = {"mouthSmileLeft": SMILE, "eyeBlinkLeft": BLINK, "jawOpen": "jawOpen"}
 
 
 def face(unit="cm", scale=1.0):
-    """(face with three expressions and a corrective in a unit, expressions, corrective; in cm)."""
+    """(face in a unit, displacements of its three expressions in cm, and of its corrective)."""
     points, faces = face_shapes.head()
     ways = {NAMES[n]: d for n, d in face_shapes.expressions(points).items() if n in NAMES}
     mesh = ObjMesh(scale * points, np.zeros((0, 2)), faces.tolist(), [[]] * len(faces))

@@ -330,8 +330,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Near the fault of 0.35 mm, the expression that is undone balances a rise of 6 mm by the other
-    # one. Its effect in other places makes undoing cheap.
+    # The two expressions together enter the ball by 0.35 mm. Near this fault, one expression
+    # balances a rise of 6 mm by the other one, so undoing it would uncover the rise.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])

@@ -23,7 +23,7 @@ def check(*arguments):
 
 @pytest.fixture
 def two_errors(tmp_path):
-    """A file with wrong counts of the name and of GUI table inputs, and both byte offsets."""
+    """(DNA file, byte offset of its wrong name length, offset of its wrong GUI input count)."""
     data = bytearray((GOLDEN / "tiny_v22.dna").read_bytes())
     entries = struct.unpack_from(">16I", data, 11)
     descriptor, behavior = entries[2], entries[10]

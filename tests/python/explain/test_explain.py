@@ -365,7 +365,7 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "CTRL_expressions.browRaiseInnerL=0.5, CTRL_expressions.browRaiseInnerR=0.5" in (
         captured.err
     )
-    # By hand: corrective 6 is 1.5 * 0.5 * 0.75, and corrective 5 lacks a factor.
+    # By hand: corrective 6 is 1.5 * 0.5 * 0.75; corrective 5 is 0, because one of its controls is.
     assert "corrective 6 = 0.5625: browRaiseInnerR 0.5 * jawOpen 0.75, weight 1.5" in captured.out
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 

@@ -93,23 +93,25 @@ def test_a_pattern_stands_for_many():
 
 
 def test_lips_that_a_capture_shuts_are_the_whole_share_of_its_jaw():
-    """If lips are shut, mouthClose equals jawOpen, and the control of the share must be 1."""
+    """If lips are shut, mouthClose equals jawOpen, so mouthLipsTogether, their quotient, is 1."""
     jaw = [0.5, 0.5, 0.5, 0.0, 0.01, 0.01, 0.3]
     close = [0.5, 0.25, 0.7, 0.0, 0.005, 0.02, -0.1]
     take = importing.Imported(Clip(["JawOpen", "MouthClose"], [jaw, close], 30.0), "csv", "", "a")
     clip, _ = take.apply("live_link_face")
     lips = [RIG + "mouthLipsTogether" + quarter for quarter in ("UL", "UR", "DL", "DR")]
     for name in lips:
-        # If the jaw is open by less than 0.02, the share falls to 0, because a quotient of noise
-        # would jump between 0 and 1.
+        # If the jaw is open by less than 0.02, the quotient is faded to 0, because a quotient of
+        # noise would jump between 0 and 1.
         np.testing.assert_allclose(clip.curve(name), [1, 0.5, 1, 0, 0.25, 1, 0], atol=1e-6)
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen"), jaw, atol=1e-6)
-    # A mapping's gain of the jaw does not open shut lips, because the share has its own gain.
+    # A mapping's gain of the jaw does not open shut lips, because the quotient is formed before
+    # the gain; mouthLipsTogether has its own gain.
     own = '[controls]\n"jaw*" = { gain = 2.0 }\n"mouthLipsTogether??" = { gain = 0.5 }'
     clip, _ = take.apply(parse_mapping('base = "arkit"\n' + own, "m"))
     np.testing.assert_allclose(clip.curve(lips[0])[:2], [0.5, 0.25])
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen")[0], 1.0)
-    # A mapping can switch off the share; without a curve of the jaw, mouthClose is not divided.
+    # A mapping can switch off the division by jawOpen; without a curve of the jaw, mouthClose is
+    # not divided either.
     none = 'base = "arkit"\nprefix = "CTRL_expressions."\n[shares]\n"mouthLipsTogether**" = ""'
     clip, _ = take.apply(parse_mapping(none, "m"))
     np.testing.assert_allclose(clip.curve(lips[3]), close)

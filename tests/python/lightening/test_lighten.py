@@ -138,12 +138,12 @@ def test_correctives_that_move_least_leave(face):
     assert light.joint_names == face.joint_names
     assert light.psd_count == 6
     names = [name.replace("CTRL_expressions.", "") for name in report.removed_correctives]
-    # Later correctives move the face less, so that these leave; but number 6 drives the animated
-    # map, and the last one moves the face as much as a smile.
+    # Later correctives move the face less, so that they are removed. Exceptions are number 6, which
+    # drives the animated map, and the last one, which moves the face as much as a smile.
     assert all("jawOpen + neck" not in name for name in names)
     assert "eyeBlinkLeft + mouthSmileRight + jawOpen" not in names
     assert len(report.removed_correctives) == 3
-    # Of the channels, only the channel of a removed corrective leaves.
+    # Only one channel is removed: the channel that a removed corrective drives.
     none, _ = lighten(face, correctives=2, measured=False)
     assert none.psd_count == 2
     assert none.blend_shape_channel_names == face.blend_shape_channel_names[:-1]

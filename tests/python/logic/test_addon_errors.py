@@ -56,6 +56,28 @@ def test_a_value_is_translated_too() -> None:
     ) == ("take.zip: Animation wurde erwartet, dies ist ein Archiv (ZIP): packe es zuerst aus")
 
 
+@pytest.mark.parametrize(
+    ("note", "there"),
+    [
+        ("Body, skin: the left eye turns with the look controls",
+         "Body, skin: das linke Auge dreht sich mit den Blickreglern"),
+        ("a part of Head is left out: it lies 20 cm from the face",
+         "ein Teil von Head wird weggelassen: es ist 20 cm vom Gesicht entfernt"),
+        ("/a b/anna_textures: textures of Head, Teeth and Tongue",
+         "/a b/anna_textures: Texturen von Head, Teeth und Tongue"),
+        ("combinations: with 3 targets, 0.7 mm of jawOpen and mouthClose remain: more than 0.5 mm",
+         "Kombinationen: mit 3 Morph-Targets bleiben 0.7 mm von jawOpen und mouthClose: mehr als "
+         "0.5 mm"),
+        ("for 5 MB: sparse targets, textures of 512 pixels, LOD 1; the file has 4.90 MB",
+         "für 5 MB: dünn besetzte Morph-Targets, Texturen mit 512 Pixeln, LOD 1; die Datei hat "
+         "4.90 MB"),
+        ("man and woman: 1 empty cell(s) filled", "man and woman: 1 leere Zelle(n) aufgefüllt"),
+    ],
+)  # fmt: skip
+def test_a_note_is_translated_with_its_lists_but_not_its_names(note: str, there: str) -> None:
+    assert german(note) == there
+
+
 def test_places_of_the_native_module_stay_behind_the_message() -> None:
     assert german(
         "a.dna: not a DNA file: it does not begin with the letters DNA; it is a picture (PNG) "

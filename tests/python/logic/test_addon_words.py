@@ -67,7 +67,7 @@ class Reader(ast.NodeVisitor):
                             self.values.setdefault(target.id, []).append(value)
 
     def add(self, node: ast.expr | None, context: str, only_plain: bool = True) -> None:
-        """Add all texts that an expression can have to `found`."""
+        """Add to `found` all texts that an expression may evaluate to."""
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if any(letter.isalpha() for letter in node.value):
                 self.found[context, node.value] = f"{self.path.name}:{node.lineno}"

@@ -93,7 +93,7 @@ def _other_skin(dna):
 def _groups_that_share_a_joint(dna):
     """Replace the joint groups by two whose union has many empty cells.
 
-    One has all rows but the first and one column, the other one row and all columns.
+    One group has one column and all rows except the first; the other has one row and all columns.
     """
     rows, columns = np.arange(9 * len(dna.joint_names)), np.arange(len(dna.raw_control_names))
     dna.joint_groups = [group(rows[1:], columns[:1]), group(rows[:1], columns)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests mixing of faces with all layers: equal data stay equal, a difference gives a sentence."""
+"""Tests mixing of faces with all layers: equal data stay equal, and errors name differences."""
 
 import copy
 

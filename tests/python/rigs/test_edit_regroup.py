@@ -100,7 +100,7 @@ def giant(dna):
 
 
 def scattered(dna, seed):
-    """The face with each joint group divided into seven by rows; groups, columns are shuffled."""
+    """The face with each joint group divided into seven by rows; shuffles groups and columns."""
     rng = np.random.default_rng(seed)
     out, groups = copy.deepcopy(dna), []
     for group in dna.joint_groups:

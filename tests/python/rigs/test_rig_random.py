@@ -25,7 +25,7 @@ def random_group(rng, dna, control_count, rows, columns):
 
 
 def random_table(rng, rows, inputs, outputs):
-    """A table in which up to three rows in a row share input and output; some swap from and to."""
+    """A table with up to three successive rows for an input and output; some swap from and to."""
     pairs = [(rng.integers(inputs), rng.integers(outputs)) for _ in range(rows)]
     pairs = [pairs[r - r % 3] if rng.random() < 0.7 else pairs[r] for r in range(rows)]
     bounds = rng.choice([-0.5, 0, 0.25, 0.5, 0.75, 1, 1.5], (rows, 2))

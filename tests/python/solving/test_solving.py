@@ -166,7 +166,7 @@ def test_partners_keep_the_limits_of_both(face):
 
 @pytest.mark.parametrize("eases", [(1, 0.01), (0.01, 1)])
 def test_partners_change_as_readily_as_the_readier_one(face, eases):
-    """Both partners use the larger of their eases, because the pair moves as one."""
+    """Both partners use the larger of their two `ease` values, because the pair moves as one."""
     surface, vertex = face[1], 14 * 5 + 6
     axis = np.array([0, 0.6, 0.8])
     target = surface.positions(raw(), 0, [vertex]) + 0.1 * axis
@@ -241,7 +241,10 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """It ends at most 1.3 mm farther from the goal; no active slider has an active opposite."""
+    """A sparse drag ends at most 1.3 mm farther from the goal than a drag with all controls.
+
+    No two opposites are both active afterwards.
+    """
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
@@ -342,7 +345,8 @@ def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # the twin moves like the jaw
     alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
     assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
-    # A small step equals least squares that are weighted by the inverse of the squared ease.
+    # A small step equals a least squares solution that weights the square of each control's change
+    # by 1 / ease².
     small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
     step = risorius.solve_drag(surface, raw(), points, [small], **free).raw

@@ -40,7 +40,7 @@ def deadly_once(job, threads=1):
 
 
 def beside_deadly(job):
-    """Kill the worker if the job is the deadly one; any other job waits for the third death."""
+    """Kill the worker if the clip is named deadly; other jobs wait until three workers are dead."""
     deaths = job.clip.with_name("deaths")
     if job.clip.stem == "deadly":
         with deaths.open("ab") as file:

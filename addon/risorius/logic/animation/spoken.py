@@ -186,7 +186,9 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
         out.append(sound._replace(word=keeps))
         word = ""
     if not out:
-        raise SpokenError(told("a voice keeps one sound at least: replace it by Rest instead"))
+        raise SpokenError(
+            told("a voice keeps one sound at least: replace the last sound by Rest instead")
+        )
     out[0] = out[0]._replace(begin=min(out[0].begin, sounds[0].begin))
     return out
 

@@ -148,7 +148,7 @@ def kind_of(mesh_name: str) -> str:
 def layer_warnings(layers: Sequence[str]) -> list[str]:
     """Warnings about parts of a DNA file (layers) that the evaluator ignores."""
     words = [_LAYER_WORDS.get(layer) or told("layer '{name}'", name=layer) for layer in layers]
-    return [told("Not evaluated yet: {what}", what=word) for word in dict.fromkeys(words)]
+    return [told("Risorius does not support: {what}", what=word) for word in dict.fromkeys(words)]
 
 
 def space_of(dna: DnaData, unit_scale: float) -> Space:

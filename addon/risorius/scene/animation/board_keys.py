@@ -54,7 +54,7 @@ def lost(loss: board_fit.Loss) -> Sentence | None:
         return None
     worst = [f"{name.rpartition('.')[2]} {value:.2f}" for name, value in loss.worst]
     return told(
-        "The board cannot show all of it: largest difference {largest:.3f} of 1 ({worst}).",
+        ("The board cannot show the whole pose: largest difference {largest:.3f} of 1 ({worst})."),
         largest=loss.largest,
         worst=names.listed(worst, _NAMED),
     )

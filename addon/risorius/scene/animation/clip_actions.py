@@ -565,7 +565,7 @@ def add_sound(
     sound = strip.sound
     if strip.frame_final_duration <= 1 and (sound is None or not sound.samplerate):
         strips.remove(strip)
-        raise clip_units.ClipError(told("no sound strip: Blender cannot read it"))
+        raise clip_units.ClipError(told("no sound strip: Blender cannot read the sound file"))
     return strip
 
 

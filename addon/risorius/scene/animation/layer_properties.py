@@ -19,18 +19,22 @@ from ...logic.animation import layer_rules
 KINDS = (
     ("ACTION", "Action", "An action with keys of the controls"),
     ("EXPRESSION", "Expression", "A built-in pose"),
-    ("IDLE", "Idle Life", "Blinks, glances and small movements from a seed"),
+    ("IDLE", "Idle Life", "Random blinks, glances and small movements"),
 )
 BLENDS = (
     ("OVERRIDE", "Override", "Replace lower layers"),
-    ("ADD", "Add", "Add to lower layers"),
+    ("ADD", "Add", "Add this layer to lower layers"),
     ("MAXIMUM", "Maximum", "Use the higher value of this layer and lower layers"),
 )
 EXTENDS = (
-    ("HOLD", "Hold", "Hold the first and last frames"),
-    ("HOLD_FORWARD", "Hold Forward", "Nothing before the start; hold the last frame"),
-    ("NOTHING", "Nothing", "Nothing before the start and after the end"),
-    ("REPEAT", "Repeat", "Repeat before and after"),
+    ("HOLD", "Hold", "Hold the first frame before the start, and the last frame after the end"),
+    (
+        "HOLD_FORWARD",
+        "Hold Forward",
+        ("No effect before the start; hold the last frame after the end"),
+    ),
+    ("NOTHING", "Nothing", "No effect before the start and after the end"),
+    ("REPEAT", "Repeat", "Repeat the animation before the start and after the end"),
 )
 REGIONS = tuple((r.upper(), title, "") for r, title in native.regions().titles.items())
 INDEX = f"{layer_rules.COLLECTION}_index"
@@ -61,10 +65,12 @@ class RISORIUS_PG_warp(bpy.types.PropertyGroup):
     frame: _still(
         bpy.props.FloatProperty,
         name="Frame",
-        description="Frame of the scene at which the layer shows the other frame",
+        description="Frame of the scene that is pinned to a frame of the layer",
     )
     source: _still(
-        bpy.props.FloatProperty, name="Shows", description="Frame of the layer's own animation"
+        bpy.props.FloatProperty,
+        name="Shows",
+        description=("Frame of the layer's animation that is pinned to a frame of the scene"),
     )
 
 
@@ -101,7 +107,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     blend: _still(bpy.props.EnumProperty, name="Blend", items=BLENDS)
     weight: bpy.props.FloatProperty(
         name="Weight",
-        description="Weight of the layer; it can have keys",
+        description="Weight of the layer; the weight can have keys",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -112,7 +118,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     regions: _still(
         bpy.props.EnumProperty,
         name="Regions",
-        description="Regions that the layer moves; none: all",
+        description="Regions that the layer moves; no region: all regions",
         items=REGIONS,
         options={"ENUM_FLAG"},
     )
@@ -120,8 +126,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         bpy.props.StringProperty,
         name="Controls",
         description=(
-            "Controls that the layer moves, as names or patterns such as "
-            "jawOpen mouth*; -name excludes one"
+            "Controls that the layer moves, as names or patterns such as jawOpen "
+            "mouth*; -name excludes a control"
         ),
     )
     start: _still(bpy.props.FloatProperty, name="Start", default=1.0, description="Frame")
@@ -142,7 +148,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     length: _still(
         bpy.props.FloatProperty,
         name="Length",
-        description="Length in frames; 0: no end",
+        description="Length of the layer in frames; 0: no end",
         min=0.0,
     )
     repeat: _still(bpy.props.FloatProperty, name="Repeat", default=1.0, min=0.01, max=1000.0)
@@ -184,8 +190,8 @@ def register() -> None:
         name="Exclude Opposites",
         translation_context=tables.CONTEXT,
         description=(
-            "On a face with layers, keep opposite controls apart: closed lips"
-            " hold the jaw, a blink holds wide lids"
+            "On a face with layers, prevent that opposite controls act together: "
+            "closed lips hold the jaw, a blink lowers wide lids"
         ),
         default=True,
     )

@@ -46,7 +46,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
 
     used: bpy.props.BoolProperty(
         name="Use",
-        description="Stretch this control; off: it stays as captured",
+        description="Stretch the captured values of this control; off: keep the values",
         override=_OVERRIDE,
         update=_touch,
     )

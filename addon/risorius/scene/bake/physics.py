@@ -40,8 +40,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         # negative frames.
         raise BakeError(
             told(
-                "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "
-                "begin it at 0 or later.",
+                "The cache of a simulation begins at frame {begin}. Blender loses "
+                "baked frames below 0: let the cache begin at frame 0 or later.",
                 begin=begin,
             )
         )

@@ -123,10 +123,10 @@ def content(text: object) -> bytes:
     """
     packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
     if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):
-        raise ContentError(told("the Text holds no bytes of a DNA file"))
+        raise ContentError(told("the text data-block contains no bytes of a DNA file"))
     content = _unpack(packed, _limit(text, packed))
     if hash_of(content) != content_hash(text):
-        raise ContentError(told("its bytes are not those that were imported"))
+        raise ContentError(told("its bytes differ from the imported file"))
     return content
 
 
@@ -139,12 +139,12 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if said is None:
         return _most(packed)
     if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
-        raise ContentError(told("the length of its file is no number"))
+        raise ContentError(told("the stored length of its file is no number"))
     if int(said) > _most(packed):
         raise ContentError(
             told(
-                "its file is said to have {said:,} bytes, {most:,} can be in the {packed:,} "
-                "that are there",
+                "its stored length is {said:,} bytes, but its {packed:,} packed "
+                "bytes can contain at most {most:,}",
                 said=int(said),
                 most=_most(packed),
                 packed=len(packed),

@@ -382,7 +382,9 @@ def begin(context: Context, rig: ArmatureObject, point: Point, options: Options)
 
 
 _NOTHING = told("No control of this face moves this point.")
-_LED = told("What moves this point is led by drivers or layers: drag there has no effect.")
+_LED = told(
+    "All sliders that move this point are led by drivers or layers: dragging has no effect here."
+)
 
 
 def _usable(context: Context, rig: ArmatureObject) -> runtime.Runtime:

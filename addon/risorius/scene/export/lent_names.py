@@ -62,7 +62,7 @@ def images_as_files() -> Iterator[None]:
             raise FaceError(
                 told(
                     "rename the linked image {name} in its file: the name must not "
-                    "contain / or other characters of paths",
+                    "contain / or other characters that file names cannot have",
                     name=printable(image.name),
                 )
             )

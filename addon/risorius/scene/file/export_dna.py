@@ -97,7 +97,10 @@ def _check(item: MeshObject, mesh_plan: plans.MeshPlan) -> None:
     if not refit_meshes.has_faces_of(item.data, mesh_plan):
         raise ExportError(
             told(
-                "{name} has other vertices or faces than in its file, so it cannot be exported.",
+                (
+                    "{name} has other vertices or faces than the DNA file, so this mesh "
+                    "cannot be exported."
+                ),
                 name=item.name,
             )
         )

@@ -282,7 +282,10 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     item.hide_viewport = item.hide_render = True
     change.report.append(
         told(
-            "The mesh {label} is gone from the file; it stays, hidden, for {things}.",
+            (
+                "The mesh {label} is gone from the file; in the scene this mesh stays, "
+                "hidden, for {things}."
+            ),
             label=label,
             things=", ".join(things),
         )

@@ -84,7 +84,10 @@ def _check(rig: ArmatureObject) -> None:
     for item in (rig, controls, *parts.meshes_of(rig)):
         if item.library or item.override_library or item.data.library:
             raise ReplaceError(
-                told("{name} is linked: replace it in the file that it is from.", name=item.name)
+                told(
+                    "{name} is linked: replace its DNA in the .blend file that contains the face.",
+                    name=item.name,
+                )
             )
         if item.mode == "EDIT":
             raise ReplaceError(told("{name} is in edit mode: leave that first.", name=item.name))
@@ -312,7 +315,7 @@ def _renew_board(
         change.report.append(told("New on the face board: {names}.", names=listed))
     if old - new:
         listed = names.listed(sorted(old - new))
-        change.report.append(told("Gone from the face board: {names}.", names=listed))
+        change.report.append(told("Removed from the face board: {names}.", names=listed))
 
 
 def _keep_report(change: Change) -> None:

@@ -194,7 +194,9 @@ def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.Head
 
     keys = item.data.shape_keys
     if not keys.use_relative:
-        raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
+        raise HeadError(
+            told("The shape keys are not relative: turn on Relative in the panel Shape Keys.")
+        )
     cached = {key.name: points(key) for key in keys.key_blocks}
     deltas = {
         key.name: cached[key.name] - cached[key.relative_key.name]

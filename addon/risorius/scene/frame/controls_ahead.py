@@ -131,7 +131,7 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
             return ""
     lateness.note_circle(rig, controls)
     return told(
-        "{face} cannot be baked: {cause} depends on what a face does.",
+        "{face} cannot be baked: {cause} depends on the motion of a face.",
         face=rig.name,
         cause=lateness.circle(rig),
     )

@@ -28,14 +28,15 @@ def words(rig: ArmatureObject) -> Iterator[str]:
         return
     if _has_joint_keys(rig):
         yield told(
-            "Keys on joints of {rig} lead: from the next frame on the sliders do not move these. "
-            "Mute or remove the action of {rig}.",
+            "Keys on joints of {rig} lead: from the next frame on, the sliders do "
+            "not move these joints. Mute or remove the action of {rig}.",
             rig=rig.name,
         )
     if rig.get(parts.FOLLOW) and _is_sheared(controls):
         yield told(
-            "The parent of {controls} shears it, and no object can stand so: the face is not where "
-            "its controls are. Apply the scale of the parent.",
+            "The parent of {controls} shears it, and the face cannot follow a shear: "
+            "the face is not at the place of its controls. Apply the scale of the "
+            "parent.",
             controls=controls.name,
         )
 

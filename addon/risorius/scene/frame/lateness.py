@@ -62,7 +62,7 @@ def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
     Args:
         rig, controls: deforming and control armature of the face.
     """
-    cause = next(_causes(controls), told("Something that the controls follow"))
+    cause = next(_causes(controls), told("Another input of the controls"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
 
@@ -99,7 +99,7 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     apart = np.flatnonzero(first != then)
     if len(apart):
         return labels[int(apart[0])]
-    return told("The turn of the head") if states[0][3:] != states[1][3:] else ""
+    return told("The rotation of the head") if states[0][3:] != states[1][3:] else ""
 
 
 def circle(rig: ArmatureObject) -> str:
@@ -113,8 +113,9 @@ def words(rig: ArmatureObject) -> str:
     kept = _circles.get(rig.session_uid)
     if kept is not None:
         return told(
-            "{cause} depends on what a face does: it is shown one pass late, and simulations see "
-            "it one frame late (frames so far: {count}).",
+            "{cause} depends on the motion of a face: the effect is shown one "
+            "evaluation late, and simulations see the effect one frame late (frames "
+            "so far: {count}).",
             cause=kept.cause,
             count=kept.frames,
         )
@@ -122,8 +123,8 @@ def words(rig: ArmatureObject) -> str:
     if kept is None:
         return ""
     return told(
-        "{cause} had another value after the frame than before it: simulations saw it one frame "
-        "late (frames so far: {count}).",
+        "{cause} changed its value during the evaluation of the frame: simulations "
+        "saw the new value one frame late (frames so far: {count}).",
         cause=kept.cause,
         count=kept.frames,
     )

@@ -31,27 +31,30 @@ def _all() -> dict[str, object]:
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
             description=(
-                "Amount by which both eyes turn towards the target itself; at 0 they stay parallel"
+                "Amount by which the eyes converge on the target; 0: the eyes stay parallel"
             ),
             **shared,
         ),
         "risorius_lids": bpy.props.FloatProperty(
             name="Lids Follow",
-            description="Motion of the lids with a gaze up or down, in addition to the rig",
+            description=(
+                "Strength of the lid motion with a gaze up or down, in "
+                "addition to the motion of the rig"
+            ),
             **shared,
         ),
         "risorius_body_turn": bpy.props.FloatProperty(
             name="Body's Turn",
-            description="Share of the turn of the body's neck and head that the face follows",
+            description="Share of the rotation of the body's neck and head that the face follows",
             default=1.0,
             **shared,
         ),
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
             description=(
-                "Fill the raw controls of head and neck rotations from their "
-                "joints, so that poses of the file repair neck and jaw. Off: "
-                "the sliders of these controls lead"
+                "Set the raw controls of head and neck rotation from the joints, so "
+                "that the corrective poses of the DNA file correct neck and jaw. "
+                "Off: their sliders set these raw controls"
             ),
             default=True,
             override=_OVERRIDE,

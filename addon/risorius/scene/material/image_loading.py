@@ -82,8 +82,9 @@ def _room_for(path: Path) -> int:
     if room > limit:
         raise ValueError(
             told(
-                "The texture {file} of {width:,} x {height:,} pixels stays away: it takes "
-                "{room:,} bytes, at most {limit:,} are given to a file of its size.",
+                "The texture {file} of {width:,} x {height:,} pixels stays away: it "
+                "needs {room:,} bytes, at most {limit:,} are allowed for a file of "
+                "its size.",
                 file=path.name,
                 width=width,
                 height=height,
@@ -171,8 +172,9 @@ class Images:
         if self._room + room > limit:
             raise ValueError(
                 told(
-                    "The texture {file} stays away: with those before it it takes {room:,} bytes, "
-                    "at most {limit:,} are given to files of their size.",
+                    "The texture {file} stays away: together with the textures "
+                    "before it, it needs {room:,} bytes, at most {limit:,} are "
+                    "allowed for files of their size.",
                     file=path.name,
                     room=self._room + room,
                     limit=limit,

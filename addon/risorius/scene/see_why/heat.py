@@ -98,7 +98,7 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
     if not coloured:
         raise FaceError(
             told(
-                "No mesh of {name} has the number of vertices that the DNA file says.",
+                "No mesh of {name} has as many vertices as in the DNA file.",
                 name=rig.name,
             )
         )

@@ -42,7 +42,7 @@ def raw_pair(
     with_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)
     stack = layer_mixing.compiled(controls, live, depsgraph.scene, maximum)
     if place not in stack.places or not layers.has_any(controls):
-        raise FaceError(told("This layer plays nothing now."))
+        raise FaceError(told("This layer plays nothing at the current frame."))
     at = stack.places.index(place)
     layer = stack.layers[at]
     # The layer is replaced by a layer that moves nothing. The layer is not muted instead, because

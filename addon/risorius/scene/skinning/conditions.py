@@ -450,7 +450,7 @@ def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
     moved = np.abs(place - np.eye(4)).max() > _STRAIGHT
     moved = moved or item.parent != rig or item.parent_type != "OBJECT" or len(item.constraints)
     if moved or any(curve.data_path.startswith(_PLACES) for curve in _curves(item)):
-        yield told("{mesh} was moved against {rig}.", mesh=item.name, rig=rig.name)
+        yield told("{mesh} was moved relative to {rig}.", mesh=item.name, rig=rig.name)
 
 
 def _curves(owner: bpy.types.Object | bpy.types.Key) -> Iterator[bpy.types.FCurve]:
@@ -505,7 +505,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
             return
         if modifier.show_viewport or modifier.show_render:
             yield told(
-                "The modifier {modifier} of {mesh} comes before the armature.",
+                "The modifier {modifier} of {mesh} comes before the armature modifier.",
                 modifier=modifier.name,
                 mesh=item.name,
             )
@@ -528,13 +528,13 @@ def _keys(
     key, block = item.data.shape_keys, meshes.live_block(item)
     if key is None or block is None:
         if key is not None:
-            yield told("{mesh} uses other shape keys than the live key.", mesh=item.name)
+            yield told("{mesh} has shape keys in use besides the live key.", mesh=item.name)
         return
     others = (b for b in key.key_blocks if b not in (block, key.reference_key))
     used = [b for b in others if b.value and not b.mute]
     pinned = item.show_only_shape_key or not key.use_relative
     if used or pinned or parts.REAL in key or next(_curves(key), None) is not None:
-        yield told("{mesh} uses other shape keys than the live key.", mesh=item.name)
+        yield told("{mesh} has shape keys in use besides the live key.", mesh=item.name)
     plain = block.value == 1.0 and not block.mute and not block.vertex_group
     if not plain or block.relative_key != key.reference_key:
         yield told("The live key of {mesh} was changed.", mesh=item.name)

@@ -165,7 +165,7 @@ def _built(action: bpy.types.Action) -> list[Sound]:
     if not found:
         raise SpokenError(
             told(
-                "{action} has lost what its keys were made of: speak from audio again",
+                "{action} has lost what its keys were made of: use Speak from Audio again",
                 action=action.name,
             )
         )
@@ -225,7 +225,7 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
     said = of(action)
     begins = [row.begin for row in said.sounds]
     if not begins:
-        raise SpokenError(told("{action} holds no voice", action=action.name))
+        raise SpokenError(told("{action} contains no voice", action=action.name))
     _built(action)
     if not (np.diff(begins) > 0.0).all() or not said.fps > 0.0 or not said.rate > 0.0:
         raise SpokenError(

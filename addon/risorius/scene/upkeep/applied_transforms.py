@@ -109,8 +109,8 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
         done.append(rig.name)
     if done:
         _said[rig.session_uid] = told(
-            "{names}: Blender's step was taken back, because joints, meshes and controls must fit. "
-            "To place the face, move {controls}.",
+            "{names}: Blender's step was taken back, because joints, meshes and "
+            "controls must stay aligned. To place the face, move {controls}.",
             names=done[0] if len(done) == 1 else f"{done[0]} (+{len(done) - 1})",
             controls=cast("bpy.types.Object", rig[parts.CONTROLS]).name,
         )

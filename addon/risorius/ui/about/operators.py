@@ -56,7 +56,9 @@ def describe(rig: ArmatureObject) -> list[str]:
         )
         lines.append(line)
         if still:
-            lines.append("    " + words.say("Move nothing: {names}", names=", ".join(still)))
+            lines.append(
+                "    " + words.say("These channels move nothing: {names}", names=", ".join(still))
+            )
     return lines
 
 
@@ -117,7 +119,7 @@ class RISORIUS_OT_self_test(Operator):
         if not bpy.app.background:
             context.window_manager.popup_menu(
                 lambda menu, _context: [words.show(menu.layout, s) for s in report.splitlines()],
-                title=words.say("Self-test; the clipboard has this report"),
+                title=words.say("Self-test: this report was copied to the clipboard"),
                 icon="ERROR" if bad else "CHECKMARK",
             )
         return {"FINISHED"}

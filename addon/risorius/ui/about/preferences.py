@@ -46,7 +46,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
     sides: bpy.props.EnumProperty(
         name="Left and Right",
-        description="Sides that name and place the left and right sliders",
+        description="Point of view for the names and places of the left and right sliders",
         items=(
             ("SEEN", "As Seen", "Left is on the left of a face that looks at you"),
             ("OWN", "The Character's", "Left is the character's own left, as in a body's bones"),

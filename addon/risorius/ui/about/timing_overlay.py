@@ -20,7 +20,9 @@ def show_property() -> object:
     return bpy.props.BoolProperty(
         name="Show Timing",
         translation_context=words.CONTEXT,
-        description="Milliseconds of each stage of a frame, in the corner of the 3D view",
+        description=(
+            "Show the time of each stage of a frame in milliseconds, in the corner of the 3D view"
+        ),
         options={"SKIP_SAVE"},
         update=_switched,
     )

@@ -19,7 +19,7 @@ from .place_clip import PlacesClip
 
 
 class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
-    """Find control curves that repeat a moving mesh with the topology of the face"""
+    """Find curves of the controls that repeat the motion of a mesh with the topology of the face"""
 
     bl_idname = "risorius.curves_from_mesh"
     bl_label = "Control Curves from Mesh"
@@ -28,7 +28,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     source: bpy.props.StringProperty(
         name="Object",
         description=(
-            "Mesh with the vertices of the face; empty: the selected mesh, or the only one"
+            "Mesh with the same number of vertices as the face; empty: the selected "
+            "mesh, or the only such mesh"
         ),
         options={"SKIP_SAVE"},
     )
@@ -37,7 +38,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     use_relative: bpy.props.BoolProperty(
         name="Movement Only",
         description=(
-            "Use the motion of the mesh and not its form: for another face of the same topology"
+            "Use the motion of the mesh and ignore its form: for another face of the same topology"
         ),
     )
     sparse: bpy.props.FloatProperty(
@@ -55,9 +56,9 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         soft_max=4.0,
     )
     use_colour: bpy.props.BoolProperty(
-        name="Show What Is Left",
-        description="Paint what the controls cannot repeat onto the face, as the color attribute "
-        "risorius_residual",
+        name="Show Remaining Distance",
+        description="Colour the face by the distance to the mesh that the controls "
+        "cannot remove, as the color attribute risorius_residual",
     )
 
     @classmethod
@@ -130,9 +131,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
                 raise task.error or FaceError("nothing was solved")
             rig = parts.active_rig(context)
             if rig is None or rig.session_uid != self._face:
-                text = (
-                    "The solved face is no longer the active face: make it active and solve again."
-                )
+                text = "The solved face is no longer active: make this face active and solve again."
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
             self.start = float(self.first)
@@ -150,7 +149,10 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         worst = int(np.argmax(frames))
         return [
             words.say(
-                "Left over: {mean} mm, at most {most} mm; most of all in frame {frame}.",
+                (
+                    "Left over: {mean} mm (root mean square), at most {most} mm; the "
+                    "worst frame is {frame}."
+                ),
                 mean=f"{np.sqrt((frames**2).mean()):.3f}",
                 most=f"{solved.largest * mm:.3f}",
                 frame=self.first + worst,

@@ -42,13 +42,13 @@ CAPTURE_RANGES = (
         "Use the range of this face from the panel Capture Range",
     ),
     ("TAKE", "Of This File", "Learn the range from this file"),
-    ("NONE", "None", "Values stay as captured"),
+    ("NONE", "None", "Keep the captured values unchanged"),
 )
 TIME_UNITS = (
     (
         "AUTO",
         "As the File Says",
-        ("Read the unit from the header, or from the size of the numbers"),
+        "Detect the unit of time from the header, or from the size of the numbers",
     ),
     ("S", "Seconds", ""),
     ("MS", "Milliseconds", ""),
@@ -56,14 +56,14 @@ TIME_UNITS = (
     ("NS", "Nanoseconds", ""),
     ("MIN", "Minutes", ""),
     ("H", "Hours", ""),
-    ("FRAMES", "Frame Numbers", "At the rate of the file"),
+    ("FRAMES", "Frame Numbers", "Times are frame numbers at the rate of the file"),
     ("ROWS", "Rows", "Ignore the times: each row is a frame at the rate of the file"),
 )
 ANGLES = (
     (
         "AUTO",
         "As the File Says",
-        ("Radians; angles that no head can turn are refused with a question"),
+        "Radians; angles that no head can turn stop the import with a message",
     ),
     ("RADIANS", "Radians", ""),
     ("DEGREES", "Degrees", ""),
@@ -88,15 +88,18 @@ SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mo
 @session.cached(("unregister",))
 def _kinds() -> list[Item]:
     kinds = native.part("importing").KINDS.items()
-    return [("AUTO", "Automatic", "Detect from the file"), *((k, t, "") for k, t in kinds)]
+    return [
+        ("AUTO", "Automatic", "Detect the kind from the contents of the file"),
+        *((k, t, "") for k, t in kinds),
+    ]
 
 
 @session.cached(("unregister",))
 def _mappings() -> list[Item]:
     importing = native.part("importing")
     return [
-        ("AUTO", "Automatic", "The mapping that knows most names of the file"),
-        ("FILE", "File", "A mapping of your own, a TOML file"),
+        ("AUTO", "Automatic", "Use the mapping that knows the most names in the file"),
+        ("FILE", "File", "Use your own mapping, a TOML file"),
         *((name, importing.mapping_title(name), "") for name in importing.mapping_names()),
     ]
 
@@ -112,7 +115,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"}
     )
     kind: bpy.props.EnumProperty(
-        name="Kind", description="Kind of the file", items=lambda _s, _c: _kinds()
+        name="Kind", description="Kind of the imported file", items=lambda _s, _c: _kinds()
     )
     mapping: bpy.props.EnumProperty(
         name="Mapping",
@@ -120,14 +123,14 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         items=lambda _s, _c: _mappings(),
     )
     mapping_file: bpy.props.StringProperty(
-        name="Mapping File", description="A TOML file", subtype="FILE_PATH"
+        name="Mapping File", description="TOML file with your own mapping", subtype="FILE_PATH"
     )
     rate_mode: bpy.props.EnumProperty(
         name="Keys", description="Frames at which samples of the file become keys", items=RATES
     )
     file_rate: bpy.props.FloatProperty(
         name="File Rate",
-        description="Frames per second of a file that does not state its rate; 0: as found",
+        description="Frames per second of a file that does not state its rate; 0: detect the rate",
         min=0.0,
         soft_max=240.0,
     )
@@ -138,7 +141,10 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     timecode_rate: bpy.props.FloatProperty(
         name="Timecode Rate",
-        description="Frames a second of the timecode, if the file does not show it; 0: as found",
+        description=(
+            "Frames per second of the timecode, if the file does not show "
+            "this rate; 0: detect the rate"
+        ),
         min=0.0,
         soft_max=240.0,
     )
@@ -150,9 +156,9 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     full_value: bpy.props.FloatProperty(
         name="Full Value",
         description=(
-            "Value of a full movement in the file: 100 for per cent, 255 for "
-            "bytes; 1 keeps all values. 0: like 1, but values far above 1 are"
-            " refused with a question"
+            "Value of a full movement in the file: 100 for per cent, 255 for bytes; "
+            "1 keeps all values. 0: like 1, but values far above 1 stop the import "
+            "with a message"
         ),
         min=0.0,
         soft_max=255.0,
@@ -161,11 +167,15 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         name="Angles", description="Unit of the file's angles of head and eyes", items=ANGLES
     )
     gain: bpy.props.FloatProperty(
-        name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
+        name="Gain",
+        description="Factor by which the values of all controls are multiplied",
+        default=1.0,
+        min=0.0,
+        soft_max=2.0,
     )
     gains: bpy.props.StringProperty(
         name="Single Gains",
-        description="Factors of single controls or patterns of their names, as "
+        description="Factors of single controls or patterns of their names, such as "
         "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
     )
     smoothing: bpy.props.FloatProperty(
@@ -358,10 +368,16 @@ def _gains(text: str) -> dict[str, float]:
 
 def lines_of(report: "native.Report") -> list[str]:
     """The sentences of an import report, without its list of absent controls."""
-    lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
+    text = "{count} curves mapped by {mapping}."
+    lines = [words.say(text, count=len(report.mapped), mapping=report.mapping)]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
-    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]
-    return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
+    lines += [_as_line(f"{words.local(head)}: {', '.join(names)}") for head, names in told]
+    return [*lines, *(_as_line(words.local(note)) for note in report.notes)]
+
+
+def _as_line(text: str) -> str:
+    """The text with a capital letter at the beginning and a full stop at the end."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 class RISORIUS_FH_animation(FileHandler):
@@ -390,7 +406,10 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
     )
     source: bpy.props.StringProperty(
         name="Object",
-        description="A mesh whose shape keys move; empty: the selected one, else the only one",
+        description=(
+            "A mesh whose shape keys move; empty: the selected mesh, or the "
+            "only mesh with animated shape keys"
+        ),
         options={"SKIP_SAVE"},
     )
 

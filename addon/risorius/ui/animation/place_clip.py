@@ -20,8 +20,8 @@ from ..common import FaceOperator, face_controls, face_rig
 from ..words import say
 
 TARGETS = (
-    ("ACTION", "Action", "As the face's active action; the one before is kept"),
-    ("STRIP", "NLA Strip", "On a new NLA track"),
+    ("ACTION", "Action", "As the active action of the face; the earlier action is kept"),
+    ("STRIP", "NLA Strip", "As a strip on a new NLA track"),
     ("LAYER", "Layer", "As a layer above the existing animation"),
 )
 RANGES = (
@@ -44,13 +44,14 @@ class PlacesClip(FaceOperator):
     start: bpy.props.FloatProperty(
         name="Start Frame",
         description=(
-            "Frame of time 0 of the animation: its first frame, or the start of its sound"
+            "Frame of the scene for time 0 of the animation, which is its first "
+            "frame or the start of its sound"
         ),
         default=1.0,
     )
     scene_range: bpy.props.EnumProperty(
         name="Scene Range",
-        description="Change of the first and last frame of the scene",
+        description="Choose whether the frame range of the scene changes",
         items=RANGES,
     )
 

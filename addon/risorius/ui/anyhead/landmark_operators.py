@@ -95,7 +95,7 @@ class RISORIUS_OT_find_landmarks(RunsBeside, OfHead, Operator):
         return words.say("Finding landmarks: {share} %, Esc cancels", share=share)
 
     def cancelled_text(self) -> str:
-        return words.say("No landmarks were looked for.")
+        return words.say("The search for landmarks was cancelled.")
 
 
 def show_found(
@@ -115,7 +115,7 @@ def show_found(
         operator.report({"INFO"}, words.local(sentence))
     missing = [name for name in found.missing if name not in points.of(head)]
     if missing:
-        text = "Not found: {names}. Place them in the panel Face from Head."
+        text = "Not found: {names}. Place these landmarks in the panel Face from Head."
         operator.report({"WARNING"}, words.say(text, names=listed(missing)))
         return
     text = "{count} landmarks found"
@@ -150,7 +150,7 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
         name="Where",
         items=[
             ("CURSOR", "At the 3D Cursor", "Where the 3D cursor is"),
-            ("CLICK", "By Click", "Where you click on the head; Esc or right click: leave"),
+            ("CLICK", "By Click", "Where you click on the head; Esc or right click: cancel"),
         ],
         options={"SKIP_SAVE"},
     )
@@ -163,7 +163,7 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set("EYEDROPPER")
         title = words.say(finding.words()[self.landmark])
-        text = words.say("Click on {landmark}; Esc or right click: leave", landmark=title)
+        text = words.say("Click on {landmark}; Esc or right click: cancel", landmark=title)
         context.workspace.status_text_set(text)
         return {"RUNNING_MODAL"}
 
@@ -253,7 +253,7 @@ class RISORIUS_OT_clear_landmarks(_OfLandmarks, Operator):
 
 
 class RISORIUS_OT_landmark_names(_OfLandmarks, Operator):
-    """Show the names of landmarks beside them in the 3D view, or hide them"""
+    """Show the names of the landmarks in the 3D view, or hide the names"""
 
     bl_idname = "risorius.landmark_names"
     bl_label = "Names of Landmarks"
@@ -267,7 +267,7 @@ class RISORIUS_OT_landmark_names(_OfLandmarks, Operator):
 
 
 class RISORIUS_OT_save_landmarks(_OfLandmarks, Operator, ExportHelper):
-    """Write the landmarks of this head into a file, for risorius author --landmarks and others"""
+    """Write the landmarks of this head into a file, such as for risorius author --landmarks"""
 
     bl_idname = "risorius.save_landmarks"
     bl_label = "Save Landmarks"

@@ -29,8 +29,12 @@ from ..file.rig_operators import MadeFace, show_made
 from .landmark_operators import OfHead, head_there, hide_lines
 
 TEMPLATES = [
-    ("SAMPLE", "Sample Man", "The man who came with Risorius"),
-    ("FACE", "Face of the Scene", "The face that is selected beside the head, or the only one"),
+    ("SAMPLE", "Sample Man", "The sample man that is included in Risorius"),
+    (
+        "FACE",
+        "Face of the Scene",
+        ("The face that is selected together with the head, or the only face of the scene"),
+    ),
     ("FILE", "DNA File", "Any face with expressions"),
 ]
 _STAGES = {
@@ -47,7 +51,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_family: bpy.props.BoolProperty(
         name="Take Others Along",
-        description="Also meshes of the same armature or parent: eyes, teeth, hair",
+        description="Include other meshes of the same armature or parent object: eyes, teeth, hair",
         default=True,
     )
 
@@ -106,7 +110,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
 
 
 class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
-    """Make a face of the selected head, which needs no expressions: another face lends its own"""
+    """Make a face from the selected head, which needs no expressions: another face lends them"""
 
     bl_idname = "risorius.make_rig_from_head"
     bl_label = "Make Rig from Head"
@@ -129,7 +133,10 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
     )
     use_repair: bpy.props.BoolProperty(
         name="Repair Contacts",
-        description="Let lids close on these eyes, lips meet, and keep skin out of eyes and teeth",
+        description=(
+            "Correct the expressions so that lids close on these eyes, lips "
+            "meet, and the skin stays out of eyes and teeth"
+        ),
         default=True,
     )
     joints: bpy.props.IntProperty(
@@ -192,7 +199,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
 
 
 class RISORIUS_OT_conform_face(_Makes, Operator):
-    """Give a face the form of the selected head; its own topology, names and controls stay"""
+    """Give a face the form of the selected head; the face keeps its topology, names and controls"""
 
     bl_idname = "risorius.conform_face"
     bl_label = "Conform Face to Head"
@@ -224,7 +231,7 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
             if not bpy.app.background:
                 framing.frame(context, rig)
         for sentence in notes[:5]:
-            self.report({"INFO"}, sentence)
+            self.report({"INFO"}, words.local(sentence))
         return done
 
     def draw(self, context: Context) -> None:

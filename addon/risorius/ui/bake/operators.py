@@ -29,7 +29,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     kind: bpy.props.EnumProperty(
         name="Bake",
         items=(
-            (bake_face.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
+            (
+                bake_face.RESULT,
+                "Bones, Shapes, Maps",
+                "The face itself: the actions play without the add-on",
+            ),
             (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
         ),
     )
@@ -37,7 +41,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         name="Parts",
         description="Parts to bake; other parts keep their current state",
         items=(
-            ("BONES", "Bones", "Bones of the deforming armature, and its place"),
+            (
+                "BONES",
+                "Bones",
+                "Bones of the deforming armature, and the transform of the armature",
+            ),
             ("SHAPES", "Shapes", "Shape keys of the meshes"),
             ("MAPS", "Maps", "Values of the animated maps, which materials read"),
         ),

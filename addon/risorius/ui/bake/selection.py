@@ -17,7 +17,7 @@ from ..common import FaceOperator, usable
 RANGES = (
     ("SCENE", "Scene", "The frame range of the scene"),
     ("PREVIEW", "Preview", "The preview range if it is set, otherwise the range of the scene"),
-    ("CUSTOM", "Custom", "Frames of your choice"),
+    ("CUSTOM", "Custom", "First and last frame of your choice"),
 )
 
 
@@ -74,7 +74,11 @@ class FrameRange(OperatorBase):
     start: bpy.props.FloatProperty(name="Start", default=1)
     end: bpy.props.FloatProperty(name="End", default=250)
     step: bpy.props.FloatProperty(
-        name="Step", description="Frames from key to key", default=1, min=0.01, soft_min=1
+        name="Step",
+        description="Distance between two keys in frames",
+        default=1,
+        min=0.01,
+        soft_min=1,
     )
     lod: bpy.props.IntProperty(
         name="Detail",

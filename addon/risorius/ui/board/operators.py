@@ -22,7 +22,7 @@ from ..hand.base import HandOperator
 from ..words import say
 
 LEADERS = (
-    ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
+    ("SLIDERS", "Sliders", "The sliders in the panel Controls move the face"),
     ("BOARD", "Board", "The face board moves the face; the sliders show its values"),
 )
 
@@ -236,7 +236,9 @@ class RISORIUS_OT_lead(_Leading, Operator):
     bl_idname = "risorius.lead"
     bl_label = "Lead"
 
-    by: bpy.props.EnumProperty(name="By", description="What moves the face", items=LEADERS)
+    by: bpy.props.EnumProperty(
+        name="By", description="Sliders or face board: one of them moves the face", items=LEADERS
+    )
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",
         description="Convert the keys in a copy of the action; the original is kept",

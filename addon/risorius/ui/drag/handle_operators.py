@@ -23,10 +23,16 @@ class _PointOperator(FaceOperator):
     """
 
     mesh: bpy.props.IntProperty(
-        name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
+        name="Mesh",
+        description="Number of the mesh in the DNA file, from 0",
+        min=0,
+        options={"SKIP_SAVE"},
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Number of the vertex", min=-1, options={"SKIP_SAVE"}
+        name="Vertex",
+        description="Number of the vertex in the mesh, from 0",
+        min=-1,
+        options={"SKIP_SAVE"},
     )
 
     def fits(self, hit: picking.Hit) -> bool:
@@ -133,7 +139,7 @@ class _SelectedOperator(FaceOperator):
 
 
 class RISORIUS_OT_hide_handles(_SelectedOperator, Operator):
-    """Hide the selected handles; their points can be dragged as any other"""
+    """Hide the selected handles; their points can be dragged like any other point"""
 
     bl_idname = "risorius.hide_handles"
     bl_label = "Hide Handles"
@@ -149,7 +155,7 @@ class RISORIUS_OT_hide_handles(_SelectedOperator, Operator):
 
 
 class RISORIUS_OT_show_handles(FaceOperator, Operator):
-    """Show the hidden handles again, selected"""
+    """Show the hidden handles again, and select them"""
 
     bl_idname = "risorius.show_handles"
     bl_label = "Show Hidden Handles"
@@ -171,7 +177,7 @@ class RISORIUS_OT_show_handles(FaceOperator, Operator):
 
 
 class RISORIUS_OT_key_handles(_SelectedOperator, Operator):
-    """Insert keyframes on the sliders that move the selected handles, as on selected bones"""
+    """Insert keyframes on the sliders that move the selected handles"""
 
     bl_idname = "risorius.key_handles"
     bl_label = "Key Handles"

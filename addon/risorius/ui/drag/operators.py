@@ -33,10 +33,16 @@ class RISORIUS_OT_drag(Operator):
     _is_handle = False
 
     mesh: bpy.props.IntProperty(
-        name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
+        name="Mesh",
+        description="Number of the mesh in the DNA file, from 0",
+        min=0,
+        options={"SKIP_SAVE"},
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Number of the vertex", min=0, options={"SKIP_SAVE"}
+        name="Vertex",
+        description="Number of the vertex in the mesh, from 0",
+        min=0,
+        options={"SKIP_SAVE"},
     )
     offset: bpy.props.FloatVectorProperty(
         name="Offset",
@@ -47,7 +53,7 @@ class RISORIUS_OT_drag(Operator):
     )
     view: bpy.props.FloatVectorProperty(
         name="View",
-        description="Along this direction the point may lie anywhere; 0, 0, 0 for none",
+        description="Direction along which the point may move freely; 0, 0, 0: no direction",
         size=3,
         options={"SKIP_SAVE", "HIDDEN"},
     )
@@ -218,7 +224,7 @@ class RISORIUS_OT_drag(Operator):
             for name, change in self._held.moved(1 if self.single else 3)
         ]
         if self.single and not lines:
-            lines.append(say("No single slider moves this point nearer."))
+            lines.append(say("No single slider moves this point nearer to the target."))
         return lines
 
 

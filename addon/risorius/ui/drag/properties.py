@@ -14,14 +14,18 @@ METHODS = (
         "NEAR",
         "Near",
         (
-            "Few sliders that belong to this place: a dragged brow turns no eye. The "
-            "point lags behind the pointer if they do not reach it"
+            "A few sliders that belong to this place: a dragged brow turns no eye. "
+            "The point lags behind the pointer if these sliders do not reach the "
+            "pointer"
         ),
     ),
     (
         "LEAST_SQUARES",
         "Exact",
-        "The smallest change of all sliders that brings the point there: many move a little",
+        (
+            "Smallest change of all sliders that brings the point to the pointer: many "
+            "sliders move a little"
+        ),
     ),
     (
         "TRANSPOSE",
@@ -52,7 +56,7 @@ def method_property() -> object:
 def region_property() -> object:
     return bpy.props.BoolProperty(
         name="Region Only",
-        description="Only sliders of the region of the face that is dragged",
+        description="Move only sliders of the region of the dragged point",
         options={"SKIP_SAVE"},
     )
 
@@ -64,7 +68,8 @@ class RISORIUS_PG_drag(bpy.types.PropertyGroup):
     handles: bpy.props.BoolProperty(
         name="Show Handles",
         description=(
-            "Show the points that dragging moves farthest; you can drag any other point too"
+            "Show handles at the points that dragging moves farthest; you can drag "
+            "any other point too"
         ),
         default=True,
         options={"SKIP_SAVE"},

@@ -54,9 +54,9 @@ class _Tool(WorkSpaceTool):
     bl_idname = IDNAME
     bl_label = "Drag the Face"
     bl_description = (
-        "Point at the skin and drag it. Ctrl: one slider, Tab: the next one; Shift-"
-        "click: pin, or select handles that move together; I keys handles, H hides "
-        "them"
+        "Point at the skin and drag it. Ctrl: one slider, Tab: the next slider; "
+        "Shift-click: pin a point, or select handles that move together; I: key "
+        "handles, H: hide handles"
     )
     bl_icon = "ops.pose.push"
     bl_widget = None

@@ -19,9 +19,9 @@ FORMATS = (
     ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),
     ("FBX", "FBX", "Bones and shape keys"),
     ("USD", "USD", "Bones and shape keys"),
-    ("ALEMBIC", "Alembic", "Vertices of every frame, no bones"),
-    ("RZC", "Clip (.rzc)", "The controls, without loss and small, for any face"),
-    ("CSV", "CSV", "The controls as a plain table"),
+    ("ALEMBIC", "Alembic", "Vertex positions of every frame, without bones"),
+    ("RZC", "Clip (.rzc)", "Exact values of the controls in a small file, for any face"),
+    ("CSV", "CSV", "Values of the controls as a plain table"),
 )
 _OPERATORS = {
     "GLTF": ("export_scene", "gltf"),

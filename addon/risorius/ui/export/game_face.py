@@ -31,11 +31,15 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     shapes: bpy.props.EnumProperty(
         name="Shapes",
         items=(
-            ("arkit", "ARKit", "The 52 units of ARKit"),
-            ("visemes", "Visemes", "The 15 visemes of Oculus lip sync"),
-            ("vrm", "VRM", "The preset expressions of VRM 1.0"),
-            ("expressions", "Expressions", "The expressions of Risorius"),
-            ("all", "All Controls", "Each control by its own name"),
+            ("arkit", "ARKit", "Morph targets for the 52 units of ARKit"),
+            ("visemes", "Visemes", "Morph targets for the 15 visemes of Oculus lip sync"),
+            ("vrm", "VRM", "Morph targets for the preset expressions of VRM 1.0"),
+            ("expressions", "Expressions", "Morph targets for the expressions of Risorius"),
+            (
+                "all",
+                "All Controls",
+                "A morph target for each control, with the name of the control",
+            ),
         ),
         options={"ENUM_FLAG"},
         default={"arkit", "visemes"},
@@ -44,43 +48,53 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
     megabytes: bpy.props.FloatProperty(
         name="Megabytes",
         description=(
-            "Largest size of the file in megabytes; textures, vertices and "
-            "levels are reduced until it fits. 0: no limit"
+            "Largest size of the file in megabytes; textures, vertices and levels "
+            "are reduced until the file fits. 0: no limit"
         ),
         min=0.0,
         max=1000.0,
     )
     use_skeleton: bpy.props.BoolProperty(
-        name="Skeleton", description="Joints of neck, head, jaw and eyes", default=True
+        name="Skeleton", description="Include joints for neck, head, jaw and eyes", default=True
     )
     body: bpy.props.EnumProperty(
         name="Body",
         description="Bones to add for a body, without meshes",
         items=(
-            ("NONE", "None", "The joints that the face has"),
-            ("minimal", "Minimal", "The bones that a VRM needs"),
-            ("mixamo", "Mixamo", "All bones by Mixamo's names, as TalkingHead wants them"),
+            ("NONE", "None", "No bones for a body: only the joints of the face"),
+            ("minimal", "Minimal", "The bones of a body that VRM requires"),
+            (
+                "mixamo",
+                "Mixamo",
+                (
+                    "All bones of a body with Mixamo's names, as the program "
+                    "TalkingHead requires them"
+                ),
+            ),
         ),
     )
     body_file: bpy.props.StringProperty(
         name="Body File",
         description=(
-            "A character in glTF or VRM with a skeleton, which the face is hung on; empty: none"
+            "File (glTF or VRM) of a character with a skeleton, to which the face is "
+            "attached; empty: none"
         ),
         subtype="FILE_PATH",
     )
     without: bpy.props.StringProperty(
         name="Leave Out",
-        description="Meshes of the body, such as its head, separated by commas",
+        description="Meshes of the body to leave out, such as its head, separated by commas",
     )
     use_springs: bpy.props.BoolProperty(
-        name="Springs", description="Long hair of a VRM swings", default=True
+        name="Springs", description="Let the long hair of a VRM swing", default=True
     )
     use_quantize: bpy.props.BoolProperty(
-        name="Quantize", description="Store vertices with 16 bits; most programs read this"
+        name="Quantize",
+        description="Store vertices with 16 bits; most programs can read such a file",
     )
     use_meshopt: bpy.props.BoolProperty(
-        name="Compress", description="Compress with meshoptimizer; not every program reads this"
+        name="Compress",
+        description="Compress with meshoptimizer; not every program can read such a file",
     )
     use_combinations: bpy.props.BoolProperty(
         name="Combinations",
@@ -149,7 +163,7 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         for note in made.notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, words.local(note))
         count = len(made.files[out.name])
         self.report({"INFO"}, words.say("{name}: {count:,} bytes", name=out.name, count=count))
         return {"FINISHED"}

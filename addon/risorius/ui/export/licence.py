@@ -24,11 +24,11 @@ class LicenceForm:
 
     vrm: bpy.props.EnumProperty(
         name="VRM",
-        description="Write a VRM, which viewers and games for avatars read",
+        description="Write a VRM file, which viewers and games for avatars read",
         items=(
-            ("NONE", "None", "A glTF that is no VRM"),
-            ("1.0", "VRM 1.0", "What three-vrm and newer programs read"),
-            ("0.x", "VRM 0.x", "What older programs read"),
+            ("NONE", "None", "A glTF file without data for VRM"),
+            ("1.0", "VRM 1.0", "For three-vrm and newer programs"),
+            ("0.x", "VRM 0.x", "For older programs"),
         ),
     )
     title: bpy.props.StringProperty(name="Name", description="Name of the character")
@@ -36,7 +36,7 @@ class LicenceForm:
         name="Authors", description="Names of the authors, separated by commas"
     )
     avatar: _choice(
-        "Who May Use It",
+        "Who May Use the Avatar",
         ("onlyAuthor", "The Author", ""),
         ("onlySeparatelyLicensedPerson", "Persons with a Licence", ""),
         ("everyone", "Everyone", ""),
@@ -59,7 +59,7 @@ class LicenceForm:
         "Changes",
         ("prohibited", "Not Allowed", ""),
         ("allowModification", "Allowed", ""),
-        ("allowModificationRedistribution", "Allowed, and Passed On", ""),
+        ("allowModificationRedistribution", "Allowed, with Redistribution", ""),
     )
     licence_name: bpy.props.EnumProperty(
         name="Licence",

@@ -23,8 +23,8 @@ def before_gltf(settings: Mapping[str, object]) -> None:
         return
     warning(
         say(
-            "{faces}: Blender's own export knows no live faces and writes them at rest. Use Export "
-            "Animation of the tab Risorius, or Bake first.",
+            "{faces}: Blender's own export knows no live faces and writes them at "
+            "rest. Use Export Animation in the Risorius tab, or bake the faces first.",
             faces=names.printable(names.listed(found)),
         ),
         popup=True,

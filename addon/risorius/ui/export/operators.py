@@ -62,13 +62,14 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     all_shapes: bpy.props.BoolProperty(
         name="All Shapes",
-        description="Include shape keys that this range does not use",
+        description="Include shape keys that do not move in this frame range",
         default=False,
     )
     influences: bpy.props.IntProperty(
         name="Influences",
         description=(
-            "Most joints of a vertex. Engines take 4 or 8; 0 writes all, as Blender shows them"
+            "Largest number of joints per vertex. Engines take 4 or 8; 0 writes all, "
+            "as Blender shows them"
         ),
         default=0,
         min=0,
@@ -84,8 +85,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     lod_groups: bpy.props.BoolProperty(
         name="LOD Groups",
-        description="Write also the coarser levels that were built, in groups between which an "
-        "engine changes by distance",
+        description="Also write the coarser levels that were built, in groups; an "
+        "engine chooses a group by distance",
     )
     bake_materials: bpy.props.BoolProperty(
         name="Bake Materials",
@@ -153,7 +154,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
 
     def execute(self, context: Context) -> Result:
         if not Path(self.filepath).name:
-            self.report({"ERROR"}, words.say("Say into which file: there is no name."))
+            self.report({"ERROR"}, words.say("Enter a file name: no name was given."))
             return {"CANCELLED"}
         trouble = missing(self.format)
         if trouble:

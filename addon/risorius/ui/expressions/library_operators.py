@@ -37,7 +37,7 @@ def redraw(context: Context) -> None:
 
 
 class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
-    """Draw the pictures of all expressions on this face; Esc ends it"""
+    """Draw the pictures of all expressions on this face; Esc stops the drawing"""
 
     bl_idname = "risorius.render_thumbnails"
     bl_label = "Draw Pictures"
@@ -101,7 +101,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
             self._redrawn = done
             redraw(current_context())
         return say(
-            "Pictures of expressions: {done} of {count}. Esc ends it.",
+            "Pictures of expressions: {done} of {count} are drawn. Esc stops the drawing.",
             done=done,
             count=self._count,
         )
@@ -170,7 +170,7 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Regions to save; choose none for all regions that are not at rest",
+        description="Regions to save; no region: all regions that are not at rest",
         items=region_items,
         options={"ENUM_FLAG", "SKIP_SAVE"},
     )
@@ -297,7 +297,7 @@ class RISORIUS_OT_delete_expression(_OfOne, Operator):
 
 
 class RISORIUS_OT_star_expression(_OfOne, Operator):
-    """Favourites have a star and a category of their own"""
+    """Add this expression to the favourites, or remove it. Favourites have a star"""
 
     bl_idname = "risorius.star_expression"
     bl_label = "Favourite"
@@ -375,8 +375,8 @@ class RISORIUS_OT_export_expressions(_OfFolder, Operator):
         if taken and not self.replace:
             raise library.TakenError(
                 told(
-                    "{folder} holds a file {file} already: choose Replace to write over files of "
-                    "these names, or another folder.",
+                    "{folder} holds a file {file} already: choose Replace to "
+                    "overwrite files with these names, or choose another folder.",
                     folder=self.chosen().name,
                     file=taken[0].name,
                 )
@@ -403,8 +403,8 @@ class RISORIUS_OT_import_expressions(_OfFolder, Operator):
                 if not self.replace:
                     raise library.TakenError(
                         told(
-                            "There is an expression {label} already: choose Replace to write over "
-                            "those of your own.",
+                            "There is an expression {label} already: choose Replace to "
+                            "overwrite your own expressions.",
                             label=printable(expression.label),
                         )
                     )

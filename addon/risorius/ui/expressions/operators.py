@@ -38,7 +38,7 @@ class Mixes(HandOperator):
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Move only these regions; choose none for all",
+        description="Move only these regions; no region: all regions",
         items=region_items,
         options={"ENUM_FLAG"},
     )

@@ -84,7 +84,7 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Move only these regions; choose none for all",
+        description="Move only these regions; no region: all regions",
         items=region_items,
         options={"ENUM_FLAG"},
     )

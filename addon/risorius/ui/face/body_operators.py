@@ -21,20 +21,22 @@ def _is_body(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
 
 
 class RISORIUS_OT_attach_body(FaceOperator, Operator):
-    """Hang the face on a body's armature: it follows the body's neck and head"""
+    """Attach the face to the armature of a body: the face follows the neck and head of the body"""
 
     bl_idname = "risorius.attach_body"
     bl_label = "Attach to Body"
 
     body: bpy.props.StringProperty(name="Body", description="The body's armature")
     base: bpy.props.StringProperty(
-        name="Base", description="Bone that carries the whole face; empty: find it by name"
+        name="Base", description="Bone that moves the whole face; empty: find the bone by name"
     )
     neck: bpy.props.StringProperty(
-        name="Neck", description="Bone that turns the neck of the face; empty: find it by name"
+        name="Neck",
+        description="Bone that turns the neck of the face; empty: find the bone by name",
     )
     head: bpy.props.StringProperty(
-        name="Head", description="Bone that turns the head of the face; empty: find it by name"
+        name="Head",
+        description="Bone that turns the head of the face; empty: find the bone by name",
     )
     fit: bpy.props.EnumProperty(
         name="Place",
@@ -46,7 +48,7 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
             ),
             (
                 "SCALE",
-                "On the Head, to Size",
+                "On the Head, Scaled",
                 (
                     "Move the face to the head bone of the body, and scale the face to the "
                     "length of the body's neck"
@@ -109,7 +111,7 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
 
 
 class RISORIUS_OT_detach_body(FaceOperator, Operator):
-    """Detach the face from its body; it keeps its place"""
+    """Detach the face from its body; the face keeps its place"""
 
     bl_idname = "risorius.detach_body"
     bl_label = "Detach from Body"

@@ -13,7 +13,7 @@ from ..words import say
 
 
 class RISORIUS_OT_set_strands(FaceOperator, Operator):
-    """Render hair as strands that follow the cards; the viewport keeps the cards"""
+    """Render hair as strands that follow the hair cards; the viewport shows the cards"""
 
     bl_idname = "risorius.set_strands"
     bl_label = "Strands in Renders"

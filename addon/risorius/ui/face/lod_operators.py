@@ -23,7 +23,9 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
 
     lod: bpy.props.IntProperty(
         name="Level",
-        description="0 is the finest; for renders -1 follows the viewport",
+        description=(
+            "0 is the finest level; -1, for renders only: the same level as in the viewport"
+        ),
         min=-1,
         max=31,
         options={"SKIP_SAVE"},
@@ -31,7 +33,7 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
     target: bpy.props.EnumProperty(
         name="Where",
         items=(
-            ("BOTH", "Everywhere", "In the viewport, and renders follow it"),
+            ("BOTH", "Everywhere", "In the viewport and in renders"),
             ("VIEWPORT", "Viewport", "In the viewport; renders keep their own level"),
             ("RENDER", "Render", "In renders only"),
         ),
@@ -73,8 +75,8 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
             self.report(
                 {"WARNING"},
                 say(
-                    "The scene has no camera yet: the level of detail does not change until it "
-                    "has one."
+                    "The scene has no camera: the level of detail does not change "
+                    "until you add a camera."
                 ),
             )
         lods.follow_camera(rig, self.enable, _size(rig))

@@ -31,14 +31,14 @@ def _labels(context: Context, region: str = "") -> list[str]:
 
 
 class RISORIUS_OT_reset(HandOperator, Operator):
-    """Set controls to rest and the head, neck and eye bones straight"""
+    """Bring the controls and the bones of head, neck and eyes to rest"""
 
     bl_idname = "risorius.reset"
     bl_label = "Reset"
 
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -69,7 +69,7 @@ class RISORIUS_OT_key(FaceOperator, Operator):
 
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -176,7 +176,7 @@ class RISORIUS_OT_set_overdrive(FaceOperator, Operator):
 
 
 class RISORIUS_OT_separate(FaceOperator, Operator):
-    """Give a copied face materials, shapes and drivers of its own"""
+    """Give a copied face its own materials, shapes and drivers"""
 
     bl_idname = "risorius.separate"
     bl_label = "Make Single User"

@@ -38,13 +38,13 @@ def _posed_controls(context: Context) -> ArmatureObject | None:
 
 
 class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
-    """Paste the copied pose with left and right swapped, with the sliders of the face"""
+    """Paste the copied pose with left and right swapped, including the sliders of the face"""
 
     bl_idname = "risorius.paste_pose_flipped"
     bl_label = "Paste Pose Flipped, with Sliders"
 
     selected: bpy.props.BoolProperty(
-        name="On Selected Only", description="Only onto selected bones", default=False
+        name="On Selected Only", description="Paste only onto selected bones", default=False
     )
 
     @classmethod
@@ -52,7 +52,7 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if not super().poll(context):
             return False
         if _posed_controls(context) is None:
-            cls.poll_message_set(say("Enter pose mode on the controls of a face first."))
+            cls.poll_message_set(say("Select the controls of a face and enter pose mode first."))
             return False
         return True
 

@@ -24,7 +24,7 @@ _copied: dict[str, float] = session.table("side_operators.copied", ("unregister"
 def _only_region() -> object:
     return bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -70,7 +70,7 @@ class RISORIUS_OT_copy_side(HandOperator, Operator):
 
 
 class RISORIUS_OT_link_sides(FaceOperator, Operator):
-    """Let one slider move both sides of the face with drivers; press again to free them"""
+    """Let one slider move both sides of the face with drivers; press again to unlink the sides"""
 
     bl_idname = "risorius.link_sides"
     bl_label = "Link Left and Right"
@@ -85,7 +85,10 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
             return False
         if face_controls(context).override_library:
             cls.poll_message_set(
-                say("The controls are a library override: Blender saves no drivers in it.")
+                say(
+                    "The controls are a library override: Blender saves no drivers "
+                    "in library overrides."
+                )
             )
             return False
         return True

@@ -105,21 +105,23 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         name="Custom Normals", description="Keep the file's own normals", default=True
     )
     use_materials: bpy.props.BoolProperty(
-        name="Materials", description="Build skin, eyes, teeth and lashes", default=True
+        name="Materials",
+        description="Build materials for skin, eyes, teeth and lashes",
+        default=True,
     )
     use_textures: bpy.props.BoolProperty(
         name="Textures",
-        description="Load textures beside the file and pack them",
+        description="Load textures from the folder of the file, and pack them into the .blend file",
         default=True,
     )
     texture_folder: bpy.props.StringProperty(
         name="Texture Folder",
-        description="Folder of textures with MetaHuman names; empty: beside the file",
+        description="Folder of textures with MetaHuman names; empty: the folder of the DNA file",
         subtype="DIR_PATH",
     )
     use_simple_materials: bpy.props.BoolProperty(
         name="Simple Materials",
-        description="Cheap to draw: no subsurface, no pores, no wrinkles or flush",
+        description="Fast to draw: without subsurface scattering, pores, wrinkles and flush",
         default=False,
     )
     use_frame_view: FRAME_VIEW
@@ -200,12 +202,12 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         name="Person",
         description="Who",
         items=[
-            ("man", "Man", "A man of 28; comes with Risorius"),
-            ("woman", "Woman", "A woman of 31; data (48 MB) are downloaded once"),
-            ("girl", "Girl", "A girl of 8; data (48 MB) are downloaded once"),
-            ("lady", "Lady", "A woman of 58; data (48 MB) are downloaded once"),
-            ("fighter", "Fighter", "A man of 42, strong; data (48 MB) are downloaded once"),
-            ("elder", "Elder", "A man of 75; data (48 MB) are downloaded once"),
+            ("man", "Man", "A man, 28 years old; included in Risorius"),
+            ("woman", "Woman", "A woman, 31 years old; data (48 MB) are downloaded once"),
+            ("girl", "Girl", "A girl, 8 years old; data (48 MB) are downloaded once"),
+            ("lady", "Lady", "A woman, 58 years old; data (48 MB) are downloaded once"),
+            ("fighter", "Fighter", "A strong man, 42 years old; data (48 MB) are downloaded once"),
+            ("elder", "Elder", "A man, 75 years old; data (48 MB) are downloaded once"),
         ],
         default="man",
     )

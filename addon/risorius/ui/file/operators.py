@@ -84,7 +84,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
-    """Read the file of the face again; asks for the file if it has moved"""
+    """Read the DNA file of the face again; opens a file browser if the file is missing"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
@@ -118,8 +118,8 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     bl_idname = "risorius.export_dna"
     bl_label = "Export DNA"
     bl_description = (
-        "Write this face's DNA file: byte for byte as imported, with your edits of shape keys, "
-        "neutral vertices, joints and weights"
+        "Write this face's DNA file: unchanged since the import, except for your "
+        "edits of shape keys, neutral vertices, joints and weights"
     )
     bl_options = {"PRESET"}
 

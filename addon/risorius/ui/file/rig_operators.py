@@ -47,15 +47,15 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     )
     use_shapes: bpy.props.BoolProperty(
         name="Keep Shapes",
-        description="Keep the errors of the joints as blend shapes",
+        description="Add blend shapes that correct the errors of the joints",
         default=True,
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
         description=(
-            "Largest error of the joints in millimetres without a blend "
-            "shape; 0: a share of the head's height. It is raised if the rig "
-            "would become heavier than the head"
+            "Largest error of the joints, in millimetres, that gets no blend shape; "
+            "0: a share of the head's height. This limit is raised if the rig would "
+            "become heavier than the head"
         ),
         default=0.0,
         min=0.0,
@@ -64,12 +64,15 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
 
     use_family: bpy.props.BoolProperty(
         name="Take Others Along",
-        description="Also meshes of the same armature or parent: eyes, teeth, hair",
+        description="Include other meshes of the same armature or parent object: eyes, teeth, hair",
         default=True,
     )
     height: bpy.props.FloatProperty(
         name="Height",
-        description="Height of the face from the chin to the top in millimetres. 0: as it is",
+        description=(
+            "Height of the face from the chin to the top of the head in "
+            "millimetres. 0: keep the size"
+        ),
         default=0.0,
         min=0.0,
         max=100_000.0,
@@ -157,7 +160,9 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             column.prop(self, "use_family")
             also = column.column()
             also.active = self.use_family
-            words.write(also, words.say("Also made of {names}", names=names.listed(_named(family))))
+            words.write(
+                also, words.say("Also included: {names}", names=names.listed(_named(family)))
+            )
 
 
 def _named(items: Sequence[MeshObject]) -> list[str]:
@@ -209,9 +214,9 @@ def show_made(
         if not material.users:  # replaced by a material of the head
             bpy.data.materials.remove(material)
     for sentence in made.shapes.notes:
-        operator.report({"INFO"}, sentence)
+        operator.report({"INFO"}, words.local(sentence))
     for sentence in made.odd[:5]:
-        operator.report({"WARNING"}, sentence)
+        operator.report({"WARNING"}, words.local(sentence))
     rig = made.rig
     operator.report(
         {"INFO"},

@@ -15,8 +15,15 @@ from ..common import FaceOperator, face_rig
 from ..words import of_error
 
 MOMENTS = (
-    ("NOW", "Current Frame", "Insert keys as auto-key and the keying set of Blender require"),
-    ("SELECTED", "Selected Keys", "At each frame that has a selected key of this face"),
+    (
+        "NOW",
+        "Current Frame",
+        (
+            "Change the current frame; keys are inserted as Blender's "
+            "auto-key and keying set require"
+        ),
+    ),
+    ("SELECTED", "Selected Keys", "Change each frame that has a selected key of this face"),
 )
 
 

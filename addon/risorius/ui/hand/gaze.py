@@ -41,14 +41,16 @@ def proposed(context: Context) -> str:
 
 
 class RISORIUS_OT_gaze_target(FaceOperator, Operator):
-    """Object that the target of the eyes follows"""
+    """Choose what the target of the eyes follows: the head, nothing, or an object"""
 
     bl_idname = "risorius.gaze_target"
     bl_label = "Eyes Follow"
 
     mode: bpy.props.EnumProperty(name="Follow", items=TARGETS, options={"SKIP_SAVE"})
     target: bpy.props.StringProperty(
-        name="Object", description="Empty: the scene's camera", options={"SKIP_SAVE"}
+        name="Object",
+        description="Object that the eyes look at; empty: the camera of the scene",
+        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -64,7 +66,7 @@ class RISORIUS_OT_gaze_target(FaceOperator, Operator):
         rig, controls = face_rig(context), face_controls(context)
         if "eyes" not in controls.pose.bones:
             self.report(
-                {"ERROR"}, say("The controls have no bone for the target of the eyes any more.")
+                {"ERROR"}, say("The bone for the target of the eyes is missing from the controls.")
             )
             return {"CANCELLED"}
         if self.mode == "HEAD":

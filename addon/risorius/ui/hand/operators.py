@@ -54,7 +54,7 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -85,7 +85,7 @@ def _of_region(context: Context, region: str) -> list[str]:
 
 
 class RISORIUS_OT_breakdown(HandOperator, Operator):
-    """Set a pose between the poses before and after; move the mouse, click to keep it"""
+    """Set a pose between the poses before and after; move the mouse, click to keep the pose"""
 
     bl_idname = "risorius.breakdown"
     bl_label = "Breakdowner"
@@ -94,7 +94,11 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
     kind: bpy.props.EnumProperty(
         name="Towards",
         items=(
-            ("BREAKDOWN", "Breakdown", "Between the pose before (0) and the pose after (1)"),
+            (
+                "BREAKDOWN",
+                "Breakdown",
+                ("Place of the new pose: 0 is the pose before, 1 is the pose after"),
+            ),
             (
                 "NEIGHBOURS",
                 "Relax",
@@ -121,7 +125,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Limit this to a region; empty: all regions",
+        description="Region to change; empty: all regions",
         options={"SKIP_SAVE"},
     )
 
@@ -225,7 +229,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
 
 class RISORIUS_OT_tweak(FaceOperator, Operator):
-    """Tweak a range of frames in a layer of its own; keys stay; press again to end the tweak"""
+    """Tweak a range of frames in a separate layer; keys stay; press again to end the tweak"""
 
     bl_idname = "risorius.tweak"
     bl_label = "Tweak over a Range"
@@ -266,7 +270,7 @@ class RISORIUS_OT_tweak(FaceOperator, Operator):
 
 
 class RISORIUS_OT_colour_curves(FaceOperator, Operator):
-    """Sort the F-curves of the face into groups by region, each with its colour"""
+    """Sort the F-curves of the face into groups by region; each group gets a colour"""
 
     bl_idname = "risorius.colour_curves"
     bl_label = "Colour Curves by Region"
@@ -277,7 +281,7 @@ class RISORIUS_OT_colour_curves(FaceOperator, Operator):
         actions = [a for a in compat.played_actions(controls) if a.library is None]
         count = sum(curve_colours.colour_action(controls, action) for action in actions)
         if not count:
-            self.report({"WARNING"}, say("This face has no curves of sliders."))
+            self.report({"WARNING"}, say("The sliders of this face have no F-curves."))
             return {"CANCELLED"}
         self.report({"INFO"}, say("{count} curves have the colours of their regions", count=count))
         return {"FINISHED"}

@@ -150,7 +150,9 @@ class RISORIUS_OT_layer_warp(LayerOperator, Operator):
         if self.clear:
             layer.warp.clear()
         elif layer.kind != "ACTION" or layer.action is None:
-            self.report({"ERROR"}, say("Only a layer with an action has a time to warp."))
+            self.report(
+                {"ERROR"}, say("Only a layer with an action has a time that can be warped.")
+            )
             return {"CANCELLED"}
         else:
             layers.add_warp_point(layer, context.scene.frame_current_final)

@@ -45,7 +45,7 @@ def _has_controls(cls: type[Operator], context: Context) -> bool:
 
 
 class RISORIUS_OT_live_start(Operator):
-    """Let the active face follow a capture app until you stop it"""
+    """Let the active face follow a capture app until you stop live capture"""
 
     bl_idname = "risorius.live_start"
     bl_label = "Start"
@@ -82,7 +82,7 @@ def _session(context: Context) -> sessions.Session:
 
 
 class RISORIUS_OT_live_stop(_Running, Operator):
-    """Stop live capture; a recording is finished or waits, the sliders return to their values"""
+    """Stop live capture, and finish a recording; the sliders return to their earlier values"""
 
     bl_idname = "risorius.live_stop"
     bl_label = "Stop"
@@ -97,7 +97,7 @@ class RISORIUS_OT_live_stop(_Running, Operator):
 
 
 class RISORIUS_OT_live_record(_Running, Operator):
-    """Begin a recording at the current frame, or end it as an action of the face"""
+    """Begin a recording at the current frame, or end it and make it an action of the face"""
 
     bl_idname = "risorius.live_record"
     bl_label = "Record"
@@ -189,7 +189,7 @@ class RISORIUS_OT_live_discard(_Waiting, Operator):
 
 
 class RISORIUS_OT_live_neutral(_Running, Operator):
-    """Use the current face as the neutral face; it is subtracted from received faces"""
+    """Use the current face as the neutral face, which is subtracted from received faces"""
 
     bl_idname = "risorius.live_neutral"
     bl_label = "Neutral Now"
@@ -209,7 +209,7 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
 
 
 class RISORIUS_OT_live_subject(_Running, Operator):
-    """Follow this subject"""
+    """Let the face follow this person"""
 
     bl_idname = "risorius.live_subject"
     bl_label = "Follow"
@@ -243,7 +243,10 @@ def _finish(
         why = names.printable(str(error)).rstrip(".")
         operator.report(
             {"ERROR"},
-            say("{reason}. The recording waits: finish it in the panel.", reason=why),
+            say(
+                "{reason}. The recording waits in the panel Live Capture: finish it there.",
+                reason=why,
+            ),
         )
         return False
     if report is None:

@@ -90,7 +90,7 @@ def _draw_status(layout: UILayout, session: sessions.Session) -> None:
         count = len(session.recording.take)
         words.show(column, words.say("Recording: {count} faces", count=count), "REC")
     for count, what in (
-        (status.lost, words.say("Lost on the Way")),
+        (status.lost, words.say("Lost Packets")),
         (status.late, words.say("Late, Left Out")),
         (status.refused, words.say("Packets Refused")),
         (status.floods, words.say("Floods")),

@@ -47,20 +47,22 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     everywhere: bpy.props.BoolProperty(
         name="From the Network",
-        description="Hear any device of the network, as a phone needs; off: programs of this "
-        "computer alone. In a network that is not your own, others could move the face",
+        description="Receive from any device in the network, such as a phone; off: "
+        "only from programs on this computer. In a network that is not "
+        "your own, other people could move the face",
         default=False,
     )
     subject: bpy.props.StringProperty(
         name="Subject",
         description=(
-            "Name of the subject to follow, as the app sends it; empty: the first one received"
+            "Name of the person to follow, as the app sends the name; empty: the "
+            "first person received"
         ),
         update=_changed,
     )
     mapping: bpy.props.StringProperty(
         name="Mapping",
-        description="Mapping file from names to controls; empty: names of ARKit and VRM",
+        description="File that maps received names to controls; empty: names of ARKit and VRM",
         subtype="FILE_PATH",
     )
     smoothing: bpy.props.FloatProperty(
@@ -73,7 +75,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     gain: bpy.props.FloatProperty(
         name="Gain",
-        description="Factor of all received values of the face",
+        description="Factor by which all received values of the face are multiplied",
         default=1.0,
         min=0.0,
         max=3.0,

@@ -26,8 +26,8 @@ class _Learns(FaceOperator):
     most_gain: bpy.props.FloatProperty(
         name="Most Gain",
         description=(
-            "Largest factor of a control; a control that needs more stays as "
-            "captured. Lids may have 2"
+            "Largest factor of a control; a control that needs a larger factor stays "
+            "as captured. The limit for lids is at least 2"
         ),
         default=1.6,
         min=1.0,
@@ -59,7 +59,7 @@ class _Learns(FaceOperator):
 
 
 class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
-    """Learn the range of each control of this person, so that blinks close the eyes"""
+    """Learn the range of each control from a capture of a person, so that blinks close the eyes"""
 
     bl_idname = "risorius.learn_range"
     bl_label = "Learn Range"
@@ -68,8 +68,8 @@ class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
     performance: bpy.props.BoolProperty(
         name="Performance",
         description=(
-            "The take shows acting: only blinks, and peaks that stop at one height "
-            "again and again, count as extremes. Off: the take goes to all extremes "
+            "The take shows acting: only blinks, and peaks that repeatedly stop at "
+            "the same height, count as extremes. Off: the take goes to all extremes "
             "one after another"
         ),
     )
@@ -100,7 +100,11 @@ class RISORIUS_OT_learn_range_live(_Learns, Operator):
     bl_label = "Learn from Live"
 
     seconds: bpy.props.FloatProperty(
-        name="Seconds", description="Seconds to learn from", default=30.0, min=2.0, max=60.0
+        name="Seconds",
+        description="Length of the live capture to learn from, in seconds",
+        default=30.0,
+        min=2.0,
+        max=60.0,
     )
 
     @classmethod
@@ -181,7 +185,7 @@ class RISORIUS_OT_save_range(_HasRange, Operator, ExportHelper):
 
 
 class RISORIUS_OT_forget_range(_HasRange, Operator):
-    """Remove the range of this face; captures stay as captured"""
+    """Remove the range of this face; captures are then not stretched"""
 
     bl_idname = "risorius.forget_range"
     bl_label = "Forget Range"

@@ -62,7 +62,7 @@ class RISORIUS_PT_ranges(FaceOnlyPanel, Panel):
         row.operator("risorius.load_range", text="Load")
         rows = range_properties.rows_of(controls)
         if not rows:
-            words.write(layout, "Captures of this face come as they are: no range was learned.")
+            words.write(layout, "Captures of this face are not stretched: no range was learned.")
             return
         row.operator("risorius.save_range", text="Save")
         row.operator("risorius.forget_range", text="Forget")

@@ -52,7 +52,7 @@ class RISORIUS_MT_face_sides(Menu):
             button = layout.operator("risorius.copy_side", text=text)
             button.region, button.from_left = "", from_left != seen
         layout.separator()
-        for enable, text in ((True, "Link Left and Right"), (False, "Free Left and Right")):
+        for enable, text in ((True, "Link Left and Right"), (False, "Unlink Left and Right")):
             button = layout.operator("risorius.link_sides", text=text)
             button.enable, button.from_left = enable, not seen
 

@@ -30,12 +30,16 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
         return ", ".join(name for name, found in own.items() if found == why)
 
     texts = {
-        "missing": say("Not mixed, as not every face has them: {names}", names=names("missing")),
+        "missing": say(
+            "Not mixed, because not every face has these textures: {names}", names=names("missing")
+        ),
         "format": say(
-            "Not mixed, as Risorius mixes its own kind of PNG alone: {names}", names=names("format")
+            "Not mixed, because Risorius mixes only PNG files of the kind that it writes: {names}",
+            names=names("format"),
         ),
         "size": say(
-            "Not mixed, as the faces have them in different sizes: {names}", names=names("size")
+            "Not mixed, because these textures have different sizes on the faces: {names}",
+            names=names("size"),
         ),
     }
     return [text for why, text in texts.items() if names(why)]

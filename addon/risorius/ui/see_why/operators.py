@@ -19,14 +19,14 @@ from .properties import choices
 from .spoken import title
 
 MUTED = (
-    ("JOINTS", "Joints", "All joints rest"),
-    ("SHAPES", "Shapes", "All blend shapes rest"),
-    ("MAPS", "Maps", "All animated maps rest: wrinkles and blush"),
+    ("JOINTS", "Joints", "Keep all joints in the neutral pose"),
+    ("SHAPES", "Shapes", "Keep all blend shapes at weight 0"),
+    ("MAPS", "Maps", "Keep all animated maps at 0: no wrinkles, no blush"),
 )
 
 
 class RISORIUS_OT_solo(FaceOperator, Operator):
-    """Show this control alone: all others rest in the view; their values and keys stay"""
+    """Show this control alone: the view shows all others at rest; their values and keys stay"""
 
     bl_idname = "risorius.solo"
     bl_label = "Solo"
@@ -116,7 +116,7 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
 
     kind: bpy.props.EnumProperty(
         name="Kind",
-        description="Source of the motion",
+        description="Motion that the colours show",
         items=(
             ("POSE", "From Neutral", "Distance of the current pose from the neutral pose"),
             ("CONTROL", "Reach of a Control", "Motion of the neutral face by one control"),
@@ -128,8 +128,8 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
     what: bpy.props.StringProperty(
         name="What",
         description=(
-            "Name of the control, number of the corrective, place of the "
-            "layer; empty: the chosen control or layer"
+            "Name of the control, number of the corrective or position of the layer "
+            "in the list; empty: the chosen control or layer"
         ),
     )
 

@@ -74,7 +74,7 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
         context.window_manager.modal_handler_add(self)
         if context.window is not None:
             context.window.cursor_modal_set("EYEDROPPER")
-        _say_in_status(context, say("Click on the face; Esc or right click: leave"))
+        _say_in_status(context, say("Click on the face; Esc or right click: cancel"))
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:

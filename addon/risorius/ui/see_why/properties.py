@@ -27,7 +27,9 @@ class RISORIUS_PG_why(bpy.types.PropertyGroup):
 
     control: bpy.props.StringProperty(
         name="Control",
-        description="Slider to examine: its reach, its correctives, solo",
+        description=(
+            "Slider to examine: See Why shows its reach and correctives, and Solo shows it alone"
+        ),
         search=_labels,
         search_options={"SORT"},
     )

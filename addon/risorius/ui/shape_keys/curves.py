@@ -46,7 +46,7 @@ class _OfCurves(FaceOperator):
 
 
 class RISORIUS_OT_assign_curve(_OfCurves, Operator):
-    """Assign a control or expression to a curve of the imported file; empty: leave it out"""
+    """Assign a control or expression to a curve of the imported file; empty: ignore the curve"""
 
     bl_idname = "risorius.assign_curve"
     bl_label = "Assign Curve"
@@ -54,7 +54,7 @@ class RISORIUS_OT_assign_curve(_OfCurves, Operator):
     curve: bpy.props.StringProperty(name="Curve", options={"SKIP_SAVE"})
     becomes: bpy.props.StringProperty(
         name="Control or Expression",
-        description="A control, as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
+        description="A control, such as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
         options={"SKIP_SAVE"},
     )
 
@@ -70,7 +70,7 @@ class RISORIUS_OT_choose_curve(_OfCurves, Operator):
     """Find a control or expression to assign to a curve of the imported file"""
 
     bl_idname = "risorius.choose_curve"
-    bl_label = "Choose for a Curve"
+    bl_label = "Choose a Control for a Curve"
     bl_property = "choice"
 
     curve: bpy.props.StringProperty(name="Curve", options={"SKIP_SAVE"})

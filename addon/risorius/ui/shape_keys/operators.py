@@ -32,9 +32,9 @@ from . import shown
 
 WAYS = (
     ("CHOSEN", "Control or Expression", "Assign the chosen control or expression"),
-    ("NAME", "By Its Name", "Guess from the name of the key"),
-    ("OWN", "Control of Its Own", "A new control with the name of the key"),
-    ("NOTHING", "Leave Out", "Leave the key out of the rig"),
+    ("NAME", "By Its Name", "Guess the control from the name of the shape key"),
+    ("OWN", "Control of Its Own", "A new control with the name of the shape key"),
+    ("NOTHING", "Leave Out", "Leave the shape key out of the rig"),
 )
 _AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 
@@ -115,7 +115,7 @@ class RISORIUS_OT_assign_shape_key(Says, Operator):
     way: bpy.props.EnumProperty(name="Becomes", items=WAYS)
     becomes: bpy.props.StringProperty(
         name="Control or Expression",
-        description="A control, as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
+        description="A control, such as jawOpen; =mouthFunnel: an ARKit unit; @joy: an expression",
     )
 
     def execute(self, context: Context) -> Result:
@@ -191,7 +191,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -226,7 +226,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Load assignments of shape keys from a file of this list or of risorius author"""
+    """Load assignments of shape keys from a file that this list or risorius author wrote"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
@@ -266,8 +266,11 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
     )
     use_choices: bpy.props.BoolProperty(
-        name="What Can Be Chosen",
-        description="Include controls without a key in the list of Choose",
+        name="Pictures of Controls",
+        description=(
+            "Also draw pictures of the controls that the button Choose "
+            "lists, including controls without a shape key"
+        ),
         options={"SKIP_SAVE"},
     )
 
@@ -307,7 +310,9 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
             self._redrawn = done
             redraw(current_context())
         return words.say(
-            "Pictures of shape keys: {done} of {count}. Esc ends it.", done=done, count=self._count
+            "Pictures of shape keys: {done} of {count} are drawn. Esc stops the drawing.",
+            done=done,
+            count=self._count,
         )
 
     def cancelled_text(self) -> str:

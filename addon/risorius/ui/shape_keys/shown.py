@@ -56,8 +56,8 @@ def who_knows(row: assigned.Row) -> str:
     if row.holder:
         return words.say(
             (
-                "This name means a control that the shape key {name} has already; each "
-                "control has one key."
+                "This name means a control that is already assigned to the shape key "
+                "{name}; a control can have only one shape key."
             ),
             name=row.holder,
         )

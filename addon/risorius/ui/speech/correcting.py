@@ -127,7 +127,7 @@ class RISORIUS_OT_sound_set(_CorrectsSound, Operator):
 
     sound: bpy.props.StringProperty(
         name="Phoneme",
-        description="A mouth such as M B P, or a phoneme such as AA",
+        description="A mouth shape such as M B P, or a phoneme such as AA",
         options={"SKIP_SAVE"},
     )
 
@@ -138,14 +138,14 @@ class RISORIUS_OT_sound_set(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_sound_insert(_CorrectsSound, Operator):
-    """Insert a sound in the second half of the chosen one; the keys of the mouth follow"""
+    """Insert a sound in the second half of the chosen sound; the keys of the mouth follow"""
 
     bl_idname = "risorius.sound_insert"
     bl_label = "Insert Sound"
 
     sound: bpy.props.StringProperty(
         name="Phoneme",
-        description="A mouth such as M B P, or a phoneme such as AA",
+        description="A mouth shape such as M B P, or a phoneme such as AA",
         default="AH",
         options={"SKIP_SAVE"},
     )
@@ -225,7 +225,8 @@ class RISORIUS_OT_speech_update(_Corrects, Operator):
             return
         for name in spoken_markers.take(scene, action, placing):
             text = (
-                "{name} was moved past its neighbour and stays beside it: sounds keep their order."
+                "{name} was moved past its neighbour and stays beside this "
+                "neighbour: sounds keep their order."
             )
             self.report({"WARNING"}, words.say(text, name=name))
 

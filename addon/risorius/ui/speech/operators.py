@@ -31,7 +31,7 @@ _FADE = 0.1  # seconds for fading in and fading out a voice's layer
 
 
 class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
-    """Let the active face speak a sound file; typed words make it better"""
+    """Let the active face speak a sound file; typed words improve the mouth movement"""
 
     bl_idname = "risorius.speak"
     bl_label = "Speak from Audio"
@@ -41,15 +41,20 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in SOUNDS), options={"HIDDEN"}
     )
     transcript: bpy.props.StringProperty(
-        name="Transcript", description="Spoken words in English; empty: recognise them"
+        name="Transcript",
+        description=("Spoken words in English; empty: recognise the words in the sound"),
     )
     transcript_text: bpy.props.StringProperty(
         name="Text", description="A text of this file that holds the transcript"
     )
     intensity: bpy.props.FloatProperty(
-        name="Intensity", description="Strength of mouth and brows", default=1.0, min=0.0, max=4.0
+        name="Intensity",
+        description="Strength of the motion of mouth and brows",
+        default=1.0,
+        min=0.0,
+        max=4.0,
     )
-    seed: bpy.props.IntProperty(name="Seed", description="Seed of the blinks")
+    seed: bpy.props.IntProperty(name="Seed", description="Seed of the random times of the blinks")
     use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
     use_accents: bpy.props.BoolProperty(
         name="Accents", description="Move brows and head with stressed words", default=True
@@ -64,13 +69,15 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     use_whole_frames: bpy.props.BoolProperty(
         name="Whole Frames",
-        description="Keys on the scene's frames only; off: the voice is sampled 60 times a second, "
-        "and keys lie between frames too",
+        description="Insert keys only on frames of the scene; off: the voice is "
+        "sampled 60 times per second, and keys lie between frames too",
         default=True,
     )
     use_every_frame: bpy.props.BoolProperty(
         name="Every Frame",
-        description="A key at each frame; off: as few keys with handles as the curves need",
+        description=(
+            "Insert a key at each frame; off: insert as few keys with handles as the curves need"
+        ),
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
@@ -135,7 +142,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Listening to {name}: {share} %, Esc cancels", name=name, share=share)
 
     def cancelled_text(self) -> str:
-        return words.say("Speech was cancelled.")
+        return words.say("Speak from Audio was cancelled.")
 
     def finish(self, context: Context) -> Result:
         """Place the animation on the face, unless the face was deleted or is not active."""
@@ -145,12 +152,13 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
                 raise task.error or FaceError("nothing was heard")
             if not type(self).poll(context) or face_rig(context).session_uid != self._face:
                 text = (
-                    "Nothing was spoken, as the face is no longer active: select it, then "
-                    "use Speak from Audio again."
+                    "No speech was added, because the face is no longer active: "
+                    "select the face, then use Speak from Audio again."
                 )
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
-            notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
+            told = task.result.metadata.get("notes", "").split("; ")
+            notes = [words.local(note) for note in told if note]
             name = Path(self.filepath).stem
             few = 0.0 if self.use_every_frame else self.tolerance
             action = self.place(

@@ -21,11 +21,11 @@ SHAPES = (
         "DRIVEN",
         "Driven Keys",
         (
-            "Use the shape keys of the library, moved by drivers; later edits of "
-            "the library are shown"
+            "Use the shape keys of the library file, moved by drivers; later edits "
+            "of that file are shown"
         ),
     ),
-    ("LOCAL", "Local Meshes", "Meshes copied into this file: live sum and edits are possible"),
+    ("LOCAL", "Local Meshes", "Copy the meshes into this file: Live mode and edits are possible"),
 )
 
 

@@ -254,7 +254,7 @@ class Clip:
         }
         unknown = set(changes) - set(values)
         if unknown:
-            raise TypeError(f"a clip has no {sorted(unknown)[0]}")
+            raise TypeError(f"a clip has no field {sorted(unknown)[0]}")
         return Clip(**{**values, **changes})  # type: ignore[arg-type]
 
     def to_bytes(self) -> bytes:

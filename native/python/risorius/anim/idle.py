@@ -323,8 +323,7 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """The next point to look at, in degrees. A gaze far from straight ahead often returns near
-    it."""
+    """The next gaze in degrees. After a gaze far from straight ahead, it is often near 0."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale

@@ -40,8 +40,8 @@ class Layer:
             outside.
         mask: {region, control or pattern: weight}, see regions.mask; or float[controls] in [0, 1];
             None for all controls. Controls without a curve in the source never change.
-        start: scene time at which the clip (or its clip_range) or the pose starts; None: the clip's
-            own start, or always for a pose.
+        start: scene time at which the clip (or its clip_range) or the pose starts. None: a clip
+            starts at its own start time, and a pose is active at all times before its end.
         end: scene time at which a pose ends; the end of a clip follows from its length, scale and
             repeat.
         clip_range: first and last clip time to play; None for the whole clip.
@@ -323,7 +323,9 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
                 "repeat and reverse, was expected"
             )
     elif not still and end is not None:
-        raise ArgumentError(f"layers[{place}].end: a clip ends by its length, none was expected")
+        raise ArgumentError(
+            f"layers[{place}].end: a clip ends by its length, so that no end was expected"
+        )
     if start is None:
         start = -math.inf if still else first
     weight = layer.weight

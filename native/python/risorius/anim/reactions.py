@@ -65,7 +65,7 @@ class Reaction:
 class Yield:
     """A rule: active controls `by` weaken each control in `of` by a factor.
 
-    The factor is 1 - amount * measure(by).
+    The factor is 1 - amount * m; `measure` says whether m is the maximum, minimum or mean of `by`.
     """
 
     name: str

@@ -47,8 +47,10 @@ Say = Callable[[str], None]
 _READ, _CHECKED, _SHAPED = 0.1, 0.4, 0.8  # progress of shape_face
 FIT_VERTICES = 12_000  # joints are fitted to a head simplified to this, see RigOptions
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
-# Progress after each step, 0 to 1.
+# Finished share of the work, 0 to 1, after finding the face, reading the template, registering the
+# template onto the head, and transferring the displacements.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.8
+# The same after fitting missing meshes, adding up correctives, repair, and moving lashes and brows.
 _COMPLETE, _WHOLE, _MENDED, _JOINED = 0.83, 0.85, 0.97, 0.99
 
 
@@ -247,7 +249,7 @@ def whole_ways(ways: SparseShapes[Pose], progress: Progress | None = None) -> Sp
 
 def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
     count = len({name for part in parts for name in part.shapes})
-    return [f"{counted(count, 'shape')} of the head itself left out"] if count else []
+    return [f"the head's own shapes are left out: {count:,}"] if count else []
 
 
 def _copy_board(template: Dna, dna: Dna) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the meshes of a head at rest from an OBJ, glTF or FBX file."""
+"""Reads the meshes of a head in its rest pose from an OBJ, glTF or FBX file."""
 
 from __future__ import annotations
 

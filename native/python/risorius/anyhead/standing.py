@@ -81,15 +81,17 @@ def stand(
     hints = Hints(where, given, up, front, paired_balls(able))
     found, backwards = _found(skin, hints, progress)
     if backwards:
-        notes.append("the polygons show their backs: they are turned")
+        notes.append("the polygons faced inwards and were flipped")
     found.landmarks.require(where)
     found.require_lips(where)
     turn = _upright(found.pose.rotation)
     factor, odd = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)
     if not np.array_equal(turn, np.eye(3)):
         looks, top = word_of(turn[2]), word_of(turn[1])
-        notes.append(f"the face looks about along {looks}, its top is {top} (by its form): it is "
-                     "turned until it stands")  # fmt: skip
+        notes.append(
+            f"by its form, the face looks roughly along {looks}, its top is {top}: it was turned "
+            "upright"
+        )
     pose = replace(
         found.pose,
         rotation=turn @ found.pose.rotation,
@@ -151,7 +153,7 @@ def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]
     """The factor from the head's unit to cm, and notes on an unusual height.
 
     Args:
-        height: height of the face from the chin to the top, in the head's unit.
+        height: height from the chin to the top of the head, in the head's unit.
         unit: the unit of the file format.
         wishes: the user's unit, scale or height, which have precedence.
     """

@@ -21,7 +21,8 @@ class Ways:
 
     Attributes:
         rest: float64[joints, 3], neutral positions of all joints.
-        whole: float64[C, joints, 3, 4], motions of the new face's joints with input C at 1.
+        whole: float64[C, joints, 3, 4], motions of the new face's joints with input C at 1, as
+            matrices from positions in the rest pose to posed positions.
         made: share -> motions of the new face's joints with the input at this value.
         before: share -> motions of the source's joints with the input at this value.
         turning: bool[C], whether an input moves joints of the source.

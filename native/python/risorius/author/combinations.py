@@ -57,7 +57,7 @@ class _Side:
         self.rest = np.linalg.inv(sk.world_matrices(dna, np.zeros_like(self.deltas[0])))
 
     def worlds(self, active: Sequence[int], extra: Doubles | float = 0.0) -> Doubles:
-        """float64[joints, 4, 4]: world matrices with inputs at 1.
+        """float64[joints, 4, 4]: matrices from the joints' axes to the world, with inputs at 1.
 
         Args:
             active: inputs at 1.

@@ -32,7 +32,7 @@ class FitOptions:
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric
     threads: int = 0  # number of threads; 0: all cores; the result does not depend on it
-    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # A joint does not move in an expression in which it would move every vertex by less than this
     # distance, in the mesh' unit.
     least_effect: float = 0.0
     # The result is the round with the smallest maximum error: among the second half of the rounds
@@ -47,11 +47,15 @@ def bounded(options: FitOptions) -> FitOptions:
 
 
 def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:
-    """Rotation vectors and shifts of the joints, both float64[E, J, 3], of rigid motions.
+    """Split rigid motions into rotation vectors about the joints, and shifts of the joints.
 
     Args:
-        motions: float64[E, J, 3, 4], motion of each joint in each expression.
-        positions: float64[J, 3], positions of the joints.
+        motions: float64[E, J, 3, 4], motion of each joint in each expression, as a matrix from
+            neutral to posed positions.
+        positions: float64[J, 3], neutral positions of the joints.
+
+    Returns:
+        Both float64[E, J, 3]; an angle is in radians.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
     return rotation_vectors(motions[..., :3]), moved - positions
@@ -70,15 +74,15 @@ def fit_joints(
     progress: Progress | None = None,
 ) -> JointFit:
     """Fit positions and motions of new joints in addition to given joints, and weights of all
-    joints.
+    joints. A motion is a matrix from neutral to posed positions.
 
     Args:
         neutral: float64[V, 3], neutral vertices; the face's middle is x = 0.
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of the given joints.
-        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
-            all expressions.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must not move
+            in any expression.
         importance: float64[V], weight of a vertex' squared error; None: 1.
         pivots: points at which joints of some expressions are placed.
         options: options of the fit.
@@ -109,13 +113,15 @@ def fit_motions(
 ) -> JointFit:
     """Fit positions and motions of new joints whose weights are known from another face.
 
+    A motion is a matrix from neutral to posed positions.
+
     Args:
         neutral: float64[V, 3], neutral vertices.
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of the given joints.
-        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must rest in
-            all expressions.
+        motions: float64[E, J, 3, 4], motions of the given joints; at least one joint must not move
+            in any expression.
         weights: float64[V, J + new joints], skin weights: given joints first, then new ones.
         pivots: points at which joints may be placed.
         at: index of the pivot of each new joint; None: the joint is placed in the middle of its
@@ -155,7 +161,7 @@ def fit_weights(
         displacements: float32[E, V, 3], displacements with each expression at 1.
         edges: uint32[n, 2], edges of the polygons.
         given: float64[J, 3], positions of all joints.
-        motions: float64[E, J, 3, 4], motions of all joints.
+        motions: float64[E, J, 3, 4], matrices of all joints from neutral to posed positions.
         importance: float64[V], weight of a vertex' squared error; None: 1.
         mirrored: int64[J], the joint of the other side; None: found by place and motion.
         start: float64[V, J], weights to start with, for example of the finer mesh.

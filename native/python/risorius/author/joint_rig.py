@@ -96,8 +96,8 @@ def make_joint_rig(
 
     Raises:
         DnaError: a value is not finite, nothing moves, or progress returned False.
-        ValueError: the face has no mesh, a joint changes its size, no joint rests, or the face has
-            another topology than `like`.
+        ValueError: the face has no mesh, a joint changes its size, every joint moves, or the face
+            has another topology than `like`.
     """
     work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
     made.finish()
@@ -376,8 +376,8 @@ def _order_levels(
     own = np.arange(count) + len(work.source.joint_names)
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
-    # Shifts of resting joints, such as the neck, count as further expressions, so that vertices
-    # keep the resting joint that they follow.
+    # Shifts of joints that no expression moves, such as the neck, count as further expressions, so
+    # that vertices keep following the same of these joints.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),

@@ -24,8 +24,8 @@ from .work import (
     resting,
 )
 
-# Expressions that move vertices along an arc are also fitted at the value 0.5: the weight of their
-# displacements there. Displacements at the value 1 have the weight 1.
+# Weight of the displacements at the control value 0.5, at which expressions that move vertices on
+# arcs are also fitted. Displacements at the value 1 have the weight 1.
 _HALVES = 1.5
 
 
@@ -76,7 +76,9 @@ def level_weights(
 
 
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
-    """Additional expressions that shift resting joints, so that vertices keep following them.
+    """Additional expressions that shift joints that no real expression moves, such as the neck.
+
+    Because of them, vertices keep following these joints.
 
     Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
         the source that the fit uses.

@@ -79,7 +79,7 @@ class _Merging:
     Attributes:
         points: float64[V, 4], vertices in homogeneous coordinates.
         weights: float64[V, J], skin weights of the joints that are still there.
-        motions: float64[J, E, 3, 4], the displacement that a joint gives to a point.
+        motions: float64[J, E, 3, 4], matrices from a vertex to its displacement by a joint.
         heirs: removed joint -> joint that took its vertices.
         there: bool[J], whether a joint is still there.
         can_leave: bool[J], whether a joint may be removed.
@@ -146,7 +146,7 @@ def joint_order(
     Args:
         positions: float64[V, 3], neutral vertices.
         weights: float64[V, J], skin weights.
-        rotations: float64[E, J, 3, 3], rotation of each joint in each expression.
+        rotations: float64[E, J, 3, 3], rotation of each joint in each expression, from neutral.
         translations: float64[E, J, 3], shift of each joint's position in each expression.
         centres: float64[J, 3], positions of the joints.
         mirrored: int64[J], the joint of the other side; a joint in the middle names itself.

@@ -30,7 +30,7 @@ _ROOM = 0.08  # fraction of the new joints that is reserved for second joints
 
 
 def joint_motions(fit: Joints) -> Doubles:
-    """float64[E, J, 3, 4]: rigid motion of each joint in each expression.
+    """float64[E, J, 3, 4]: rigid motion of each joint in each expression, from the neutral pose.
 
     Args:
         fit: the joints; it has rotation vectors and shifts about the joints' positions.
@@ -97,10 +97,10 @@ def second_joints(
     weights: dict[int, Doubles],
     room: int,
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
-    """Duplicate joints whose vertices follow two resting joints, such as neck and head.
+    """Duplicate joints whose vertices follow two joints that no expression moves: neck and head.
 
-    The second joint has the same motions, but the other resting joint as parent. So the vertices
-    move as in the source if an animator rotates the neck.
+    The second joint has the same motions, but the other of these two joints as parent. So the
+    vertices move as in the source if an animator rotates the neck.
 
     Args:
         work: the face; the parents of new joints must be known.
@@ -171,7 +171,7 @@ def _split(
 def _follow(
     work: Work, meshes: Sequence[int], fit: Joints, rows: Doubles, mirrored: Ints, jaw: int
 ) -> npt.NDArray[np.bool_]:
-    """bool[new joints]: whether a joint's motion is closer to the jaw's motion than to rest."""
+    """bool[new joints]: whether a joint's motion is closer to the jaw's motion than to none."""
     first = len(given(work))
     moving = np.flatnonzero(np.abs(work.motions[:, jaw] - np.eye(3, 4)).max(axis=(1, 2)) > 1e-9)
     own = joint_motions(fit)[moving, first:]

@@ -235,8 +235,8 @@ def refit(
     for m in shaped:
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin))
         begin += len(dna.meshes[m].positions)
-    # The fit gets the weights of all resting joints as weights of the head, because none of them
-    # moves.
+    # The fit gets the weights of all joints that no expression moves (neck, spine) as weights of
+    # the head, because it cannot distinguish these joints.
     rows = np.concatenate([weights[m] for m in shaped])
     others = np.setdiff1d(np.arange(rows.shape[1]), own)
     rows[:, work.head] += rows[:, others].sum(axis=1)

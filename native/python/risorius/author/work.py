@@ -21,7 +21,7 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift in mm of a resting joint in carried_shifts(). A vertex that follows another neck joint than
+# Shift in mm of an unmoved joint in carried_shifts(). A vertex that follows another neck joint than
 # in the source gets this error, because a rotated head separates such vertices about this far.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
@@ -46,7 +46,7 @@ class RigOptions:
     # Whether the rig has at most as many blend shape deltas as the source face. If necessary, the
     # shortest deltas are removed even above the tolerance.
     lighter: bool = True
-    # A joint stays at rest in an expression in which it would move every vertex by less than this
+    # A joint does not move in an expression in which it would move every vertex by less than this
     # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
@@ -112,7 +112,7 @@ class Work:
     names: list[str]  # names of these inputs
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
-    head: int  # the resting joint with the largest weights on moved vertices
+    head: int  # the joint that no expression moves with the largest weights on moved vertices
     wanted: dict[int, Wanted] = field(default_factory=dict)  # by mesh, released early
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
@@ -146,13 +146,15 @@ def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
         joint = int(np.argwhere(deltas[..., 6:9].any(axis=(0, 2)))[0, 0])
-        raise ArgumentError(f"joint {dna.joint_names[joint]} changes its size: not supported")
+        raise ArgumentError(
+            f"joint {dna.joint_names[joint]} is scaled by a control, which is not supported"
+        )
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
     shaped = {c for mesh in dna.meshes for c in sk.shaped_columns(dna, mesh, count)}
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     if not columns:
-        raise ArgumentError("a face with controls that move it was expected, found none that does")
+        raise ArgumentError("a face with controls that move it was expected, found none")
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
@@ -218,7 +220,9 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """The resting joint with the largest sum of its weights times the motion of the vertices."""
+    """Of the joints that no expression moves, the one with the largest sum over the vertices of
+    its weight times the vertex' motion.
+    """
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
@@ -245,7 +249,7 @@ def needs_joints(work: Work, wanted: Wanted) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish resting joints. But vertices must keep following the same one,
+    The fit cannot distinguish these joints. But vertices must keep following the same one,
     because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
@@ -253,8 +257,8 @@ def resting(work: Work) -> Ints:
 
 
 def carriers(work: Work) -> Ints:
-    """int64[joints]: for each joint, its own index if it rests, otherwise the index of the nearest
-    resting joint above it.
+    """int64[joints]: for each joint, its own index if no expression moves it, otherwise the index
+    of its nearest ancestor that no expression moves.
 
     Args:
         work: the face. New joints are included if their parents are chosen.
@@ -273,10 +277,9 @@ def carriers(work: Work) -> Ints:
 
 
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V, resting]: the fraction of a vertex' weights that each resting joint carries.
+    """float64[V, n]: the fraction of a vertex' weights that each of the n joints of resting() has.
 
-    It is the sum of the weights on the joints whose carriers() is the resting joint. Rows have the
-    sum 1.
+    It is the sum of the weights on the joints whose carriers() is this joint. Rows have the sum 1.
 
     Args:
         work: the face.
@@ -289,19 +292,19 @@ def carried_shares(work: Work, mesh: Mesh) -> Doubles:
 
 
 def carried_shift(work: Work) -> float:
-    """CARRIED_MM in the file's unit: the shift of resting joints in carried_shifts()."""
+    """CARRIED_MM in the file's unit: the shift of unmoved joints in carried_shifts()."""
     return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
-    """float64[n, joints, 3]: shifts of all joints if each of n resting joints is shifted upwards.
+    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.
 
     Args:
         work: the face; the parents of new joints must be known.
-        joints: n resting joints.
+        joints: n joints that no expression moves, see resting().
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
     out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])

@@ -44,7 +44,7 @@ def bake(
         clip: clip that is already resampled and cut, see `prepared`.
         face, lod: the character, and the LOD from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
-            Temporary files that killed processes left in the folders of these paths remain.
+            Temporary files of killed processes in these folders are not deleted.
         parts: pose parts to write, some of PARTS.
         compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips of a character's controls, from animation files of any kind."""
+"""Loads clips of a character's controls from animation files of any kind."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ _CHUNK_BYTES = 8 << 20
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character, and unique names of its joints, channels, maps and controls."""
+    """A compiled character, and unique names of its joints, blend shapes, maps and controls."""
 
     name: str
     rig: risorius.Rig
@@ -64,7 +64,7 @@ class Face:
     def rest(self, part: str) -> Floats:
         """The rest values of a part of the pose, one of PARTS.
 
-        The part "joints" has float32[joints, columns]; the other parts have float32[count].
+        The part "joints" has float32[joints, columns]; other parts have float32[n], one per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
@@ -83,11 +83,12 @@ class Face:
 
 
 def load_face(path: Path, *, quaternions: bool = False) -> Face:
-    """The character of a DNA file, compiled or from the user's cache of compiled faces.
+    """Compile the character of a DNA file, or load it from the user's cache of compiled faces.
 
     Args:
         path: path of the DNA file.
-        quaternions: rotations of joints are quaternions, otherwise Euler angles in the file's unit.
+        quaternions: True: rotations of joints are quaternions (x, y, z, w); False: Euler angles in
+            the file's unit.
 
     Raises:
         DnaError: not a valid DNA file.
@@ -207,8 +208,8 @@ def missing(clip: risorius.Clip, face: Face) -> list[str]:
 def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
     """The poses of all frames, in chunks whose size depends on the character and `threads`.
 
-    Controls without a curve are at rest. Each frame equals Rig.evaluate of its controls, bit for
-    bit.
+    Controls without a curve have their rest value. Each frame equals Rig.evaluate of its controls,
+    bit for bit.
 
     Args:
         clip: curves of raw controls; unknown ones are ignored.

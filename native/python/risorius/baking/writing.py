@@ -95,7 +95,7 @@ class NpzWriter:
                 raise
 
     def finish(self) -> None:
-        """Write the parts that waited in temporary files, then the arrays without frames."""
+        """Write the parts that waited in temporary files, then the arrays of `beside`."""
         if self._first is not None:
             self._first.close()
             self._first = None
@@ -161,7 +161,7 @@ def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> di
         parts: parts to examine, from PARTS.
 
     Returns:
-        Part -> int64[moving], flat indices of these components.
+        Part -> int64[moving], indices of these components in the flattened array face.rest(part).
     """
     rests = {part: face.rest(part) for part in parts}
     moving = {part: np.zeros(rest.shape, bool) for part, rest in rests.items()}

@@ -45,7 +45,7 @@ class OneEuro:
     From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
 
     Attributes:
-        cutoff: cutoff frequency at rest in Hz; may be changed between frames.
+        cutoff: cutoff frequency at speed 0, in Hz; may be changed between frames.
         beta: growth of the cutoff: Hz per (unit per second) of speed.
         speed_cutoff: cutoff frequency for the speed in Hz.
         longest_gap: seconds between two frames; after a longer gap, or a step back in time, the
@@ -62,7 +62,7 @@ class OneEuro:
         """Start without previous values.
 
         Args:
-            cutoff: cutoff at rest in Hz, above 0.
+            cutoff: cutoff frequency at speed 0, in Hz, above 0.
             beta: growth of the cutoff with speed, 0 or more.
             speed_cutoff: cutoff for the speed in Hz, above 0.
             longest_gap: seconds; None: the filter never restarts, and a frame that is not later
@@ -83,8 +83,8 @@ class OneEuro:
         """Filtered values of a frame.
 
         Args:
-            time: time in seconds; a time that is not later returns the last values or restarts the
-                filter, see longest_gap.
+            time: time in seconds; a time that is not later than the last one returns the last
+                values or restarts the filter, see longest_gap.
             values: [controls]; a different number of controls restarts the filter.
 
         Returns:

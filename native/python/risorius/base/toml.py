@@ -30,7 +30,7 @@ def parse(text: str) -> dict[str, Any]:
         TomlError: not TOML, longer than MOST_BYTES, or nested deeper than DEEPEST.
     """
     if len(text) > MOST_BYTES:
-        raise TomlError(f"at most {MOST_BYTES:,} letters were expected, found {len(text):,}")
+        raise TomlError(f"at most {MOST_BYTES:,} characters were expected, found {len(text):,}")
     deep = f"nested at most {DEEPEST} deep was expected, found more"
     if found := _DEEP_KEY.search(text):
         raise TomlError(f"keys {deep} (line {text.count(chr(10), 0, found.start()) + 1})")

@@ -94,7 +94,7 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
 def complain(args: argparse.Namespace) -> None:
     """Check the options before the file is opened. Raises: CommandLineError."""
     if args.indent is not None and args.output_kind != "json":
-        raise CommandLineError("--indent: only JSON is indented")
+        raise CommandLineError("--indent is only for JSON output")
     if not args.force:
         refuse_same_file(args.input, args.output, "--force replaces it")
     require_writable(args.output)

@@ -133,7 +133,7 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
     Args:
         values: float32[n].
         names: names of the values; a value without a name is called "control" and its index.
-        first: index of the control that has the first value.
+        first: index of the control whose value is values[0].
     """
     return [
         {
@@ -218,11 +218,13 @@ def check_options(args: argparse.Namespace) -> None:
     if args.out is not None:
         for name, default in (("explain", False), ("gui", False), ("top", 10)):
             if getattr(args, name) != default:
-                raise CommandLineError(f"--{name}: is of one pose and not of a clip (-o)")
+                raise CommandLineError(
+                    f"--{name} shows one pose and is not possible with a clip (-o)"
+                )
         return
     for name in eval_clip.OPTIONS:
         if getattr(args, name) not in (None, False):
-            raise CommandLineError(f"--{name}: is of a clip's frames, for which -o is missing")
+            raise CommandLineError(f"--{name} is for the frames of a clip, for which -o is missing")
     if any(text.lower().endswith(".dna") and "=" not in text for text in args.controls):
         raise CommandLineError("a clip on a character: -o OUT.npz or -o OUT.csv was expected")
 

@@ -106,7 +106,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
     if kind is None:
         raise CommandLineError(f"-o: a name ending in .npz or .csv was expected, found {args.out}")
     if args.compress and kind != "npz":
-        raise CommandLineError("--compress: only an .npz is compressed")
+        raise CommandLineError("--compress is only for .npz output")
     if len(args.controls) != 1:
         raise CommandLineError(
             f"-o writes the frames of a clip: CLIP DNA were expected, found {args.file} and "

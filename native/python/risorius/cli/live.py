@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
-    """Write the take; report frames and app curves that the file lacks."""
+    """Write the take; report dropped frames, and curves of the app that no control uses."""
     if not len(take):
         raise InputError(f"{path} was not written: no face came")
     if take.full:

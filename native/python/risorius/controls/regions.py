@@ -81,7 +81,7 @@ def mask(
         float32[names].
 
     Raises:
-        ValueError: a weight out of range, or a part that matches no control.
+        ValueError: a weight out of range, or a part that is no region and matches no control.
     """
     out = np.full(len(names), default, np.float32)
     for part, weight in parts.items():

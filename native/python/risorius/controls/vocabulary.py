@@ -10,7 +10,8 @@ controls), `same` (names with one meaning) and `names`. The meaning of a name is
 - a raw control without prefix, or a list of them. "*" stands for both sides and "**" for the four
   lip quarters. If the name contains "*", it stands for a side, L or Left, in name and meaning;
 - "=jawOpen": an ARKit unit;
-- "@aa": an expression of the library. In a list, it applies if other names have the controls;
+- "@aa": an expression of the library. In a list with controls, the expression is used only if
+  another name of the same head already means one of these controls;
 - a table {control, unit or "@expression" = weight}: a shape of the whole face;
 - []: a name without meaning, such as Neutral.
 """

@@ -98,7 +98,8 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether both faces give equal bytes; else there may be differences that no module found."""
+    """Whether the DNA files of both faces have equal bytes; if not, a module may have missed one
+    difference or more."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

@@ -243,10 +243,11 @@ def explain_joints(
 ) -> list[dict[str, Any]]:
     """Each joint that is not at rest; the joint that moves most is first.
 
-    Movement is a length: translation, plus bone length times angle in radians, plus bone length
-    times change of scale. The bone length is the median of the file. A control's share is the part
-    of its contribution in the direction of the joint's whole movement. The shares of a joint sum to
-    1; a control that works against the movement has a negative share.
+    Movement is the length of a vector of nine elements: translations, angles in radians times the
+    bone length, and changes of scale times the bone length. The bone length is the median of the
+    file. A control's share is the part of its contribution in the direction of the joint's whole
+    movement. The shares of a joint sum to 1; a control that works against the movement has a
+    negative share.
 
     Args:
         dna: the face.

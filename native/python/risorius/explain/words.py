@@ -17,7 +17,8 @@ def page(facts: Facts, top: int = 10) -> str:
     """The facts as text.
 
     Args:
-        top: most lines per list; further entries are counted.
+        facts: the result of explain().
+        top: largest number of lines per list; further entries are only counted.
     """
     sections = [
         _raw(facts, top),

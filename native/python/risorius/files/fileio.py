@@ -129,7 +129,7 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
 
 @contextlib.contextmanager
 def staging(path: _Path) -> Iterator[Path]:
-    """Yield a path with the same file name in a hidden folder, for a library that writes by path.
+    """Yield a path with the same name in a hidden folder, for a library that opens the file itself.
 
     When the block ends, all files in the hidden folder are moved to the folder of `path`, with
     their subfolders, and the file itself last. Only then existing files are replaced; after an

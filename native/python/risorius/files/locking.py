@@ -30,7 +30,7 @@ class LockedError(RisoriusError):
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of an existing folder during the context.
 
-    The lock belongs to the operating system, which ends it even if the process is killed. A file
+    The operating system ends the lock when the process ends, even if it is killed. A file
     `.risorius.lock` contains the name of the holder.
 
     Raises:

@@ -128,7 +128,7 @@ class Sums:
         return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))
 
     def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
-        """float64[P, 3]: rig minus linear sum in metres, at the pose with the largest weight."""
+        """float64[P, 3]: rig minus linear sum in metres, at the combination's largest weight."""
         top = next((t for t in map(self._targets.__getitem__, of) if t.needs), None)
         if top is not None:
             return self._missing_on_top(kind, top, of)

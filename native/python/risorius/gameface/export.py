@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Exports a face as one glTF file within a size: meshes, morph targets, materials, joints."""
+"""Exports a face as one glTF file within a size limit: meshes, targets, materials, joints."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ class _Maker:
             self._points, self._skeleton, self._materials, changes, wishes, self._manner,
             self._body, self._chains,
         )  # fmt: skip
-        self.notes = self._combined + list(dict.fromkeys(self._materials.notes))
+        self.notes = self._pair_notes + list(dict.fromkeys(self._materials.notes))
         self.notes += self._body.notes if self._body else []
         return written
 
@@ -230,7 +230,7 @@ class _Maker:
         presets = {t.name: t for t in self._targets if t.group == "vrm"}
         self._manner = measured(self._points, self._sums, presets) if wishes.vrm else Manner()
         self._found = {group: self._sums.errors(group) for group in dict.fromkeys(wishes.shapes)}
-        self.made, self._combined, self._refined = [], [], []
+        self.made, self._pair_notes, self._refined = [], [], []
         if wishes.within is None:
             return
         room = _COMBINATIONS if wishes.most is None else wishes.most - len(self._targets)
@@ -238,9 +238,9 @@ class _Maker:
         self.made = chosen(first, wishes.within, room)
         left = first[len(self.made)].error_mm if len(self.made) < len(first) else 0.0
         if left > wishes.within:
-            self._combined.append(
-                f"combinations: {counted(room, 'target')} leave {left:.2f} mm of "
-                f"{joined(first[len(self.made)].of)}: more than {wishes.within:g} mm"
+            self._pair_notes.append(
+                f"combinations: with {counted(room, 'target')}, {left:.2f} mm of "
+                f"{joined(first[len(self.made)].of)} remain: more than {wishes.within:g} mm"
             )
 
         if _driven(wishes) == "arkit":

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Measures values of VRM expressions on a face.
 
-These are the angles of the gaze, and the presets that must fade out during a feeling because the
-sum of both morph targets would deform the face.
+These are the angles of the gaze, and the presets that must fade out during a preset of a feeling,
+because the sum of the two presets' morph targets would deform the face.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
     """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
 
     Args:
-        points: vertices of the LOD, at rest.
+        points: vertices of the LOD, in the rest pose.
         delta: float32[P, 3], the displacement of the vertices by the target, in metres.
     """
     found = list[float]()

@@ -149,7 +149,7 @@ class Materials:
     def _pixels_of(self, name: str, data: bytes) -> Pixels | None:
         if not data:
             self.notes.append(
-                f"{name}: no such texture beside the DNA file: a plain colour instead"
+                f"{name}: the texture is not in the folder of the DNA file: a plain colour is used"
             )
             return None
         shape = pixels_of(data, opacity=True)
@@ -157,7 +157,7 @@ class Materials:
         if max(wide, high) > LARGEST:
             self.notes.append(
                 f"{name}: at most {LARGEST:,} pixels a side were expected, found {wide:,} x "
-                f"{high:,}: a plain colour instead"
+                f"{high:,}: a plain colour is used"
             )
             return None
         pixels = read_pixels(data, opacity=True) if shape else None
@@ -169,7 +169,7 @@ class Materials:
             )
         elif pixels is None:
             self.notes.append(
-                f"{name}: a PNG or JPEG file was expected, this is {media}: a plain colour instead"
+                f"{name}: a PNG or JPEG file was expected, this is {media}: a plain colour is used"
             )
         return pixels
 

@@ -62,7 +62,7 @@ class Points:
     Attributes:
         parts: the meshes that have triangles.
         rest: float64[P, 3], rest positions in metres; y up, the face looks along z.
-        axes: float64[3, 3], maps the file's axes and unit to glTF's metres.
+        axes: the result of axes_of.
     """
 
     def __init__(
@@ -148,6 +148,8 @@ class Points:
 
 def axes_of(dna: Dna, *, faces_back: bool = False) -> Doubles:
     """float64[3, 3]: maps the file's axes and unit to glTF's: metres, y up, z to the front.
+
+    Positions in glTF are `points @ axes.T`.
 
     Args:
         dna: its metadata names axes and unit.

@@ -191,7 +191,7 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
 
     Args:
         targets: targets of the group arkit.
-        rest: float32[R], raw controls at rest.
+        rest: float32[R], values of the raw controls in the rest pose.
         weights: float64[targets], 0 to 1.
     """
     column = {target.name: i for i, target in enumerate(targets)}

@@ -96,7 +96,7 @@ class _Finder:
                 absent.append(f"{name} ({_short(missing)})")
                 continue
             if missing:
-                partly.append(f"{name} (without {_short(missing)})")
+                partly.append(f"{name} ({_short(missing)})")
             out.append(self._target(name, group, weights))
         if not any(rows[t.name] for t in out):
             raise GameFaceError(
@@ -107,7 +107,7 @@ class _Finder:
             many = counted(len(absent), "shape")
             notes.append(f"{group}: {many} of {len(rows)} left out, the rig lacks {_some(absent)}")
         if partly:
-            notes.append(f"{group}: approximated: {_some(partly)}")
+            notes.append(f"{group}: approximated, the rig lacks controls: {_some(partly)}")
         return out
 
     def _target(self, name: str, group: str, weights: Mapping[str, float]) -> Target:

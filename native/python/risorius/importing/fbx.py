@@ -364,7 +364,7 @@ def _curves(
                 scene.budget.work(keys.times.size, name)
                 if not np.array_equal(out[name].values, keys.values):
                     scene.notes.append(
-                        f"{name}: another node moves it differently, the first is taken"
+                        f"{name}: another node moves it differently, the first one is taken"
                     )
     if bones:
         scene.notes.append(f"{bones} track(s) move nodes, not shapes or properties: left out")
@@ -437,7 +437,7 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
         raise AnimationFileError(scene.name, f"{place}: key times that ascend were expected")
     flags, slopes = _attributes(node, times.size)
     if (flags & _WEIGHTED).any() and (flags & _CUBIC).any():
-        note = "weighted tangents are taken as plain ones"
+        note = "weighted tangents are read as unweighted ones"
         notes += [note] if note not in notes else []
     kinds = np.full(times.size, LINEAR, np.uint8)
     kinds[(flags & _CONSTANT) != 0] = CONSTANT

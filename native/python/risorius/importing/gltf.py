@@ -192,12 +192,17 @@ class Document:
             raise self.fail(at, "indices and values were expected")
         indices, values = (part for part in parts if isinstance(part, dict))
         if indices.get("componentType") not in (5121, 5123, 5125):
-            raise self.fail(f"{at}.indices", "whole numbers without a sign were expected")
+            raise self.fail(
+                f"{at}.indices",
+                "indices of type 5121, 5123 or 5125 (unsigned integers) were expected",
+            )
         kind = np.dtype(_TYPES[indices["componentType"]])
         self.budget.hold(count * (1 + out.shape[1]) * 8, at)
         rows = self._viewed(indices, f"{at}.indices", kind, (count, 1))[:, 0].astype(np.int64)
         if count and rows.max() >= len(out):
-            raise self.fail(f"{at}.indices", f"row {rows.max()} of {len(out)}")
+            raise self.fail(
+                f"{at}.indices", f"row {rows.max()} was found, a row below {len(out)} was expected"
+            )
         out[rows] = self._viewed(values, f"{at}.values", dtype, (count, out.shape[1]))
 
     def _viewed(

@@ -227,7 +227,7 @@ def neurosync(reader: Reader, document: object) -> Take | None:
     rate = reader.rate_of(document)
     if rate is None:
         rate = NEUROSYNC_RATE
-        reader.notes.append(f"{rate:g} frames a second were assumed, as NeuroSync makes")
+        reader.notes.append(f"{rate:g} frames a second were assumed, as NeuroSync writes")
     return reader.take(columns[:count], np.array(values).T, np.arange(len(values)) / rate, rate)
 
 

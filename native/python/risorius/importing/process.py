@@ -97,7 +97,7 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """Makes a face's neutral values 0: subtracts them, and rescales the rest so that 1 stays 1.
 
     A control with the neutral value n becomes (value - n) / (1 - n), clamped to 0 unless the
-    control was negative in the capture. Angles of head and eyes are only subtracted. Some
+    control was negative in the capture. From angles of head and eyes, n is only subtracted. Some
     controls are a share of another control, such as the share of the jaw's opening that the lips
     close. They are calibrated as share times the other control, because a neutral face with shut
     lips may have any share.
@@ -194,7 +194,7 @@ def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
 
     Args:
         clip: any clip.
-        cutoff: cutoff of `OneEuro` at rest in Hz; lower is smoother.
+        cutoff: cutoff frequency of `OneEuro` at speed 0, in Hz; lower is smoother.
         beta: increase of the cutoff with speed, see `OneEuro`.
     """
     running = OneEuro(cutoff, beta)

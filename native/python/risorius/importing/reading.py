@@ -204,7 +204,7 @@ def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
     raw = raw.reshape(clip.frame_count, len(rig.raw_control_names))
     moving = np.flatnonzero(raw.any(axis=0))
     names = [rig.raw_control_names[i] for i in moving]
-    report.notes.append(f"{len(index)} GUI controls of the rig gave {len(names)} raw controls")
+    report.notes.append(f"{len(index)} GUI controls of the rig became {len(names)} raw controls")
     rows = [raw[:, moving].T, clip.selected(angles).curves]
     return clip.replaced(names=[*names, *angles], curves=np.concatenate(rows))
 

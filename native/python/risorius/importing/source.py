@@ -68,14 +68,15 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
 
 
 def refuse_other_kinds(data: bytes, name: str) -> None:
-    """Raises an error that names the kind of a file if its first bytes show no animation file.
+    """Raises an error if the first bytes of a file identify a kind other than animation.
 
     Args:
         data: the file, or its first bytes.
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: a sound, a picture, an archive, a document, a scene, a face ...
+        AnimationFileError: the file is a sound, a picture, an archive, a document, a scene or a
+            face; the error names the kind.
     """
     kind = signatures.other_kind(data)
     if kind is not None:

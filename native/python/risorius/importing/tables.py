@@ -270,7 +270,7 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """Reads a take of Live Link Face; times come from the timecode, not from the row number.
 
     Args:
-        table: 2 columns, then 51 to 61 curves in any order, in either spelling of their names.
+        table: timecode and number of shapes, then 51 to 61 curves in any order.
         asked: the caller's options on timecodes.
 
     Raises:

@@ -378,7 +378,7 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Reads Papagayo's text file: voices with phrases with words with phonemes.
+    """Reads Papagayo's text file: voices, their phrases, the words of these, and their phonemes.
 
     Args:
         text: content of the file.
@@ -411,7 +411,9 @@ def _pgo_word(lines: Lines) -> Word:
     if len(parts) == 3:
         parts.insert(0, "")
     if len(parts) != 4:
-        raise lines.fail("a word, its first and last frame and its phonemes' number were expected")
+        raise lines.fail(
+            "a word, its first frame, its last frame and the number of its phonemes were expected"
+        )
     start, end, count = (lines.count(part, "a frame or a number") for part in parts[1:])
     phonemes = []
     for _ in range(count):
@@ -454,7 +456,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; the mouth rests between words."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]

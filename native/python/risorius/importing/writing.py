@@ -19,7 +19,7 @@ from ..base.errors import ArgumentError
 from ..files import fileio
 from .mapping import load_mapping, mapping_names
 
-# characters that are not allowed in names of Unreal
+# characters that Unreal Engine does not allow in names
 _UNREAL = re.compile(r"""[\s"',./:|&!~@#(){}\[\]=;^%$`]""")
 
 

@@ -121,7 +121,8 @@ def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int
         contribution: float64[correctives], see `contributions`.
 
     Raises:
-        ArgumentError: the number can only be reached by removing correctives that others read.
+        ArgumentError: the number can only be reached by removing correctives that networks,
+            solvers, twists or maps need.
     """
     raw = len(dna.raw_control_names)
     readers: dict[int, set[int]] = {}

@@ -79,7 +79,7 @@ def mirrored_joints(dna: Dna) -> Ints:
 
 
 class Leaving:
-    """Removes joints one after the other. Other joints, its heirs, take over a joint's vertices."""
+    """Removes joints one after the other; other joints (the heirs) take over their vertices."""
 
     def __init__(
         self,

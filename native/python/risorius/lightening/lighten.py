@@ -399,8 +399,9 @@ def _products(
 ) -> Doubles:
     """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
-    For each joint that no pose moves, a small shift of its descendants is added as a pose, because
-    otherwise all resting joints would seem to be interchangeable.
+    For each joint with children that no pose moves, a shift of the joint and its descendants by
+    CARRIED_MM is added as a pose, because otherwise all resting joints would seem to be
+    interchangeable.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))

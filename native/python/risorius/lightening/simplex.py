@@ -45,7 +45,7 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """Minimises with sum 1 over the active weights, which may be negative; the others are 0."""
+    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0."""
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

@@ -210,7 +210,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject with the oldest place."""
+        """The latest frame of a subject; for "", of the subject that came first."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -402,6 +402,6 @@ def _bound(host: str, port: int) -> socket.socket:
                 f"Port {port} is in use: close the program that listens there, or take another."
             ) from error
         raise LiveError(
-            f"Port {port} at {host} cannot be listened to: {error.strerror}."
+            f"Risorius cannot listen at {host}, port {port}: {error.strerror}."
         ) from error
     return listener

@@ -22,8 +22,8 @@ HEAD = ("head.yaw", "head.pitch", "head.roll")
 _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # radians of an eye's rotation at which a look control is 1
-# Cutoff frequency of the filter at rest in Hz, with almost no smoothing; full smoothing uses 5 %
-# of it.
+# Cutoff frequency of the filter at speed 0 in Hz, if `smoothing` is just above 0; at `smoothing` 1
+# the cutoff is 5 % of it.
 _STILL = 12.0
 _LONGEST_GAP = 0.5  # seconds without a frame after which the filter restarts
 Row = dict[str, float]
@@ -147,7 +147,7 @@ class Shaper:
         smoothing: strength of the one-euro filter, 0 (none) to 1; it calms a still face and passes
             quick movements.
         maximum: upper limit of control values.
-        neutral: values of the face at rest, by name in the frame; see `capture`.
+        neutral: values of the neutral face, by name in the frame; see `capture`.
         ranges: the person's ranges, applied to controls before the gain; None: no remapping. If
             `neutral` is set, only the extremes of the ranges are used.
     """
@@ -194,7 +194,7 @@ class Shaper:
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
-        """Uses a frame as the face at rest, whose values are subtracted; None: no subtraction."""
+        """Uses a frame as the neutral face, whose values are subtracted; None: no subtraction."""
         self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
@@ -234,7 +234,7 @@ class Shaper:
         return Controls(plan.controls, result)
 
     def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
-        """Values minus the face at rest, rescaled so that a blend shape still reaches 1."""
+        """Values minus the neutral ones, rescaled so that a blend shape still reaches 1."""
         if not self.neutral:
             return frame.values
         rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)

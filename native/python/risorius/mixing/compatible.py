@@ -95,7 +95,7 @@ def _names(one: Dna, other: Dna) -> str | None:
         if lacking:
             return f"it has no {word} {lacking[0]}"
         if more:
-            return f"it has a {word} {more[0]} that the other lacks"
+            return f"the other face has no {word} {more[0]}"
         return f"its {plural(word)} are in another order"
     if [int(p) for p in one.joint_parents] != [int(p) for p in other.joint_parents]:
         return "a joint hangs on another one"

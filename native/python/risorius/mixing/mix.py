@@ -136,7 +136,7 @@ class Places:
         # beside it.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
-        # Neck and skull surround the face, so their scale is measured at their rim.
+        # Neck and skull surround the face, so their scale is measured at their border to the face.
         for outer in ("neck", "skull"):
             at = REGIONS.index(outer)
             for own, p in zip(sizes, positions, strict=True):

@@ -154,8 +154,8 @@ class Remap:
         """The rescaled values.
 
         Args:
-            values: float32[..., names]. Values below 0 are kept, and so are values above both 1 and
-                the extreme, so that exaggerated captures stay exaggerated.
+            values: float32[..., names]. Values below 0 are kept, and so are values above 1 if the
+                extreme is at most 1, so that exaggerated captures stay exaggerated.
 
         Returns:
             float32[..., names], a copy.

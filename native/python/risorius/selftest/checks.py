@@ -158,7 +158,9 @@ def _evaluate(simd: str) -> str:
         for case in _cases(name):
             error = _error(case, rig)
             if error > TOLERANCE:
-                raise _Failed(f"face {name}, case {count}: {error:.2g} from the reference")
+                raise _Failed(
+                    f"face {name}, case {count}: {error:.2g} away from the reference values"
+                )
             worst, count = max(worst, error), count + 1
     return f"{count} poses, at most {worst:.1g} from the reference"
 
@@ -188,7 +190,9 @@ def _damaged() -> str:
             load(whole[:size])
         except DnaError:
             continue
-        raise _Failed(f"a file of {size} bytes of {len(whole)} was taken")
+        raise _Failed(
+            f"a file that was cut from {len(whole)} to {size} bytes was read without an error"
+        )
     return "files that are cut short are refused"
 
 
@@ -201,19 +205,19 @@ def _files() -> str:
             if path.read_bytes() != whole:
                 raise _Failed("the file that was read differs from the file that was written")
         if load(path).to_bytes() != whole:
-            raise _Failed("the file says something else than its bytes")
+            raise _Failed("the face that was read from the file differs from the bytes of the file")
         names = load(whole).raw_control_names
         curves = np.linspace(0, 1, 5 * len(names), dtype=np.float32).reshape(-1, 5)
         clip = path.with_suffix(".rzc")
         Clip(names, curves, 30.0).save(clip)
         if not np.array_equal(Clip.load(clip).curves, curves):
-            raise _Failed("a clip came back different")
+            raise _Failed("the clip that was read differs from the clip that was written")
         fileio.write_bytes(path, b"")
         if path.read_bytes() != b"":
             raise _Failed("a file could not be replaced")
         left = sorted(p.suffix for p in Path(folder).iterdir())
         if left != [".dna", ".rzc"]:
-            raise _Failed(f"files were left behind: {left}")
+            raise _Failed(f"one .dna and one .rzc file were expected in the folder, found {left}")
     return "a face and a clip, byte for byte, under a name with umlauts and Chinese"
 
 

@@ -2,8 +2,8 @@
 """Finds the control curves that reproduce a moving mesh.
 
 First each frame is solved alone, starting from the solution of the frame before: few controls
-within their limits that bring the face nearest to the mesh. Each control has a price, a multiple of
-the value that noise alone would give it. Then the selected controls are solved without this price,
+within their limits that bring the face nearest to the mesh. A control's value has a price, so that
+noise alone does not set controls. Then the selected controls are solved with a far smaller price,
 all frames together, with a price on sudden changes of speed. The noise is measured, so that curves
 of a clean mesh are exact, and curves of a noisy mesh are smooth.
 """
@@ -32,7 +32,8 @@ _AROUND = 8  # frames before and after a chunk that are smoothed with it
 _FLOOR_MM = 0.004  # mm: smallest noise that is assumed
 _WORTH = 3.0  # price of a control in standard errors of its value
 _LEAST = 0.01  # a control whose curve has a smaller range is not used
-# limits of the usual second difference of a control's curve, at 30 frames per second
+# lowest and highest value assumed for the typical second difference of a control's curve, at 30
+# frames per second
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
 _ENOUGH = 5e-4  # a smaller change of all controls ends an iteration
@@ -272,7 +273,8 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
     sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that the frames solved alone use may change, and their values have no price here.
+    controls that the frames solved alone use may change; the price of their values is only
+    `sparse` per unit.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))

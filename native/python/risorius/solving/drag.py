@@ -181,7 +181,7 @@ def _kept_apart(
 def _both_on(
     opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Opposite pairs in which both controls increased from `begin`: (weaker, stronger) controls.
+    """(weaker, stronger) controls of each opposite pair whose smaller value increased from `begin`.
 
     The weaker control has the smaller value in `begin`, or in `at` if both are equal in `begin`.
     """

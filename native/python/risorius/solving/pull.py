@@ -97,7 +97,7 @@ def make_drag(
     if not count:
         raise ArgumentError("points: one at least was expected, found 0")
     if dragged.shape != (count, 2):
-        raise ArgumentError("points: a mesh and a vertex of each were expected")
+        raise ArgumentError("points: a mesh index and a vertex index of each point were expected")
     wanted = numbers("targets", targets)
     if wanted.shape != (count, 3):
         raise ArgumentError(f"targets: finite numbers of shape [{count}, 3] were expected")
@@ -164,7 +164,9 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> Unkn
     if partner.shape != (count,):
         raise ArgumentError(f"partners: whole numbers of shape [{count}] were expected")
     if ((partner < 0) | (partner >= count)).any() or (partner[partner] != each).any():
-        raise ArgumentError("partners: each control's partner was expected to have it as its own")
+        raise ArgumentError(
+            "partners: each control's partner was expected to have that control as its partner"
+        )
     first = np.unique(np.minimum(each, partner))
     second = partner[first].astype(np.int64)
     easier = np.maximum(ease[first], ease[second])

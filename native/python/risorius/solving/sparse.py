@@ -198,7 +198,7 @@ def cheapest_to(
         b: float64[m], the target.
         low, high: float64[n], bounds of x; low is at most 0, high at least 0.
         price: float64[n] above 0, price per unit of x.
-        aim: the distance.
+        aim: wanted distance of a @ x from b.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end = [(path.x.copy(), path.missing)], _END * path.price

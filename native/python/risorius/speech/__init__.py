@@ -151,7 +151,7 @@ def mouth(
     """The curves of lips, jaw and tongue.
 
     Args:
-        phonemes: in order, without gaps; the mouth is at rest before and after them.
+        phonemes: in order, without gaps; before and after them the mouth has the shape of silence.
         opened: float[n], factor on the jaw of vowels every OPENNESS_STEP seconds: the result of
             prosody.openness, or the integers "openness" in a correctable clip's metadata / 1000.
         times: float64[frames], seconds, ascending in equal steps.
@@ -161,7 +161,7 @@ def mouth(
         Raw control -> float64[frames] in [0, 1].
     """
     begin, end = (phonemes[0].begin, phonemes[-1].end) if phonemes else (0.0, 0.0)
-    # Silence before and after, so that the mouth is at rest outside the sound.
+    # Silence is added before and after, for the frames outside the sound.
     rest = [Phoneme(begin - 1.0, begin, "SIL"), *phonemes, Phoneme(end, end + 1.0, "SIL")]
     weights = articulation.viseme_weights(rest, times)
     open_far = prosody.openness_at(np.asarray(opened, np.float64), times)

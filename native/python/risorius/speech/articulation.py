@@ -26,9 +26,9 @@ Times = npt.NDArray[np.float64]
 GATED = ("PP", "FF")
 """Visemes in which lips close or touch; they are applied on top of the other visemes."""
 
-# Viseme -> (strength of its pull on the lips, seconds in which the pull falls to 1/e before it, and
-# after it). Sounds of the tongue pull weakly, so that their neighbours shape the lips. Rounding
-# begins earliest. Closed lips (PP, FF) pull least, so that the vowels around shape them.
+# Viseme -> (strength of its pull on the lips, seconds in which the pull falls to 1/e before the
+# sound, and after it). Sounds of the tongue pull weakly, so that their neighbours shape the lips.
+# Rounding begins earliest. PP and FF pull least, because their `gate` closes the lips.
 _DOMINANCE = {
     "sil": (0.8, 0.06, 0.08), "PP": (0.15, 0.05, 0.05), "FF": (0.15, 0.05, 0.05),
     "TH": (0.6, 0.06, 0.05), "DD": (0.45, 0.05, 0.05), "kk": (0.35, 0.05, 0.05),

@@ -181,7 +181,7 @@ def _converted(path: str | os.PathLike[str], found: str) -> bytes:
     """Converts a sound file with ffmpeg to the bytes of a WAV file."""
     # ffmpeg gets only files: a pipe has been read already, and ffmpeg would wait for ever.
     if not os.path.isfile(path):
-        raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
+        raise AudioError(f"{path}: {found}; other formats are read from files, and not from pipes")
     program = shutil.which("ffmpeg")
     if program is None:
         raise AudioError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the phonemes of a voice: cuts it in pauses, and aligns or recognises the pieces."""
+"""Finds the phonemes of a voice: cuts it at pauses, and aligns or recognises the pieces."""
 
 from __future__ import annotations
 
@@ -95,7 +95,9 @@ def listen(
     if words is not None:
         found = _aligned(recogniser, samples, words, tell, notes)
         if found is None:
-            notes.append("the transcript does not fit the voice: it was recognised without")
+            notes.append(
+                "the transcript does not fit the voice: the voice was recognised without it"
+            )
     aligned = found is not None
     if found is None:
         found = _recognised(recogniser, samples, tell)
@@ -210,7 +212,7 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
     """Sentences for the user if the transcript seems not to belong to this voice."""
     notes = []
     if confidence(found) < _DOUBTFUL:
-        notes.append("the transcript fits the voice badly: is it of another recording?")
+        notes.append("the transcript fits the voice badly: does it belong to another recording?")
     loud = speaking(levels)
     times = (np.flatnonzero(loud) + 0.5) * STEP
     covered = np.zeros(len(times), bool)

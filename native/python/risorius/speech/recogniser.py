@@ -208,7 +208,7 @@ def _segment(first: int, last: int, name: str, word: str, count: int) -> Segment
     Args:
         first, last: first frame, and last frame + 1.
         name: name of the segment.
-        word: word that begins with it, as the decoder spells it.
+        word: word that begins with this segment, as the decoder spells it.
         count: number of samples without padding.
     """
     begin, end = (min(max(n * FRAME - _PAD + _LAG, 0.0), count / RATE) for n in (first, last))
@@ -226,7 +226,7 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 
     Args:
         segments: phonemes from one decoder.
-        other: phonemes from the other decoder, in the same time.
+        other: phonemes from the other decoder, with times from the same beginning.
 
     Returns:
         Numbers from 0 to 1.

@@ -134,7 +134,9 @@ def render_script(
     page = empty_page()
     viewer, boot = dict(_ELEMENT.findall(page)), _BOOT.search(page)
     if boot is None or "viewer" not in viewer:
-        raise WebError("this build's web page is of an older make: packaging/ship/web.sh renews it")
+        raise WebError(
+            "the web page in this build of Risorius is outdated: packaging/ship/web.sh renews it"
+        )
     table, files = _content(dna, name, looks, clip, sound)
     face = f'{{"table":{_json(table)},"files":{_json({**files, **viewer})}}}'
     return (
@@ -219,7 +221,8 @@ def _captures(names: list[str]) -> dict[str, Any]:
 def _bones(dna: Dna) -> list[dict[str, Any]]:
     """A table for each joint that rotates with the neck or head.
 
-    It contains the joint's share of the angles, its axes, and the raw controls of its rotation.
+    It contains the joint's share of the neck's or head's angles, the joint's axes about which they
+    rotate it, and the raw controls of its rotation.
     """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     return [
@@ -246,7 +249,7 @@ def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes
     """The page's table about the clip, and float32[frames, controls + 4 * turns] as bytes.
 
     The columns are the controls that the clip moves, then for each joint of neck and head its
-    rotation relative to rest, as a quaternion x, y, z, w about the joint's own axes.
+    rotation from the rest pose, as a quaternion x, y, z, w in the joint's own axes.
     """
     even = clip if clip.times is None else clip.resampled(clip.rate)
     curves = np.nan_to_num(even.curves, nan=0.0, posinf=1.0, neginf=0.0)
@@ -267,7 +270,7 @@ def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes
 
 
 def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
-    """Joint -> float64[frames, 4], its rotation as a quaternion.
+    """Joint -> float64[frames, 4], its rotation from the rest pose as a quaternion x, y, z, w.
 
     The rotation comes from the joint's raw controls if the clip moves them, else from the angles of
     neck or head.

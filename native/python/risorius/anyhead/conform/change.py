@@ -39,7 +39,8 @@ class Similar:
     """A similarity transform.
 
     Attributes:
-        linear: float64[3, 3], rotation times scale.
+        linear: float64[3, 3], rotation times scale, from the source to the target head; it
+            multiplies column vectors.
         middle: float64[3], a point of the source head.
         becomes: float64[3], the position of that point on the target head.
     """
@@ -89,10 +90,11 @@ class Change:
 
     Attributes:
         before, after: the skin on the source head and on the target head.
-        turn: float64[3, 3], the rotation of the whole target head against the source head.
-        size: the scale of the whole target head.
+        turn: float64[3, 3], the rotation from the whole source head to the target head.
+        size: the size of the target head divided by the size of the source head.
         reach: the smoothing radius in the file's unit, 2 cm on a head of 24 cm.
-        linear: float64[V, 3, 3], the smoothed deformation gradient of each vertex.
+        linear: float64[V, 3, 3], the smoothed deformation gradient of each vertex, which maps
+            offsets on the source head to offsets on the target head.
     """
 
     def __init__(self, mesh: Mesh, before: Doubles, after: Doubles) -> None:
@@ -253,7 +255,7 @@ class Change:
 
 
 def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
-    """The least-squares similarity between points, with the rotation of the whole head.
+    """The least-squares similarity from `before` to `after`, with the rotation of the whole head.
 
     Args:
         before, after: float64[n, 3], positions on the source and the target head.
@@ -266,7 +268,7 @@ def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
 
 
 def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
-    """The rotation (float64[3, 3]) and the scale of the whole target head.
+    """The rotation (float64[3, 3]) and the scale from the whole source head to the target head.
 
     If only the chin is longer, a small rotation already fits better, although the head is not
     rotated. A rotation is therefore returned only if it explains most of the difference.

@@ -2,7 +2,7 @@
 """Adjust controls that close the lids, so that the lids meet on the target head.
 
 The deformation gradient of a lid does not contain the height of the eye opening. For each control
-that brings two lids into contact on the source head, the joint columns are therefore scaled until
+that brings two lids into contact on the source head, its joint motions are therefore scaled until
 the same points meet on the target head. Joints act at all LODs. The blend shapes of the control
 store the remaining difference.
 """
@@ -56,7 +56,7 @@ class Touch(NamedTuple):
 
 
 class _Posed:
-    """Vertex positions of the skin of a face, at rest or with one control at 1."""
+    """Vertex positions of the skin of a face, in the rest pose or with one control at 1."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self.dna, self.skin = dna, skin
@@ -67,7 +67,7 @@ class _Posed:
         self.rest = np.asarray(self._probe.positions(self.raw()), np.float64)
 
     def raw(self, control: int = -1) -> npt.NDArray[np.float32]:
-        """float32[R]: the neutral pose, with one control at 1 if its index is given."""
+        """float32[R]: raw controls of the rest pose, with one at 1 if its index is given."""
         out = np.array(self.rig.initial_raw_controls, np.float32)
         if control >= 0:
             out[control] = 1
@@ -231,7 +231,7 @@ def _around(points: Doubles, places: Doubles, reach: float) -> tuple[Doubles, Do
 
 
 def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna | None:
-    """The face with scaled joint columns of a control; None if the control moves no joint."""
+    """The face with scaled joint motions of a control; None if the control moves no joint."""
     dna = face.dna
     vertex, joint, weight = sk.skin_entries(dna.meshes[face.skin])
     held = np.bincount(joint, weights=weight, minlength=len(dna.joint_names))

@@ -104,7 +104,7 @@ def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Dou
     if skin < 0:
         raise ArgumentError("a face with a mesh of skin at LOD 0 was expected, found none")
     if dna.mesh_names[skin] not in moved:
-        raise ArgumentError(f"places of {dna.mesh_names[skin]}, the skin, were expected")
+        raise ArgumentError(f"vertex positions of {dna.mesh_names[skin]}, the skin, were expected")
     counts = {n: len(m.positions) for n, m in zip(dna.mesh_names, dna.meshes, strict=False)}
     out = {}
     for name, points in moved.items():

@@ -93,7 +93,7 @@ def mouth_of(jaw: JawChange, turn: Doubles) -> Similar:
 
     Args:
         jaw: the change of the jaw.
-        turn: float64[3, 3], the rotation of the whole head.
+        turn: float64[3, 3], the rotation from the whole source head to the target head.
     """
     size = float(np.cbrt(max(np.linalg.det(jaw.linear), 1e-30)))
     return Similar(size * turn, jaw.before, jaw.after)
@@ -102,7 +102,9 @@ def mouth_of(jaw: JawChange, turn: Doubles) -> Similar:
 def joint_shifts(
     dna: Dna, joint: int, jaw: JawChange, turn: Doubles, places: tuple[Doubles, Doubles]
 ) -> Doubles:
-    """float64[columns, 3]: the motion of the jaw joint on the target head by input, in world axes.
+    """float64[columns, 3]: the jaw joint's translation on the target head by each input at 1.
+
+    The columns are the inputs of the joint matrix; translations are in world axes, in file units.
 
     The jaw rotates by the same angle on both heads. The motion of the teeth is scaled with the
     teeth, and the joint's translation is chosen so that the teeth make this motion.
@@ -111,7 +113,7 @@ def joint_shifts(
         dna: the source face.
         joint: the index of the jaw joint.
         jaw: the change of the jaw.
-        turn: float64[3, 3], the rotation of the whole head.
+        turn: float64[3, 3], the rotation from the whole source head to the target head.
         places: float64[3] each, the joint on the source head and on the target head.
     """
     columns = sk.column_count(dna)

@@ -33,7 +33,7 @@ class Places:
 
     Attributes:
         before, after: float64[J, 3], world positions on the source and the target head.
-        turns: float64[J, 3, 3], world rotations on the source head.
+        turns: float64[J, 3, 3], rotations from the joints' axes to world axes on the source head.
         linear: float64[J, 3, 3], the mean deformation gradient of the skin of each joint.
     """
 
@@ -105,7 +105,7 @@ def place_joints(out: Dna, places: Places, turn: Doubles) -> None:
     Args:
         out: a copy of the source face, changed in place.
         places: the joint positions.
-        turn: float64[3, 3], the rotation of the whole head.
+        turn: float64[3, 3], the rotation from the whole source head to the target head.
     """
     parents = np.asarray(out.joint_parents, np.int64)
     roots = parents == np.arange(len(parents))
@@ -152,7 +152,7 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> lis
     Args:
         dna: the source face.
         places: the joint positions and gradients.
-        turn: float64[3, 3], the rotation of the whole head.
+        turn: float64[3, 3], the rotation from the whole source head to the target head.
         stiff: the rigid parts of the face.
     """
     parents = np.asarray(dna.joint_parents, np.int64)

@@ -38,7 +38,7 @@ class Eye:
         radius: the radius on the source head.
         way: the similarity transform to the target head.
         joints: joints close to its centre, also joints of lids that slide on the eye.
-        holds: joints with more than half of the skin weights of the eyeball.
+        holds: the joint with more than half of the eyeball's skin weights; empty if none has.
     """
 
     middle: Doubles
@@ -61,7 +61,7 @@ class Stiff(NamedTuple):
     Attributes:
         skin: the index of the skin mesh.
         eyes: the eyeballs.
-        mouth: the transform of the inside of the mouth; None: the face has none.
+        mouth: the transform of the inside of the mouth to the target head; None: the face has none.
         joint: the index of the jaw joint; -1: none.
         jaw: the change of the lower jaw; None: unknown.
     """
@@ -167,7 +167,7 @@ def eyes_of(
 
 
 def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
-    """bool[V]: True for vertices whose skin weights belong to the joints of an eye.
+    """bool[V]: True for vertices with nearly all of their skin weight on the joints of an eye.
 
     Args:
         mesh: gives the skin weights.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Measures the distance of an eye's surface, with cornea, from its centre in any direction."""
+"""Measures the distance of an eye's surface, with cornea, from its centre in any direction.
+
+The target is the head to which expressions are transferred.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ _OUTSIDE = 3.0  # of the radius: distance from the centre at which rays towards 
 
 @dataclass(frozen=True)
 class Eyeball:
-    """An eyeball and its cornea at rest, in the target's unit.
+    """An eyeball and its cornea in the rest pose, in the target's unit.
 
     Attributes:
         side: "L" or "R".
@@ -36,7 +39,7 @@ class Eyeball:
     )
 
     def keep(self, directions: Doubles) -> None:
-        """Cache the result of `reach` at rest for an array of directions that is used often.
+        """Cache the result of `reach` in the rest pose for directions that are used often.
 
         Args:
             directions: float64[n, 3] of length 1; `reach` recognizes this array object.
@@ -48,7 +51,7 @@ class Eyeball:
 
         Args:
             directions: float64[n, 3] of length 1, from the centre.
-            turn: float64[3, 3], the rotation of the eye; None: at rest.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
         if not self._surface:
             self._surface.append(

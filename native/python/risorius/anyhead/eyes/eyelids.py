@@ -3,6 +3,7 @@
 
 A lid turns about an axis through the eye's centre, parallel to the line between both eye corners.
 The transferred motion is scaled so that the edges meet, and vertices inside the eye are lifted out.
+The target is the head to which expressions are transferred.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ _RADIUS_MM = 12.0  # radius of a human eye; the lengths in mm below are scaled t
 _BAND = 3.0  # mm from the edge: vertices up to here move with the edge
 _FADE = 16.0  # mm from the edge: vertices beyond keep their place
 _CORNER = 4.0  # mm beyond an eye corner: vertices beyond keep their place
-_CLEAR = 0.3  # mm above the eye at rest: higher vertices are on the outside of a lid
+_CLEAR = 0.3  # mm from the eye in the rest pose: farther vertices are on the outside of a lid
 _SKIN = 0.5  # mm: largest height above the eye that a rim vertex has to keep
 _PRESSED = 0.15  # mm by which closed edges overlap
 _OVER = 0.4  # mm that smoothing may move an edge beyond the gap of its column
@@ -42,7 +43,7 @@ _WIDE = np.radians(75.0)  # largest angle above or below the front of a lid vert
 
 
 class Eyelids:
-    """The lids of one eye of a target at rest.
+    """The lids of one eye of a target in its rest pose.
 
     Attributes:
         ball: the eye.
@@ -54,7 +55,7 @@ class Eyelids:
         """Find the lid vertices.
 
         Args:
-            skin: the skin of the target at rest.
+            skin: the skin of the target in the rest pose.
             ball: the eye.
             opening: the opening between the lids in this skin.
         """
@@ -95,7 +96,7 @@ class Eyelids:
         ball.keep(self._through)
 
     def _number(self) -> None:
-        """Number the edges and triangles of the lids by rows of `self.vertices`."""
+        """Store the edges and triangles of the lids as indices into `self.vertices`."""
         place = np.full(len(self._around), -1)
         place[self._lid] = np.arange(len(self._lid))
         self._own = place[self._triangles]  # -1: not a lid vertex
@@ -110,8 +111,8 @@ class Eyelids:
         return ClosestPoints(posed, np.ascontiguousarray(self._triangles, np.int32))
 
     def rim(self, reach: float) -> tuple[Ints, Doubles]:
-        """Vertices of both lid edges that touch the eye at rest, and their heights above the eye
-        (float64[n], in the target's unit).
+        """Vertices of both lid edges that touch the eye in the rest pose, and their distances from
+        the eye's surface (float64[n], in the target's unit; negative inside the eye).
 
         Args:
             reach: largest distance from the edges, in mm of a human eye.
@@ -149,20 +150,20 @@ class Eyelids:
         return bool(far > _MOVED * self.mm)
 
     def gap(self, displacement: Doubles, turn: Doubles | None = None) -> float:
-        """The largest height of the visible part of the eye, in the target's unit; 0 if hidden.
+        """The largest vertical extent of the visible part of the eye, in the target's unit.
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
-            turn: float64[3, 3], the rotation of the eye; None: at rest.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
         return self._gap(self.rest + displacement[self.vertices], turn)
 
     def cut(self, displacement: Doubles, turn: Doubles | None = None) -> float:
-        """The largest depth of the outside of the lids inside the eye, in the target's unit.
+        """The largest depth to which a lid's outer surface enters the eye, in the target's unit.
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
-            turn: float64[3, 3], the rotation of the eye; None: at rest.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
         points = self.rest + displacement[self.vertices]
         return float(self._lacks(points, turn, 0.0).max(initial=0.0))
@@ -172,7 +173,7 @@ class Eyelids:
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
-            turn: float64[3, 3], the rotation of the eye; None: at rest.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
         frame = self.opening.frame
         rest_up = frame.angles(self.rest)[1]
@@ -202,8 +203,8 @@ class Eyelids:
         return out
 
     def _level(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """Closed lids with both edges at the same height above the eye, so that no gap is visible
-        from the side or from above. Unchanged if this does not help."""
+        """Closed lids with both edges at the same distance from the eye's centre, so that no gap
+        is visible from the side or from above; `points` unchanged if this does not help."""
         seen = self._viewed(points)
         if not seen:
             return points
@@ -223,8 +224,8 @@ class Eyelids:
         return leveled if closed and self._viewed(leveled) < seen else points
 
     def _viewed(self, points: Doubles) -> int:
-        """The number of parallel rays that reach the resting ball past the lids, from the front,
-        both sides, above and below."""
+        """The number of parallel rays that pass the lids and reach the eyeball (as a sphere), from
+        the front, both sides, above and below."""
         frame, radius, tree, seen = self.opening.frame, self.ball.radius, self._posed(points), 0
         at = radius * np.linspace(-1, 1, _VIEW)
         x, y = (grid.ravel()[:, None] for grid in np.meshgrid(at, at))
@@ -245,7 +246,7 @@ class Eyelids:
 
         Args:
             displacement: float64[V, 3], displacements of all vertices of the target.
-            turn: float64[3, 3], the rotation of the eye; None: at rest.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
         """
         points = self._lifted(self.rest + displacement[self.vertices], turn)
         out = displacement.copy()
@@ -256,8 +257,8 @@ class Eyelids:
         return float(self._seen(points, turn).max(initial=0.0))
 
     def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: height of the visible eye in each column of the opening, target's
-        unit."""
+        """float64[columns]: vertical extent of the visible part of the eye in each column of the
+        opening, in the target's unit."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         beside = _BESIDE * self.mm / self.ball.radius
         edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
@@ -345,8 +346,9 @@ class Eyelids:
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
-        """float64[n]: height by which the triangles of each vertex must rise to be `above` over
-        the eye. Only triangles outside the eye at rest count."""
+        """float64[n]: distance by which the triangles of each vertex must move outwards to be
+        `above` away from the eye's surface. Only triangles that are outside the eye in the rest
+        pose count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -367,8 +369,8 @@ class Eyelids:
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
-        # The rim of a moved lid stays as high above the eye as at rest, but need not be higher than
-        # _SKIN.
+        # The rim of a moved lid keeps its distance from the eye's surface in the rest pose, but at
+        # most _SKIN.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)
@@ -384,7 +386,7 @@ class Eyelids:
         return np.asarray(points + lift[:, None] * ray)
 
     def _spread(self, need: Doubles) -> Doubles:
-        """The lifts with a smooth fall-off to neighbouring vertices, nowhere less than `need`."""
+        """float64[n]: heights by which vertices are lifted; `need` with a smooth fall-off."""
         lift = need.copy()
         a, b = self._edges.T
         count = np.bincount(a, minlength=len(lift)) + np.bincount(b, minlength=len(lift))
@@ -420,7 +422,7 @@ def find_eyelids(skin: Surface, ball: Eyeball) -> Eyelids | None:
     """The lids of an eye; None if skin covers the eye, or if there are no lids.
 
     Args:
-        skin: the skin of the target at rest.
+        skin: the skin of the target in the rest pose.
         ball: the eye.
     """
     opening = find_opening(near_eye(skin, ball), ball)

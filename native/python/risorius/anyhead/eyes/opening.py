@@ -72,7 +72,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Opening:
-    """The opening between the lids of an eye at rest.
+    """The opening between the lids of an eye in the rest pose.
 
     Attributes:
         frame: axes at the eye's centre; `across` is parallel to the line between the eye corners.
@@ -245,7 +245,7 @@ def gap_rays(opening: Opening) -> Doubles:
     """float64[columns * heights, 3]: unit directions for visible_gap.
 
     Args:
-        opening: the opening at rest.
+        opening: the opening in the rest pose.
     """
     return opening.frame.rays(*_grid(opening)).reshape(-1, 3)
 
@@ -258,16 +258,16 @@ def visible_gap(
     edges: tuple[Doubles, Doubles],
     turn: Doubles | None = None,
 ) -> Doubles:
-    """float64[columns]: height of the visible part of the eye in each column, in the skin's unit.
+    """float64[columns]: vertical extent of the visible part of the eye, in the skin's unit.
 
     Args:
         lids: the skin near the eye in some pose.
         ball: the eye.
-        opening: the opening of the same skin at rest.
+        opening: the opening of the same skin in the rest pose.
         rays: the result of gap_rays for this opening.
         edges: float64[columns] each, lowest and highest angle, in radians, that count as between
             the lids in this pose; NaN if unknown. Free rays beyond are holes of the skin.
-        turn: float64[3, 3], the rotation of the eye; None: at rest.
+        turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
     """
     up = _grid(opening)[1]
     seen = _seen(lids, ball, rays, turn).reshape(up.shape)

@@ -117,7 +117,7 @@ class _Completing:
 
     def _seat(self, ball: Eyeball, lids: Eyelids) -> Similarity:
         """The transform of an eyeball to its place behind the lids. The lid rims determine the size
-        of the eyeball. Its depth is chosen so that the rims are as high above the eyeball as on the
+        of the eyeball. Its depth is chosen so that the rims are as far from its surface as on the
         template."""
         rim, height = lids.rim(_RIM)
         near = similarity(self.skin.points[rim], self.laid[rim])

@@ -75,7 +75,7 @@ class Bodies:
 
         Args:
             fittings: the meshes of the target.
-            skin: the skin of the target at rest.
+            skin: the skin of the target in the rest pose.
             shapes: float64[V, 3] by raw control, displacements of the skin.
         """
         rows = fittings.of(TEETH, GUMS)
@@ -112,7 +112,7 @@ class Bodies:
 
 
 def eye_turn_of(side: str, controls: tuple[str, ...]) -> Doubles | None:
-    """float64[3, 3]: the rotation of an eye; None if no control turns it.
+    """float64[3, 3]: the rotation of an eye from its rest pose; None if no control rotates it.
 
     Args:
         side: "L" or "R".

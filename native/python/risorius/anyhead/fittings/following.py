@@ -25,8 +25,8 @@ class Followers:
         """Find the patch of each point.
 
         Args:
-            skin: the skin at rest.
-            points: float64[n, 3], the points at rest.
+            skin: the skin in the rest pose.
+            points: float64[n, 3], the points in the rest pose.
             islands: int64[n], the island of each point. The points of an island closest to the skin
                 are its roots, and its other points follow the nearest root. None: each point
                 follows the skin nearest to it.
@@ -132,7 +132,8 @@ def _closest(
 
 
 def _turns(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """float64[n, 3, 3]: rotations, float64[n]: scale factors of patches (Umeyama 1991)."""
+    """float64[n, 3, 3]: rotations of patches from `before` to `after`; float64[n]: their scale
+    factors (Umeyama 1991)."""
     u, s, vt = np.linalg.svd(np.einsum("npi,npj->nij", after, before))
     sign = np.sign(np.linalg.det(u @ vt))
     u[:, :, 2] *= sign[:, None]

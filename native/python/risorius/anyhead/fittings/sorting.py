@@ -14,7 +14,6 @@ from ...author.heads.parts import HeadPart, first_vertices, taken_apart
 from ...author.heads.turning import Eye, take_eyes
 from ...author.input.obj import ObjMesh
 from ...base.errors import ArgumentError
-from ...base.words import counted
 from ..eyes.eyeballs import Eyeball
 from ..surface import Surface
 from .fitted import (
@@ -221,7 +220,7 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
         deep, wide = float(np.ptp(points[:, 2])), float(np.ptp(points[:, 0]))
         low = (points[:, 1].min() + points[:, 1].max()) / 2 < place.mouth_height
         full = len(points) > 30 and deep > 0.9 * wide and deep > 2.5 * place.unit
-        # A row of teeth is an arch with an empty middle, a tongue is not.
+        # A row of teeth is an arch with an empty middle; a tongue fills its middle.
         middle = np.abs(points[:, 0] - place.middle) < 0.15 * wide
         filled = np.ptp(points[middle, 2]) > 0.7 * deep if middle.any() else False
         return TONGUE if full and filled and low else TEETH
@@ -327,7 +326,11 @@ def _rows_of_teeth(row: Fitted, middle: float, notes: list[str]) -> list[Fitted]
     if low.all() or not low.any():
         hangs = JAW if low.all() else HEAD
         if len(low) == 1:
-            notes.append(f"{name} is one piece: it hangs on the {hangs}")
+            notes.append(
+                f"{name} is one piece: it follows the jaw"
+                if hangs == JAW
+                else f"{name} is one piece: it follows the head"
+            )
         row.part.name = f"{word}{'Lower' if hangs == JAW else 'Upper'}"
         return [Fitted(row.kind, row.part, "", hangs)]
     names = [f"{word}Upper", f"{word}Lower"]
@@ -356,5 +359,5 @@ def _said(out: Fittings) -> list[str]:
             notes.append(f"{', '.join(names)}: {words}")
     left = out.of(OTHER, SKIN)
     if left:
-        notes.append(f"{counted(len(left), 'mesh')} more hang on the head or on its skin")
+        notes.append(f"other meshes that follow the head or its skin: {len(left):,}")
     return notes

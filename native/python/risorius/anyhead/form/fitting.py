@@ -18,7 +18,6 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 from .heads import HeadForm, head_form
 
-_NOISE = 0.1  # cm: standard deviation of distances that the model cannot explain
 _ALIKE = 0.08  # share of the pairs that count as independent, because neighbours err alike
 _ALONG = 0.15  # weight of distances along the surface, against 1 across it
 _EXPRESSED = 4.0  # prior of an expression against a part: a weight of 0.5 is as rare as 1 of a part
@@ -115,6 +114,7 @@ class Step:
         prior: strength of the pull of weights towards 0; 1: the model's standard deviations.
         least_cosine: least cosine between the normals of a pair.
         expressions: whether weights of expressions may change.
+        noise: cm of the form: standard deviation of distances that the model cannot explain.
     """
 
     rounds: int
@@ -124,6 +124,7 @@ class Step:
     prior: float = 1.0
     least_cosine: float = 0.3
     expressions: bool = True
+    noise: float = 0.1
 
 
 PLACE = (
@@ -144,6 +145,7 @@ def fit(
     steps: tuple[Step, ...],
     held: Held | None = None,
     weights: Doubles | None = None,
+    form: HeadForm | None = None,
 ) -> Pose:
     """Fit the model to a surface, beginning with an approximate pose.
 
@@ -153,8 +155,9 @@ def fit(
         steps: the steps of the fit in order.
         held: vertices of the model with known positions.
         weights: float64[V], weight of each vertex of the model; None: the weights in the model.
+        form: the model, with the triangles of `head_form()`; None: `head_form()` itself.
     """
-    form = head_form()
+    form = form or head_form()
     if weights is not None:
         form = replace(form, weights=weights)
     for step in steps:
@@ -231,7 +234,7 @@ def pose_normals(form: HeadForm, pose: Pose, shaped: Doubles) -> Doubles:
         pose: the pose of the model.
         shaped: float64[V, 3], vertex positions of the model with the weights of the pose.
     """
-    as_mean = not pose.parts.any() and not pose.expressions.any()
+    as_mean = form is head_form() and not (pose.parts.any() or pose.expressions.any())
     normals = _mean_normals() if as_mean else form_normals(form, shaped)
     return np.asarray(normals @ pose.rotation.T)
 
@@ -266,7 +269,7 @@ class _System:
 
     def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:
         self.form, self.shaped, self.step = form, shaped, step
-        self.parts = step.parts
+        self.parts = min(step.parts, len(form.parts))
         self.more = len(form.expressions) if step.expressions else 0
         size = 7 + self.parts + self.more
         self.left, self.right = np.zeros((size, size)), np.zeros(size)
@@ -281,7 +284,7 @@ class _System:
             weight: float64[n], weights of the pairs.
         """
         ways = self._ways(used)
-        amount = _ALIKE * weight / _NOISE**2
+        amount = _ALIKE * weight / self.step.noise**2
         if across is not None:
             slope = np.einsum("vdi,vd->vi", ways, across)
             self.left += (slope * amount[:, None]).T @ slope

@@ -12,7 +12,7 @@ from ...base import toml
 
 @cache
 def landmark_words() -> Mapping[str, str]:
-    """The words for each landmark in sentences, by name; each left one precedes its right one."""
+    """Landmark name -> its words in sentences; left landmarks precede their right counterparts."""
     out: dict[str, str] = {}
     for name, row in _table().items():
         out[name] = row["words"]

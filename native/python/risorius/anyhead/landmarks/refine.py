@@ -12,6 +12,7 @@ from ..form.fitting import Pose, Step, Target, fit
 from ..form.heads import HeadForm, head_form
 
 _ALL = 1 << 20  # above any number of vertices
+_PARTS = 40  # of the model; a region does not determine more
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,8 @@ def _of_region(
     away = np.linalg.norm(form.mean - form.mean[places].mean(axis=0), axis=1)
     weights = np.exp(-((away / region.width) ** 2))
     weights[weights < _SEEN] = 0.0
-    parts = len(form.parts)
     steps = tuple(
-        Step(6, reach, _ALL, parts, region.prior, region.least_cosine, region.expressions)
+        Step(6, reach, _ALL, _PARTS, region.prior, region.least_cosine, region.expressions)
         for reach in (0.4, 0.25)
     )
     before = pose.points(form)[places]

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
-from ..form.heads import head_form
+from ..form.fitting import Held, Pose, Step, Target, fit, pose_normals
+from ..form.heads import HeadForm, head_form
 from ..surface import Surface
 from .find import Found, find_form
 from .marks import MOVED
@@ -15,6 +18,19 @@ from .names import vague_landmarks
 _NEIGHBOURS = 12  # vertices of the model from which the displacement of a point is interpolated
 _REACH = 2.5  # cm of the model: radius in which a landmark moves the skin
 _ROWS = 2000  # points that are computed together, to limit memory
+_ALL_PARTS = 1 << 20  # above any number of parts
+_CLOSER = (  # a fit with all parts, before the template's own vertices are known
+    Step(6, 0.6, 4000, _ALL_PARTS, 1.0, 0.5),
+    Step(8, 0.3, 4000, _ALL_PARTS, 0.5, 0.5),
+)
+_AS_TEMPLATE = (  # a fit of the model that has the template's surface
+    Step(6, 1.0, 4000, _ALL_PARTS, 1.0, 0.5),
+    Step(8, 0.5, 4000, _ALL_PARTS, 0.6, 0.5, noise=0.06),
+    Step(8, 0.3, 4000, _ALL_PARTS, 0.4, 0.5, noise=0.04),
+)
+_ON = 1.0  # cm of the form: farthest place of the template that a vertex of the form is moved to
+_SURE = 0.6  # cm of the form: distance of such a place whose share is 1/e
+_HELD = 30.0  # weight of a landmark that the user moved, against a pair in the middle of the face
 
 
 def start_of(
@@ -31,7 +47,52 @@ def start_of(
         of_template, of_target: results of `find_form` for both; None: computed here.
     """
     one, other = of_template or find_form(template), of_target or find_form(target)
-    return carried(template.points, one, other)
+    seen = Target(template)
+    pose = fit(seen, one.pose, _CLOSER)
+    form = _like(seen, pose)
+    goal = fit(Target(target), other.pose, _AS_TEMPLATE, _moved(one, other), form=form)
+    before, after = (form.shaped(p.parts, p.expressions)[: form.skin] for p in (pose, goal))
+    inside = pose.back(template.points)
+    moved = inside + _between(inside, before, after - before)
+    names = [n for n in common(one, other) if _by_hand(n, one, other)]
+    if names:
+        begin, end = _places(names, one, pose), _places(names, other, goal)
+        left = end - begin - _between(begin, before, after - before)
+        moved += _smooth(inside, begin, left)
+    return goal.place(moved)
+
+
+def _like(seen: Target, pose: Pose) -> HeadForm:
+    """The model with a mean that is changed so that it lies on a surface with the weights of a
+    pose. Thus a fit to another head compares the two surfaces, and what the model does not know of
+    the one does not count as a difference."""
+    form = head_form()
+    shaped = form.shaped(pose.parts, pose.expressions)
+    normals = pose_normals(form, pose, shaped)
+    on, near, _ = seen.pairs(pose.place(shaped[: form.skin]), normals, 0.3, _ON * pose.scale)
+    away = (pose.back(near) - shaped[: form.skin]) * on[:, None]
+    away *= np.exp(-((np.linalg.norm(away, axis=1, keepdims=True) / _SURE) ** 2))
+    mean = form.mean.copy()
+    mean[: form.skin] += away
+    return replace(form, mean=mean)
+
+
+def _by_hand(name: str, one: Found, other: Found) -> bool:
+    return MOVED in (one.landmarks.how.get(name), other.landmarks.how.get(name))
+
+
+def _moved(one: Found, other: Found) -> Held | None:
+    """The landmarks that the user moved on either head, at their places on the second head."""
+    places = head_form().places
+    names = [n for n in common(one, other) if n in places and _by_hand(n, one, other)]
+    if not names:
+        return None
+    points = np.array([other.landmarks.points[n] for n in names])
+    return Held(np.array([places[n] for n in names]), points, np.full(len(names), _HELD))
+
+
+def _places(names: list[str], found: Found, pose: Pose) -> Doubles:
+    return pose.back(np.array([found.landmarks.points[n] for n in names]))
 
 
 def carried(points: Doubles, one: Found, other: Found) -> Doubles:
@@ -55,11 +116,7 @@ def common(one: Found, other: Found) -> list[str]:
     Args:
         one, other: results of `find_form` for both heads.
     """
-    moved = [
-        n
-        for n in one.landmarks.points
-        if MOVED in (one.landmarks.how[n], other.landmarks.how.get(n))
-    ]
+    moved = [n for n in one.landmarks.points if _by_hand(n, one, other)]
     return [
         n
         for n in one.landmarks.points
@@ -97,20 +154,29 @@ def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> 
     if not names:
         return np.zeros_like(inside)
     form = head_form()
-    begin = one.pose.back(np.array([one.landmarks.points[n] for n in names]))
-    goal = other.pose.back(np.array([other.landmarks.points[n] for n in names]))
+    begin, goal = _places(names, one, one.pose), _places(names, other, other.pose)
     before = form.shaped(one.pose.parts, one.pose.expressions)[: form.skin]
     after = form.shaped(other.pose.parts, other.pose.expressions)[: form.skin]
     left = goal - begin - _between(begin, before, after - before)
+    return _smooth(inside, begin, left)
+
+
+def _smooth(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
+    """float64[n, 3]: a smooth displacement at places, which is about `ways` at `points`.
+
+    Args:
+        places: float64[n, 3].
+        points, ways: float64[m, 3].
+    """
 
     def kernel(a: Doubles, b: Doubles) -> Doubles:
         away = np.linalg.norm(a[:, None] - b[None], axis=2) / _REACH
         return np.asarray(np.maximum(1 - away, 0) ** 4 * (4 * away + 1))  # Wendland 1995
 
-    weights = np.linalg.solve(kernel(begin, begin) + 0.02 * np.eye(len(begin)), left)
-    out = np.zeros_like(inside)
-    for first in range(0, len(inside), _ROWS):
-        out[first : first + _ROWS] = kernel(inside[first : first + _ROWS], begin) @ weights
+    weights = np.linalg.solve(kernel(points, points) + 0.02 * np.eye(len(points)), ways)
+    out = np.zeros_like(places)
+    for first in range(0, len(places), _ROWS):
+        out[first : first + _ROWS] = kernel(places[first : first + _ROWS], points) @ weights
     return out
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Measures skin that cuts into teeth and gums and moves it out; counts stretched polygons."""
+"""Measures skin that cuts into teeth and gums and moves it out; counts stretched polygons.
+
+The target is the head to which expressions were transferred.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ _NEAR = 0.8  # cm around the box of the teeth: skin in it is checked
 _DEEP = 0.01  # cm: smaller depths are ignored
 _AGAINST = 0.3  # least cosine between the inward normal and the direction to a point inside
 _INSIDE = 0.4  # cm: a deeper point counts as behind the teeth, not inside
-_STRETCH = 2.5  # times its area at rest: a larger polygon is stretched, as in SkinChecker
+_STRETCH = 2.5  # times its area in the rest pose: a larger polygon is stretched, as in SkinChecker
 LEAST = 0.5  # mm3: a smaller volume is not repaired
 _AWAY = 1e4  # cm: shift of solids so that they touch no skin
 _ROUNDS = 4
@@ -36,10 +39,10 @@ class Contacts:
     """Contacts of the skin of a target with its teeth and gums."""
 
     def __init__(self, skin: Surface, faces: Sequence[Sequence[int]], bodies: Bodies) -> None:
-        """Measure the contacts at rest.
+        """Measure the contacts in the rest pose.
 
         Args:
-            skin: the skin at rest.
+            skin: the skin in the rest pose.
             faces: polygons of the skin.
             bodies: teeth and gums.
         """
@@ -63,7 +66,7 @@ class Contacts:
         self._share = area[self._near]  # cm2: area of each vertex
 
     def stretched(self, displacement: Doubles) -> int:
-        """The number of polygons with more than 2.5 times their area at rest.
+        """The number of polygons with more than 2.5 times their area in the rest pose.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.
@@ -78,7 +81,7 @@ class Contacts:
         return int((areas > _STRETCH * np.maximum(self._area, 1e-12)).sum())
 
     def volume(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """Volume in mm3 (depth times area) of skin inside teeth and gums, beyond the depth at rest.
+        """Volume in mm3 (depth times area) of skin deeper in teeth and gums than in the rest pose.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.
@@ -122,8 +125,8 @@ class Contacts:
         return self._lifted(out, posed) if self.volume(out, controls) > LEAST else out
 
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
-        """float64[V, 3]: displacements with skin pushed out of teeth along their normals, and a
-        smooth fall-off around it."""
+        """float64[V, 3]: displacements with skin pushed out of teeth along the teeth's normals,
+        and a smooth fall-off around the pushed skin."""
         if self._edges is None:
             self._edges = self._edges_near_teeth()
         out = displacement.copy()
@@ -158,8 +161,8 @@ class Contacts:
         return self._checker
 
     def _allowed(self, points: Doubles) -> SkinFaults:
-        """The faults that do not count: depths at rest, and contacts of the skin with itself in
-        this pose, because lips press on each other."""
+        """The faults that do not count: depths in the rest pose, and contacts of the skin with
+        itself in this pose, because lips press on each other."""
         checker = self._made()
         assert self._rest is not None
         away = [solid + _AWAY for solid in self.bodies.rest]
@@ -239,7 +242,7 @@ class Contacts:
 
 
 def _spread(push: Doubles, edges: Ints) -> Doubles:
-    """float64[V, 3]: the pushes, with a smooth fall-off to neighbouring vertices."""
+    """float64[V, 3]: the displacements `push`, with a smooth fall-off to neighbouring vertices."""
     a, b = edges.T
     count = np.maximum(np.bincount(a, minlength=len(push)) + np.bincount(b, minlength=len(push)), 1)
     need, out = np.linalg.norm(push, axis=1), push.copy()

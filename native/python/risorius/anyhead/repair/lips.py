@@ -2,7 +2,8 @@
 """Closes the lips in poses that close the mouth, so that they meet and do not cut each other.
 
 At a point of contact, positions do not distinguish the upper from the lower lip, but the motion by
-jawOpen does. So the lips of a mesh of any topology are found by its expressions.
+jawOpen does. So the lips of a mesh of any topology are found by its expressions. The target is the
+head to which expressions were transferred.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ _RIM = 1.2  # mm beyond the nearest vertex of a column that still belong to the 
 _FADE = 14.0  # mm from the rim along the skin: vertices beyond keep their place
 _BAND = 2.5  # mm from the rim along the skin: vertices up to here move with the rim
 _CORNER = 0.08  # of the width: no columns this close to a corner, because lips may be joined there
-_TOUCH = 0.8  # mm: lips touch at rest if their gap is below half of it
+_TOUCH = 0.8  # mm: lips touch in the rest pose if their gap is below half of it
 _GOAL = 0.05  # mm: gap between closed lips
-_DEEP = 0.1  # mm that lips may press into each other, or their depth at rest if larger
+_DEEP = 0.1  # mm that lips may press into each other, or their depth in the rest pose if larger
 _ROUNDS = 12
 _UPPER_MM, _LEAST_SHARE = 2.0, 0.15  # mm that the upper lip moves, and its least share of the gap
 _FAR_MM = 6.0  # mm: wider gaps are not closed
@@ -55,7 +56,7 @@ class Meeting:
 
 
 class Lips:
-    """The lips of a target, found at rest, and their gap in poses."""
+    """The lips of a target, found in the rest pose, and their gap in poses."""
 
     def __init__(
         self,
@@ -66,10 +67,10 @@ class Lips:
         """Find the lips; `found` is False if the face has no lips that part.
 
         Args:
-            skin: the skin of the target at rest.
+            skin: the skin of the target in the rest pose.
             expressions: float64[V, 3] by raw control, displacements of the skin, with jawOpen.
             corners: float64[2, 3], the right and the left corner of the mouth; None: the ends of
-                the line in which the lips touch at rest.
+                the line in which the lips touch in the rest pose.
         """
         self.skin = skin
         self.found = False
@@ -111,8 +112,8 @@ class Lips:
         self._places = np.array([first, *columns, last])  # corrections are 0 at the corners
 
     def _touching(self) -> Doubles | None:
-        """float64[2, 3]: both ends of the line in which the lips touch at rest; None if they do not
-        touch."""
+        """float64[2, 3]: both ends of the line in which the lips touch in the rest pose; None if
+        they do not touch."""
         # `least` is halved, because `mm` derives from the first estimate of the mouth's width,
         # which is about twice too large.
         half, least = COLUMNS // 2, _TOUCH * self.mm / 2
@@ -160,7 +161,8 @@ class Lips:
         corners = lips[self.skin.triangles]
         both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
         middles = self.skin.points[self.skin.triangles[both]].mean(axis=1)
-        return len(np.unique(self._column(middles))) - 1 if len(middles) else 0
+        columns = self._column(middles)
+        return len(np.unique(columns[columns >= 0]))
 
     def widest(self, points: Doubles) -> float:
         """The widest gap between the lips, in the target's unit.
@@ -171,7 +173,7 @@ class Lips:
         return float(np.nan_to_num(self.meeting(points).gap).max(initial=0.0))
 
     def deepest(self, points: Doubles) -> float:
-        """The largest depth of one lip inside the other beyond rest, in the target's unit.
+        """By how much one lip is at most deeper in the other than in the rest pose, target's unit.
 
         Args:
             points: float64[V, 3], vertex positions of the posed target.
@@ -181,7 +183,7 @@ class Lips:
 
     def too_far(self, points: Doubles) -> bool:
         """Whether the gap is too wide to close without damage, for example because the mouth is
-        open at rest.
+        open in the rest pose.
 
         Args:
             points: float64[V, 3], vertex positions of the posed target.

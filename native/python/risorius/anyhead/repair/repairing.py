@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Repairs the expressions of a target one by one, and reports faults before and after."""
+"""Repairs expressions transferred to a head (the target), and reports faults before and after."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def repair(
     """Repair expressions: close the lids and lips, and take skin out of eyes and teeth.
 
     Args:
-        target: the skin at rest, in cm, y up, the face towards +z.
+        target: the skin in the rest pose, in cm, y up, the face towards +z.
         faces: polygons of the skin.
         parts: eyes, teeth and other meshes; the notes of the report are added to its notes.
         landmarks: give the corners of the mouth; None: the corners are searched for.
@@ -170,16 +170,17 @@ class Repairing:
                 self.eyelids[side] = lids
                 continue
             word = "left" if side == "L" else "right"
-            self.report.notes.append(f"the {word} eye is not seen between lids: they stay as they "
-                                     "are")  # fmt: skip
+            self.report.notes.append(f"no lids were found at the {word} eye: they are not repaired")
         self.lips = Lips(target, expressions, _corners(landmarks))
         self.lip_controls = closing
         if not self.lips.found and self.lip_controls:
-            self.report.notes.append("no lips that part were found: they stay as they are")
+            self.report.notes.append("no lips that open were found: they are not repaired")
         welded = self.lips.welded() if self.lips.found else 0
         if welded > _WELDED:
-            self.report.notes.append(f"the lips are one skin in {welded / COLUMNS:.0%} of the "
-                                     "mouth: they do not part there")  # fmt: skip
+            self.report.notes.append(
+                f"the lips are joined in {welded / COLUMNS:.0%} of the mouth: there they cannot "
+                "open"
+            )
         self.bodies = Bodies(parts, target, expressions)
         self.contacts = Contacts(target, faces, self.bodies)
 

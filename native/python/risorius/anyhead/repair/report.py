@@ -13,12 +13,14 @@ class Faults:
     """Faults of a pose.
 
     Attributes:
-        lid_gap: mm, largest visible height of an eye that the pose closes; 0 in other poses.
-        cut: mm, largest depth of the outside of lids in an eye.
+        lid_gap: mm, largest vertical extent of the visible part of an eye that the pose closes; 0
+            in other poses.
+        cut: mm, largest depth to which a lid's outer surface enters an eye.
         lip_gap: mm, widest gap between the lips if the pose closes the mouth; 0 in other poses.
-        lip_cut: mm, largest depth of one lip in the other beyond rest, in the same poses.
-        volume: mm3 of skin inside teeth and gums, beyond rest.
-        stretched: number of polygons with more than 2.5 times their area at rest.
+        lip_cut: mm by which one lip is at most deeper in the other than in the rest pose, in the
+            same poses.
+        volume: mm3 of skin deeper in teeth and gums than in the rest pose.
+        stretched: number of polygons with more than 2.5 times their area in the rest pose.
     """
 
     lid_gap: float = 0.0

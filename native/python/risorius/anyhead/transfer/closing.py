@@ -16,7 +16,7 @@ from .template import TemplateFace
 
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
 _MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
-_MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance at rest
+_MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance in the rest pose
 _AROUND = 0.3  # cm: standard deviation of the fall-off around contacts
 _REST = 0.02  # of the largest sum of weights: with a smaller sum the factor tends to 1
 _SHARES = (0.3, 2.0)  # smallest and largest factor
@@ -24,10 +24,10 @@ _ROWS = 256  # number of vertices that are compared at once
 
 
 def lids_that_meet(surface: Surface, way: Doubles) -> tuple[Ints, Ints]:
-    """Pairs of vertices, int64[n] each, that meet at the end of a motion but are apart at rest.
+    """Pairs of vertices, int64[n] each, that are apart in the rest pose and meet after a motion.
 
     Args:
-        surface: the skin at rest.
+        surface: the skin in the rest pose.
         way: float64[V, 3], the motion.
     """
     able = np.flatnonzero(np.linalg.norm(way, axis=1) > _MOVES)

@@ -36,8 +36,8 @@ class Jaw:
 
     Attributes:
         hinge: float64[3], the centre of rotation.
-        turns: rotation float64[3, 3] and translation float64[3] of the hinge by pose; poses that do
-            not move the jaw are left out.
+        turns: by pose, the jaw's motion from the rest pose: rotation about the hinge float64[3, 3],
+            then translation float64[3]; poses that do not move the jaw are left out.
     """
 
     hinge: Doubles
@@ -50,7 +50,7 @@ class TemplateFace:
 
     Attributes:
         name: name of the face.
-        surface: the skin at rest.
+        surface: the skin in the rest pose.
         mesh: index of the skin mesh in the file.
         controls: names of all raw controls without the prefix before the last dot.
         ways: float32[V, 3] by pose, displacements of the skin by one control, or by all controls

@@ -43,7 +43,7 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     raw, had = len(dna.raw_control_names), dna.psd_count
     others = len(dna.machine_learned_behavior.neural_networks) + len(dna.rbf_behavior.solvers)
     if sk.column_count(dna) > raw + had or others:
-        raise ArgumentError("a face without networks and solvers was expected")
+        raise ArgumentError("a face without neural networks and RBF solvers was expected")
     channel_of = _channels(dna)
     new = [row for row in correctives if frozenset(row[0]) not in channel_of]
     out = _with_channels(dna, [controls for controls, _ in new])
@@ -121,8 +121,8 @@ def _add_targets(
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
     for m in sorted(meshes):
         mesh = copy.copy(made[m])
-        # Skin and lashes get targets even if they have none yet because joints do all of their
-        # motion.
+        # Skin and lashes get targets even if they have no target yet, which is the case if joints
+        # do all of their motion.
         shaped = mesh.blend_shape_targets or m in skins or "lash" in dna.mesh_names[m].lower()
         if m in solids or not shaped:
             continue

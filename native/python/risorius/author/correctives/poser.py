@@ -40,7 +40,10 @@ class Poser:
         return [mesh.positions for mesh in self._meshes]
 
     def motions(self, on: Controls) -> Doubles | None:
-        """float64[joints, 3, 4]: motions of the joints, or None if no joint moves."""
+        """float64[joints, 3, 4]: matrices of the joints' motions from the rest pose to the pose.
+
+        None if no joint moves.
+        """
         deltas = self._deltas[self._active(on)].sum(axis=0)
         if not deltas.any():
             return None
@@ -51,7 +54,7 @@ class Poser:
 
         Args:
             on: controls at 1.
-            corrected: whether to add the correctives in `added`.
+            corrected: whether to add the new correctives that the search put into `added`.
         """
         motions, columns, out = self.motions(on), self._active(on), []
         for number, mesh in enumerate(self._meshes):

@@ -44,7 +44,7 @@ _PACES = np.geomspace(4.0, 0.1, 40)  # step sizes of the weights of kinds, one f
 class CorrectiveOptions:
     """Options of the search for correctives."""
 
-    most: int = 500  # largest number of correctives
+    most: int = 500  # largest number of correctives of pairs and triples
     solids: tuple[str, ...] = SOLIDS  # parts of the names of meshes that the skin must not enter
     triples: int = 200  # number of combinations of three that are checked
     # Number of further pairs that are repaired in the finished face of joints; None: 3/8 of `most`.

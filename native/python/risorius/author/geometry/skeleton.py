@@ -134,7 +134,7 @@ def column_deltas(dna: Dna, columns: int) -> Doubles:
 
 
 def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
-    """float64[..., joints, 4, 4]: world matrices of the joints.
+    """float64[..., joints, 4, 4]: matrices from the joints' axes to the world, column vectors.
 
     Args:
         dna: the face with its neutral pose and hierarchy.
@@ -156,6 +156,8 @@ def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
 
 def column_motions(dna: Dna, columns: int, value: float = 1.0) -> Doubles:
     """float64[columns, joints, 3, 4]: motion of each joint from the neutral pose by each input.
+
+    A motion is the matrix from neutral to posed positions of points that follow the joint.
 
     Args:
         dna: the face.
@@ -284,7 +286,7 @@ class Influences:
 
 
 class Skin:
-    """Vertices with skin weights, for poses of few moving joints. Joints at rest cost no time."""
+    """Vertices with skin weights, for poses of few moving joints. Other joints cost no time."""
 
     def __init__(self, positions: Doubles, weights: Doubles) -> None:
         """Prepare vertices.

@@ -144,12 +144,12 @@ class _Joining:
         return assign([name for name in names if "+" not in name], self.edited)
 
     def turn_and_size(self) -> None:
-        """Turn all meshes of the head upright, and scale them to the size of a face."""
+        """Turn all meshes of the head upright, and scale them to the unit of the result."""
         self._turn()
         self._size()
 
     def take_standing(self) -> None:
-        """Keep the meshes unchanged, because they are upright and have the right size."""
+        """Keep the meshes unchanged, because they are upright and in the unit of the result."""
         self.left = 1
         points, shapes = self.face.mesh.positions, self.face.shapes
         self.height = face_height(points, shapes, self.became.controls)
@@ -164,7 +164,9 @@ class _Joining:
             self._sort(part, places, moving, still)
         taken = {part.source for part in (*moving, *still)}
         self.notes.extend(
-            f"{'a part of ' if source in taken else ''}{source} is left out: {why}"
+            f"a part of {source} is left out: {why}"
+            if source in taken
+            else f"{source} is left out: {why}"
             for source, why in self.away.items()
         )
         self.became = self._assigned(moving)
@@ -202,23 +204,32 @@ class _Joining:
 
     def _about(self, found: Direction, *, mirrored: bool) -> list[str]:
         left, up, front = (word_of(x, self.axes) for x in (found.left, found.up, found.front))
-        why = [f"{counted(found.named, 'pair')} of names"] if found.named else []
-        why += ["places"] if found.sure_front else []
-        said = any((self.wishes.left, self.wishes.up, self.wishes.front))
-        by = "as was said" if said else f"by {' and '.join(why)}" if why else "as files usually do"
-        out = [f"the face looks along {front}, its top is {up}, its left {left} ({by})"]
+        pairs = counted(found.named, "pair")
+        if any((self.wishes.left, self.wishes.up, self.wishes.front)):
+            by = "as the options say"
+        elif found.named:
+            by = (
+                f"by the names of {pairs} and by positions"
+                if found.sure_front
+                else f"by the names of {pairs}"
+            )
+        else:
+            by = "by the positions of shapes" if found.sure_front else "as usual in files"
+        notes = [f"the face looks along {front}, its top is {up}, its left {left} ({by})"]
         if found.turned:
-            out.append(f"the face is turned by {found.turned:.0f} degrees against the axes: it "
-                       "stays so")  # fmt: skip
+            notes.append(
+                f"the face is rotated by {found.turned:.0f} degrees from the axes: it keeps this "
+                "rotation"
+            )
         if mirrored:
-            out.append("that is a mirrored file: x is turned round")
+            notes.append("that is a mirrored file: x is turned round")
         elif not found.agrees:
-            out.append(
+            notes.append(
                 f"names and places disagree: a face that looks along {front} has its left at "
                 f"{word_of(-found.left, self.axes)}; controls go by the names, the mesh is not "
                 "mirrored; left or front says otherwise"
             )
-        return out
+        return notes
 
     def _size(self) -> None:
         """Scale all meshes to the result's unit, and centre the face if it is far from x = 0."""
@@ -237,8 +248,10 @@ class _Joining:
         middle = float(points.min() + points.max()) / 2
         shift = -middle if abs(middle) > _OFF * np.ptp(points) else 0.0
         if shift:
-            self.notes.append(f"the face's middle is moved to x = 0, by "
-                              f"{in_words(abs(shift) * UNITS[self.unit])}")  # fmt: skip
+            self.notes.append(
+                "the middle of the face was moved to x = 0, by "
+                f"{in_words(abs(shift) * UNITS[self.unit])}"
+            )
         self.height = height * factor
         if factor != 1.0 or shift:
             turn, move = np.eye(3) * factor, np.array([shift, 0.0, 0.0])
@@ -291,7 +304,7 @@ class _Joining:
         if far:
             more = f" and {len(far) - 3} more" if len(far) > 3 else ""
             names = ", ".join(far[:3]) + more
-            self.notes.append(f"what {names} do to the {side} eye beside turning it is left out")
+            self.notes.append(f"{names}: only the rotation of the {side} eye is kept")
         return turn
 
     def _jaw(
@@ -308,7 +321,7 @@ class _Joining:
         if turn is not None:
             turns.insert(0, turn)
             return hanging
-        self.notes.append("jawOpen does not turn a jaw: what would hang on it hangs on the head")
+        self.notes.append("jawOpen does not rotate the jaw: the meshes of the jaw follow the head")
         return [(part, "head" if joint == JAW else joint) for part, joint in hanging]
 
     def _joined(self, hanging: Sequence[tuple[HeadPart, str]], turns: list[Turn]) -> Joined:

@@ -84,7 +84,7 @@ class Wishes:
         front: direction in which the face looks, one of AXES.
         unit: unit of the coordinates, see sizes.UNITS.
         scale: factor of the coordinates in addition to the unit.
-        height_mm: height of the face from the chin to the top, mm.
+        height_mm: height from the chin to the top of the head, mm.
     """
 
     mesh: str = ""

@@ -76,7 +76,7 @@ def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
     )
 
 
-_MENDS = "height_mm, scale or unit (in Blender: Height) says otherwise"
+_MENDS = "height_mm, scale or unit (in Blender: Height) sets another size"
 
 
 def in_words(mm: float) -> str:

@@ -173,5 +173,5 @@ def said_of(part: HeadPart, joint: str, shapes: Mapping[str, Doubles]) -> str:
         shapes: the shapes that move it.
     """
     if joint == FACE:
-        return f"{part.name} moves with the face: {counted(len(shapes), 'shape')} of it"
-    return f"{part.name} hangs on the {'jaw' if joint == JAW else 'head'}"
+        return f"{part.name} follows the face with {counted(len(shapes), 'shape')}"
+    return f"{part.name} hangs on the jaw" if joint == JAW else f"{part.name} hangs on the head"

@@ -103,7 +103,7 @@ def _too_large(name: str, role: str, size: tuple[int, int]) -> str:
     width, height = size
     return (
         f"{name}: its {role} texture has {width:,} x {height:,} pixels, "
-        f"{width * height * 4 / 1e9:.1f} GB in memory: make it smaller than {_LARGE:,}"
+        f"{width * height * 4 / 1e9:.1f} GB in memory: make it smaller than {_LARGE:,} pixels"
     )
 
 

@@ -39,8 +39,9 @@ class Turn:
 
     Attributes:
         name: name of the joint.
-        position: float64[3], the joint's position at rest.
-        motions: raw control without prefix -> rotation [3, 3] and shift [3] of the position.
+        position: float64[3], the joint's position in the rest pose.
+        motions: raw control without prefix -> rotation [3, 3] from the rest pose about `position`,
+            and shift [3] of the position.
     """
 
     name: str
@@ -238,7 +239,9 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
 
 
 def look_turn(look: str) -> Doubles:
-    """float64[3, 3]: the usual rotation of an eye by a look control.
+    """float64[3, 3]: the usual rotation of an eye by a look control, from the rest pose.
+
+    It multiplies column vectors with x to the left, y up and z to the front.
 
     Args:
         look: key of LOOKS, the control's name without its side.

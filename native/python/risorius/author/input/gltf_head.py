@@ -64,7 +64,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
     """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
-    such node to it. Skinned or unused meshes give one entry with the identity."""
+    of these nodes to this node. Skinned or unused meshes give one entry with the identity."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
@@ -163,7 +163,7 @@ def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Mat
     index = webp.get("source") if isinstance(webp, dict) else texture.get("source")
     if index is None:
         names = ", ".join(extensions) or "no source"
-        out.notes.append(f"{out.name}: its {role} texture is left out: {names} is not read")
+        out.notes.append(f"{out.name}: its {role} texture is left out: {names} is not supported")
         return
     image = document.item("images", index, f"{out.name}.{role}")
     try:
@@ -186,7 +186,7 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
         except (binascii.Error, ValueError) as error:
             raise document.fail(place, f"base64 was expected: {error}") from error
     file = unquote(uri)
-    # Only files in the glTF's folder or below are read, as for buffers.
+    # Only files in the glTF's folder or below are read, because a URI could name any file.
     if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
         raise document.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
     try:

@@ -43,10 +43,10 @@ class Assignment:
 
 @dataclass(frozen=True)
 class _Guess:
-    """The meaning of a name: raw controls without prefix, an expression, and the source's rank.
+    """The meaning of a name: raw controls without prefix, an expression, and a rank.
 
-    Ranks: 0 the user, 1 ARKit or the head's main vocabulary, 2 another vocabulary, 3 a word,
-    4 unknown.
+    The rank shows the source of the meaning: 0 the user, 1 ARKit or the head's main vocabulary,
+    2 another vocabulary, 3 a plain word in the name such as "open", 4 none.
     """
 
     controls: tuple[str, ...] = ()
@@ -174,10 +174,11 @@ def _said(value: sayings.Said) -> _Guess:
 
 def _twice(name: str, holder: str, controls: Sequence[str], own: str) -> str:
     meant = " and ".join(controls[:2]) + (" and more" if len(controls) > 2 else "")
-    same = " (their letters are the same)" if name.lower() == holder.lower() else ""
+    own = f"{name} becomes a control of its own, {own}; [controls] may say otherwise"
     return (
-        f"{holder} and {name} both mean {meant}{same}: {name} becomes a control of its own, {own}; "
-        "[controls] may say otherwise"
+        f"{holder} and {name} both mean {meant} (their letters are the same): {own}"
+        if name.lower() == holder.lower()
+        else f"{holder} and {name} both mean {meant}: {own}"
     )
 
 

@@ -83,7 +83,7 @@ def check_shapes(shapes: ShapeSet, go_on: Callable[[], object] = lambda: None) -
         raise ArgumentError(_too_large("the neutral mesh", shapes.mesh.positions))
     if not size:
         raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
-    out: list[str] = []
+    notes: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0
     for name, delta in shapes.expressions.items():
@@ -97,21 +97,21 @@ def check_shapes(shapes: ShapeSet, go_on: Callable[[], object] = lambda: None) -
             )
         length = np.linalg.norm(delta, axis=1)
         if length.max() <= _LEAST * size:
-            out.append(f"{name} moves nothing")
+            notes.append(f"{name} moves nothing")
             continue
         moving += 1
         mean = delta.mean(axis=0)
         if np.linalg.norm(delta - mean, axis=1).max() < 0.02 * np.linalg.norm(mean):
-            out.append(f"{name} moves the whole mesh: is another neutral baked into it?")
+            notes.append(f"{name} moves the whole mesh: is another neutral baked into it?")
         elif length.mean() > 0.25 * size:
-            out.append(f"{name} is far from the neutral mesh: another unit or other axes?")
+            notes.append(f"{name} is far from the neutral mesh: another unit or other axes?")
         key = _key(delta, length, size)
         if key in seen:
-            out.append(f"{name} is the same as {seen[key]}")
+            notes.append(f"{name} is the same as {seen[key]}")
         seen.setdefault(key, name)
     if not moving:
         raise ArgumentError("no expression moves a vertex of the neutral mesh")
-    return out
+    return notes
 
 
 def _too_large(name: str, points: Doubles) -> str:

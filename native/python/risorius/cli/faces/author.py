@@ -197,7 +197,7 @@ def _spec(args: argparse.Namespace) -> Spec:
 def as_names(became: Assignment) -> list[str]:
     """Lines of the TOML table [controls]: a row for each expression, with its assigned controls.
 
-    The last line is a comment with the number of expression names that the program knew.
+    The last line is a comment with the number of expression names that the program recognised.
     """
     lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
@@ -234,7 +234,9 @@ def _size(spec: Spec, args: argparse.Namespace) -> None:
     if args.onto is not None:
         return
     if said and "dna" in spec.source:
-        raise CommandLineError(f"author: a DNA file has its size: {next(iter(said))} is of others")
+        raise CommandLineError(
+            f"author: {next(iter(said))} is not possible with a DNA file, which has a fixed size"
+        )
     if said:
         spec.source = {k: v for k, v in spec.source.items() if k not in ("height_mm", "scale")}
         spec.source |= said

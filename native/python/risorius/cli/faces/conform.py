@@ -118,7 +118,7 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _moved_mm(dna: Dna, made: Conformed) -> tuple[float, float]:
-    """Mean and largest displacement of the skin in mm, without the displacement of its centre."""
+    """Mean and largest distance in mm that skin vertices moved, relative to the skin's centre."""
     before = np.asarray(dna.meshes[skin_of(dna)].positions, np.float64)
     way = made.moved - made.moved.mean(axis=0) - before + before.mean(axis=0)
     far = mm_of(dna) * np.linalg.norm(way, axis=1)

@@ -67,7 +67,7 @@ def _points(place: Place, a: Floats, b: Floats, noun: str, verb: str, kind: str)
 
 
 def _layout(place: Place, noun: str, a: Numbers, b: Numbers) -> None:
-    """Report changed layouts, each of which joins a position, a UV and a normal."""
+    """Report changed vertex layouts; a layout refers to a position, a UV and a normal."""
     if len(a) != len(b):
         place.say(f"{counted(len(a), 'layout')} -> {len(b):,}")
         return

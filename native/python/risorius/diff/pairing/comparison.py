@@ -53,10 +53,13 @@ class Comparison:
         return amounts.by(amount, self.measure(amount, kind), a.size > 1)
 
     def distance(self, a: Floats, b: Floats) -> str:
-        """The distance that points moved as text, e.g. "by up to 0.3 mm".
+        """The largest distance between a point of A and the same point of B, as text.
 
         Args:
             a, b: float32[n, 3], positions in the translation unit of A.
+
+        Returns:
+            The distance with its unit, e.g. "by up to 0.3 mm".
         """
         with np.errstate(invalid="ignore", over="ignore"):
             apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)

@@ -28,7 +28,7 @@ def correctives(
     Args:
         dna: the face with the correctives.
         which: "a" or "b", the face of the comparison that `dna` is.
-        raw, ml, pose_controls: the other parts of the control vector.
+        raw, ml, pose_controls: raw controls, outputs of networks, and controls of RBF poses.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
     # Labels are made before correctives are matched. So no corrective of A has a number that a
@@ -57,7 +57,8 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
     A factor that is itself a corrective is written as its own factors in brackets.
 
     Args:
-        factors: for each corrective, (control's index from the first corrective, label) per factor.
+        factors: for each corrective, (control's index - index of the first corrective, control's
+            label) per factor.
     """
 
     def product(i: int, depth: int) -> str:

@@ -17,7 +17,7 @@ _HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near t
 _STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Axes of Mixamo's bones, because poses of the web player TalkingHead assume them. Columns: the
-# bone's x axis, its y axis (along the bone) and its z axis.
+# bone's x axis, its y axis (along the bone) and its z axis, in the scene's axes (y up, z front).
 _TURNS = {
     "": _STRAIGHT,
     "arm left": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
@@ -26,7 +26,7 @@ _TURNS = {
     "foot": ((-1, 0, 0), (0, -0.5, 0.75**0.5), (0, 0.75**0.5, 0.5)),
 }
 # Parent, name in Mixamo, names in other files, whether VRM requires the bone, position as
-# fractions of the head's height, key of _TURNS.
+# fractions of the height of the head's joint above the ground, key of _TURNS.
 _Row = tuple[str, str, str, bool, tuple[float, float, float], str]
 _MIDDLE: Mapping[str, _Row] = {
     "hips": ("", "Hips", "hips hip pelvis", True, (0, 0.60, 0), ""),
@@ -55,7 +55,7 @@ _SIDES = {"left": 1.0, "right": -1.0}
 
 @dataclass(frozen=True)
 class Bone:
-    """A bone of a humanoid: its names, parent, and position in a body whose head has height 1.
+    """A bone of a humanoid: its names, parent, and position if the head's joint is at height 1.
 
     Attributes:
         name: VRM 1.0 name.
@@ -64,7 +64,8 @@ class Bone:
         words: names of the bone in files of other programs, without separators and side.
         side: "left", "right", or "".
         is_needed: whether VRM requires the bone.
-        at: position as fractions of the head's height: to the left, up, to the front.
+        at: position as fractions of the height of the head's joint above the ground: to the
+            body's left, up, to the front.
         turn: key of the axes in _TURNS that Mixamo gives the bone.
     """
 
@@ -191,5 +192,8 @@ def place_of(name: str, head: Doubles, trunk: Doubles) -> Doubles:
 
 
 def turn_of(name: str) -> Doubles:
-    """float64[3, 3]: the axes that Mixamo gives a bone. Args: name: name of the bone."""
+    """float64[3, 3]: rotation from Mixamo's axes of a bone to the scene's axes.
+
+    Args: name: name of the bone.
+    """
     return np.array(_TURNS[BONES[name].turn], np.float64)

@@ -36,8 +36,8 @@ class Spring:
         name: name of the chain.
         nodes: numbers of its nodes, from the root to the tip; the tip moves no vertex.
         colliders: indices of the colliders that the chain does not enter.
-        hit: radius in metres of a node when it meets a collider.
-        stiffness: how strongly the chain returns to rest, 0 to 4.
+        hit: radius in metres of the sphere around each node that collides with the colliders.
+        stiffness: how strongly the chain returns to its rest pose, 0 to 4.
         drag: share of the motion that is lost, 0 to 1.
         gravity: strength of gravity, 0 to 2.
         down: direction of gravity in the scene.

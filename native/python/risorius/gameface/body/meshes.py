@@ -262,7 +262,9 @@ class _Lists:
 
 
 def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at: str) -> Doubles:
-    """float64[V, 4, 4], the skin's matrix of each vertex; normalises the weights in `values`."""
+    """float64[V, 4, 4], per vertex the matrix from the mesh's coordinates to the scene: the mean of
+    `moves` by skin weights. Normalises the weights in `values`.
+    """
     count = len(values["POSITION"])
     sets = [name[8:] for name in values if name.startswith("WEIGHTS_")]
     sets = [number for number in sets if f"JOINTS_{number}" in values]

@@ -226,7 +226,7 @@ def _rotation(matrix: Doubles) -> Doubles:
 
 
 def _notes(body: Body, path: Path) -> list[str]:
-    out = list[str]()
+    notes = list[str]()
     known = {name.lower() for name in (*arkit.mapping(), *PRESETS, *_OLDER)} - {"neutral"}
     faces, example, most = list[str](), "", 0
     for mesh in body.meshes:
@@ -236,7 +236,7 @@ def _notes(body: Body, path: Path) -> list[str]:
             most = max(most, len(named))
             example = example or named[0]
     if faces:
-        out.append(
+        notes.append(
             f"{path.name}: the body has a face of its own, {joined(faces)}, with up to {most} "
             f"targets such as {example}: {' '.join(f'--without {_quoted(n)}' for n in faces)} "
             "leaves it out"
@@ -247,15 +247,15 @@ def _notes(body: Body, path: Path) -> list[str]:
             along = body.places[pair[1]] - body.places[pair[0]]
             angle = float(np.degrees(np.arctan2(-along[1], abs(along[0]))))
             if angle > _HANGING:
-                out.append(
+                notes.append(
                     f"{path.name}: its arms hang {angle:.0f} degrees below a T-pose, which VRM "
                     "expects: motions of other bodies will look wrong"
                 )
                 break
     count = len(body.document.json.get("animations") or ())
     if count:
-        out.append(f"{path.name}: its animations are left out ({count})")
-    return out
+        notes.append(f"{path.name}: its animations are left out ({count})")
+    return notes
 
 
 def _quoted(name: str) -> str:

@@ -21,8 +21,8 @@ def springs_of(body: Body, places: Doubles, turns: Doubles, flip: Doubles) -> Sp
 
     Args:
         body: the body, with its file.
-        places, turns: float64[n, 3] and float64[n, 3, 3], positions in metres and rotations of its
-            nodes in the exported file.
+        places, turns: float64[n, 3] and float64[n, 3, 3], positions of its nodes in the exported
+            scene in metres, and rotations from the nodes' axes to the scene's.
         flip: float64[3], 1 or -1 per axis; -1 where the exported file's axis is opposite.
 
     Raises:

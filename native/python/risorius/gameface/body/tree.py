@@ -47,7 +47,7 @@ def find_tree(document: Document) -> Tree:
     if not isinstance(rows, list) or not rows:
         raise document.fail("nodes", "a body with a skeleton was expected, found no node")
     if len(rows) > _MOST:
-        raise document.fail("nodes", f"at most {_MOST:,} were expected, found {len(rows):,}")
+        raise document.fail("nodes", f"at most {_MOST:,} nodes were expected, found {len(rows):,}")
     tree = Tree([], {}, {})
     waiting = [(root, -1) for root in _roots(document, rows)]
     while waiting:
@@ -63,7 +63,7 @@ def find_tree(document: Document) -> Tree:
         tree.order.append(number)
         waiting += [(child, number) for child in _listed(document, node, number)]
     if not all(np.isfinite(matrix).all() for matrix in tree.world.values()):
-        raise document.fail("nodes", "finite places were expected")
+        raise document.fail("nodes", "finite positions of nodes were expected")
     return tree
 
 

@@ -28,7 +28,7 @@ class Put:
 
     Attributes:
         meshes: the meshes, with the numbers of their nodes and meshes.
-        plain: number of a material -> its row of VRM 0.x's materialProperties.
+        plain: number of an exported material -> its row of VRM 0.x's materialProperties.
         springs: swinging chains; none if the body is no VRM.
     """
 
@@ -38,11 +38,14 @@ class Put:
 
 
 def frames(body: Body, version: str) -> tuple[Doubles, Doubles]:
-    """float64[n, 3], float64[n, 3, 3]: positions in metres and rotations of the exported nodes.
+    """Positions of the exported nodes in metres, and rotations from their axes to the scene's.
 
     Args:
         body: the body, facing along +z.
         version: VRM version; in "0.x" the body faces along -z, and no node is rotated.
+
+    Returns:
+        float64[n, 3] and float64[n, 3, 3].
     """
     if version == "0.x":
         return body.places * _FLIP, np.tile(np.eye(3), (len(body.names), 1, 1))
@@ -82,7 +85,9 @@ def put_meshes(body: Body, glb: Glb, names: list[str], version: str, below: list
 
 
 def _plain(body: Body, glb: Glb, looks: Looks) -> dict[int, dict[str, Any]]:
-    """Number of a material -> its row of materialProperties, if the body's file is a VRM 0.x."""
+    """Number of an exported material -> its row of materialProperties; empty unless the body's
+    file is a VRM 0.x.
+    """
     extensions = body.document.json.get("extensions")
     own = extensions.get("VRM") if isinstance(extensions, dict) else None
     rows = own.get("materialProperties") if isinstance(own, dict) else None

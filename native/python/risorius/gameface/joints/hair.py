@@ -59,7 +59,7 @@ class Chains:
             vertex.
         centre: float64[3], centre of the sphere in metres.
         radius: radius of the sphere in metres.
-        hit: radius of a joint in metres when it meets the sphere.
+        hit: radius in metres of the sphere around each joint that collides with the head's sphere.
     """
 
     joints: list[list[int]] = field(default_factory=list)

@@ -65,7 +65,7 @@ def find_skeleton(
 
     Args:
         dna: the face with its joints.
-        axes: float64[3, 3], maps the file's axes to glTF's.
+        axes: from parts.axes_of; maps the file's axes and unit to glTF's.
         kind: one of humanoid.KINDS, which adds missing bones; "": only joints of the face.
         is_body: whether to include the bones of the body that the face has.
         is_turned: whether bones have the axes of Mixamo's bones.
@@ -97,7 +97,7 @@ def find_skeleton(
             humanoid.place_of(name, world[found["head"]], world[trunk]) if made else world[own]
         )
         turns.append(humanoid.turn_of(name) if is_turned else np.eye(3))
-    # Joints of the file that are below no exported bone move with this joint.
+    # Joints of the file that have no exported bone among their ancestors move with this joint.
     rest = number.get(humanoid.parent_of("neck", bones), 0)
     return Skeleton(
         [ROOT.get(kind, "Root"), *(humanoid.BONES[name].node for name in bones)],

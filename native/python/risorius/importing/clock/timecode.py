@@ -109,7 +109,8 @@ def _measured(
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
-    """Seconds from the midnight before the first timecode to each timecode, also over midnights.
+    """Seconds from the midnight before the first timecode to each timecode, even after another
+    midnight.
 
     Args:
         codes: from `parse`, in the order of the frames.

@@ -175,7 +175,10 @@ def seconds_of(
     if not unit:
         unit = _shown(values, name, column)
         if unit != "s":
-            notes.append(f"its times say no unit and are read as {unit} (--time-unit says another)")
+            notes.append(
+                f"its times have no unit and are read as {unit} (--time-unit, or Time Unit in "
+                "Blender, sets another)"
+            )
     seconds = values * UNITS[unit]
     if seconds.size and seconds[0] > _LONGEST:
         notes.append("its times are dates: they count from the first frame")

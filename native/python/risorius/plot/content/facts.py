@@ -18,7 +18,7 @@ from .regions import REGIONS, regions_of
 
 @dataclass(frozen=True)
 class Lod:
-    """One LOD: joints per region, and numbers of coefficients, channels and maps evaluated."""
+    """One LOD: joints per region, and how many coefficients, blend shapes and maps it evaluates."""
 
     joints: dict[str, int]
     coefficients: int

@@ -19,7 +19,8 @@ REGIONS = (
     "neck",
     "other",
 )
-# Medium lightness, so that each colour is visible on white paper and on a dark screen.
+# Region -> colour. The colours have a medium lightness, so that they are visible on white paper and
+# on a dark screen.
 COLORS = {
     "forehead, brow": "#8f6be0",
     "eye": "#2e86de",
@@ -32,7 +33,8 @@ COLORS = {
     "neck": "#54a24b",
     "other": "#8b95a1",
 }
-# The first match counts: NasolabialBulge is a cheek although it begins like a nose.
+# Region, and the first letters of its joints' names. The first match counts: NasolabialBulge is a
+# cheek although it begins like a nose.
 _STARTS = (
     ("cheek", ("naso", "cheek", "masseter", "sideburn", "temple")),
     ("forehead, brow", ("forehead", "brow", "eyebrow", "hair", "skull", "corrugator")),

@@ -28,7 +28,7 @@ _COLORS = np.array(
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression at weight 1: its target meshes, and the error of each vertex."""
+    """An expression at weight 1: the meshes with this expression, and the error of each vertex."""
 
     name: str
     meshes: list[risorius.Mesh]

@@ -12,7 +12,7 @@ from .paper import ACCENT, MUTED, RULE, Canvas, compact, heading
 
 
 def draw(canvas: Canvas, facts: Facts) -> None:
-    """Draws a large chart of joints, and three small charts of evaluated parts per LOD.
+    """Draws a chart of joints, and small charts of coefficients, blend shapes and maps, per LOD.
 
     Args:
         canvas: receives the drawing.

@@ -61,7 +61,7 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
     Args:
         meshes: the meshes.
         paints: paint of each mesh, see Surface.
-        axes: float64[3, 3], maps file axes to right, up, front.
+        axes: float64[3, 3], from skeleton.view_axes: maps file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
     for mesh, tone in zip(meshes, paints, strict=True):
