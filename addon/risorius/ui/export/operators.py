@@ -99,8 +99,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     texture_size: bpy.props.IntProperty(
         name="Texture Size",
-        description="Pixels of a side of the images that are baked; images that a material shows "
-        "unchanged keep their own size",
+        description="Width and height of the baked images in pixels; images that a "
+        "material shows unchanged keep their own size",
         default=1024,
         min=64,
         max=8192,

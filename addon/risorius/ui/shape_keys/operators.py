@@ -201,7 +201,10 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
     use_all: bpy.props.BoolProperty(
         name="All Keys",
-        description=("Include guesses from names, so that you can edit them as text"),
+        description=(
+            "Also save the controls that Risorius guessed from names of shape "
+            "keys, so that you can edit these guesses as text"
+        ),
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
