@@ -222,7 +222,7 @@ def refit(
     }
     if sorted(weights) != sorted(shaped):
         raise ArgumentError(
-            "meshes move that do not move in the face (like) whose joints it is to have"
+            "an expression moves meshes that do not move in the face given with like"
         )
     used = given(work)
     own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])
