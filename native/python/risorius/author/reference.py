@@ -71,7 +71,7 @@ class Reference:
             if found != self.face[name]:
                 raise ArgumentError(
                     f"{name}: {self.face[name][0]} vertices and {self.face[name][1]} corners were "
-                    f"expected, as the face has whose joints it is to have, found {found[0]} and "
+                    f"expected, as in the face given with like, found {found[0]} and "
                     f"{found[1]}"
                 )
 

@@ -260,7 +260,8 @@ class _Lists:
             return None
         if len(found) and not 0 <= found.min() <= found.max() < count:
             raise self._document.fail(
-                f"{self._at}.indices", f"vertices below {count} were expected, found {found.max()}"
+                f"{self._at}.indices",
+                f"vertex numbers below {count} were expected, found {found.max()}",
             )
         return found
 
