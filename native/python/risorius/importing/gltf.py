@@ -117,7 +117,7 @@ class Document:
         at = f"accessors[{index}]"
         kind = accessor.get("componentType")
         if not _is_key(kind, _TYPES) or accessor.get("type") != "SCALAR":
-            raise self.fail(at, "an accessor of the type SCALAR with numbers was expected")
+            raise self.fail(at, "numbers one by one were expected (an accessor of the type SCALAR)")
         if "sparse" in accessor:
             raise self.fail(at, "an accessor that is not sparse was expected")
         dtype = np.dtype(_TYPES[kind])

@@ -163,6 +163,6 @@ def _check_body(args: argparse.Namespace, out: Path) -> None:
             raise CommandLineError("--without and --body-scale need a body: add --body BODY.glb")
         return
     if args.humanoid:
-        raise CommandLineError("--humanoid adds bones of a body: leave out --humanoid or --body")
+        raise CommandLineError("--humanoid adds bones of a body: leave it or --body out")
     require_suffix(args.body, SUFFIXES, "--body")
     refuse_same_file(str(args.body), str(out))
