@@ -191,7 +191,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Save the assignments of shape keys to a file, for other heads and risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -229,7 +229,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Load assignments of shape keys from a file that this list or risorius author wrote"""
+    """Load assignments of shape keys from a file of this list or of the command risorius author"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
