@@ -79,8 +79,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         name="Units",
         description="Place in the FBX file that stores the unit",
         items=(
-            ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
-            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
+            ("FBX_SCALE_NONE", "On Objects", "Objects have scale 100, as Unreal expects"),
+            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1, as Unity expects"),
         ),
     )
     lod_groups: bpy.props.BoolProperty(
@@ -186,7 +186,9 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
-                raise FaceError(told("a file holds the controls of one face: select one"))
+                raise FaceError(
+                    told("select only one face, because a file contains the controls of one face")
+                )
             scene = context.scene
             clip = export_animation.clip(
                 *characters[0], frame_rate(scene), scene.frame_start, self.maps

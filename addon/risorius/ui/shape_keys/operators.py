@@ -319,7 +319,7 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         )
 
     def cancelled_text(self) -> str:
-        return words.say("Finished pictures are kept.")
+        return words.say("Pictures that are already drawn are kept.")
 
 
 CLASSES = (
