@@ -186,9 +186,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
-                raise FaceError(
-                    told("select only one face, because a file contains the controls of one face")
-                )
+                raise FaceError(told("a file contains the controls of one face: select one face"))
             scene = context.scene
             clip = export_animation.clip(
                 *characters[0], frame_rate(scene), scene.frame_start, self.maps
