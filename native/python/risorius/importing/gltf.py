@@ -440,7 +440,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         text = chunks[b"JSON"].decode()
     except UnicodeDecodeError as error:
         raise AnimationFileError(
-            name, f"JSON in UTF-8 was expected, byte {error.start} is wrong"
+            name, f"JSON in UTF-8 was expected, found a wrong byte (byte {error.start})"
         ) from error
     document = named_json.parse(text, name)
     return open_gltf(path, document, chunks.get(b"BIN\0"), budget)
