@@ -344,7 +344,7 @@ def _check(indices: NDArray[np.int64], limit: int, what: str) -> None:
     if len(indices) and int(indices.max()) >= limit:
         raise PlanError(
             told(
-                "The file's {what} leads to number {max} of {limit}.",
+                "The file's {what} leads to number {max} of {limit}, which does not exist.",
                 what=what,
                 max=int(indices.max()),
                 limit=limit,

@@ -564,12 +564,14 @@ def add_sound(
         made = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
         said = str(error).strip().removeprefix("Error: ")
-        raise clip_units.ClipError(told("no sound strip: {said}", said=said)) from error
+        raise clip_units.ClipError(told("no sound strip was added: {said}", said=said)) from error
     strip = cast("bpy.types.SoundStrip", made)
     sound = strip.sound
     if strip.frame_final_duration <= 1 and (sound is None or not sound.samplerate):
         strips.remove(strip)
-        raise clip_units.ClipError(told("no sound strip: Blender cannot read the sound file"))
+        raise clip_units.ClipError(
+            told("no sound strip was added: Blender cannot read the sound file")
+        )
     return strip
 
 

@@ -368,7 +368,11 @@ def begin(context: Context, rig: ArmatureObject, point: Point, options: Options)
     if not 0 <= vertex < skin.surface.vertex_counts[mesh]:
         found, count = vertex, skin.surface.vertex_counts[mesh]
         raise FaceError(
-            told("A vertex below {count} was expected, found {found}.", count=count, found=found)
+            told(
+                "A vertex number below {count} was expected, found {found}.",
+                count=count,
+                found=found,
+            )
         )
     state = sliders.read(rig, live, depsgraph)
     reach = skin.surface.jacobian(state.seen, mesh, [vertex], lowest=state.low, highest=state.high)

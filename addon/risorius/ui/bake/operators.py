@@ -34,7 +34,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
                 "Bones, Shapes, Maps",
                 "The face itself: the actions play without the add-on",
             ),
-            (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
+            (bake_face.CONTROLS, "Controls", "Sliders and control bones, baked into one action"),
         ),
     )
     wanted: bpy.props.EnumProperty(

@@ -140,10 +140,14 @@ class RISORIUS_PT_shape_key_names(FacePanel, Panel):
 def _draw_count(layout: UILayout, names: assigned.Names) -> None:
     count, unknown = len(names.rows), names.unknown
     if unknown:
-        text = words.say("{unknown} of {count} unknown", unknown=unknown, count=count)
+        text = words.say(
+            "Shape-key names: {unknown} of {count} unknown", unknown=unknown, count=count
+        )
         words.show(layout, text, "QUESTION")
     else:
-        words.show(layout, words.say("All {count} known", count=count), "CHECKMARK")
+        words.show(
+            layout, words.say("Shape-key names: all {count} known", count=count), "CHECKMARK"
+        )
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:

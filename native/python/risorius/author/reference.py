@@ -73,7 +73,7 @@ class Reference:
             if found != self.face[name]:
                 raise ArgumentError(
                     f"{name}: {self.face[name][0]} vertices and {self.face[name][1]} corners were "
-                    f"expected, as the face has whose joints it is to have, found {found[0]} and "
+                    f"expected, as in the face given with like, found {found[0]} and "
                     f"{found[1]}"
                 )
 
@@ -227,7 +227,7 @@ def refit(
     }
     if sorted(weights) != sorted(shaped):
         raise ArgumentError(
-            "meshes move that do not move in the face (like) whose joints it is to have"
+            "an expression moves meshes that do not move in the face given with like"
         )
     used = given(work)
     own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])
