@@ -103,7 +103,7 @@ def problem() -> str:
     if _risorius is None:
         wheels = sorted(p.name for p in (_HERE / "wheels").glob("*.whl"))
         tags = sorted({t for w in wheels for t in re.findall(r"-cp3(\d+)-", w)}, key=int)
-        have = ", ".join(f"3.{t}" for t in tags) if tags else told("no Python at all")
+        have = ", ".join(f"3.{t}" for t in tags) if tags else told("no version of Python")
         return told(
             "The native module for Python {running} is missing: this package has wheels for "
             "{have}. Install the package made for this Blender. ({reason})",
@@ -152,7 +152,7 @@ def bundled_sample(person: str) -> Path | None:
 
 
 def sample_module() -> ModuleType:
-    """The package that makes sample people; it is loaded only when one is built.
+    """The package that makes sample people; it is loaded only when a person is built.
 
     Raises:
         UnusableError: a wheel is missing or has another version, as the text says.

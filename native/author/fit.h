@@ -18,7 +18,8 @@
 namespace risorius::author {
 
 /// Motion of a joint in an expression. A vertex p becomes position + R(rotation) (p - position) +
-/// translation. rotation is a vector along the axis; its length is the angle in radians.
+/// translation, in the axes of the shapes. rotation is a vector along the axis of a right-handed
+/// rotation; its length is the angle in radians.
 struct JointMotion {
   Vector3 rotation{};
   Vector3 translation{};
@@ -93,8 +94,8 @@ struct StartWeights {
 /// In: shapes   of the other face
 ///     options  joints (total), given, pivots, emphasis, least_effect and threads are used
 ///     weights  of all joints, the given ones first, as in a Fit
-///     at       [new joints] the pivot that a joint lies at; kInTheMiddle: the middle of its
-///              vertices
+///     at       [new joints] index of the pivot at which a joint is placed; kInTheMiddle: it is
+///              placed in the middle of its vertices
 /// Out: a Fit with these weights; each joint is its own mirror
 /// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (weights, at)
 core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,

@@ -26,7 +26,7 @@ double squared(const Vector3& a, const Vector3& b) {
   return sum;
 }
 
-/// Vertices sorted by height, so that only vertices of about the same height are compared.
+/// Vertices sorted by their y, so that only vertices of about the same y are compared.
 class ByHeight {
  public:
   explicit ByHeight(const std::vector<Vector3>& points) : points_(points), order_(points.size()) {

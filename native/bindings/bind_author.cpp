@@ -51,8 +51,8 @@ author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const
   return out;
 }
 
-/// Makes GivenJoints from positions [J, 3] and motions [E, J, 3] of existing joints.
-/// A joint that no expression moves gets an empty list of motions.
+/// Makes GivenJoints from positions [J, 3] of existing joints, and from their rotations (vectors in
+/// radians) and translations [E, J, 3]. A joint that no expression moves gets no motions.
 std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Doubles& rotations,
                                              const Doubles& translations, std::size_t expressions) {
   const auto joints = static_cast<std::size_t>(positions.shape(0));
@@ -166,7 +166,8 @@ Fit fit_motions(const author::Shapes& shapes, const GivenJoints& given,
   return fitted([&] { return author::fit_motions(shapes, all, weights, at); });
 }
 
-/// float64[expressions, joints, 3]: the rotations or the translations of the fit's joint motions.
+/// float64[expressions, joints, 3]: the rotations (vectors in radians) or the translations of the
+/// fit's joint motions.
 Doubles motions(const Fit& fit, author::Vector3 author::JointMotion::* half) {
   const std::size_t joints = fit.joints.size(), count = fit.motions.size() / joints;
   Doubles out({static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(joints), py::ssize_t{3}});

@@ -190,8 +190,8 @@ void bind_layers(DnaClass& c) {
       "Ids of the file's layers in its order.");
 }
 
-// The number of a word of the DNA format. A word like "#17", by which properties show a number that
-// the format does not define, is rejected.
+// The number that the DNA format gives to a word such as "cm". A word like "#17", by which
+// properties show a number that the format does not define, is rejected.
 template <class Number, std::size_t kCount>
 std::optional<Number> choice_argument(const std::array<const char*, kCount>& words,
                                       const std::optional<std::string>& text, const char* name) {

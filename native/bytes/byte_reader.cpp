@@ -45,8 +45,8 @@ void ByteReader::clear_error() {
   bound();
 }
 
-// Finds the end of the bytes that may be read at once. After a failure there are none, so that fast
-// paths need no check for it.
+// Finds the end of the bytes that can be read without a further check or refill. After a failure
+// there are no such bytes, so that fast paths need not test for one.
 void ByteReader::bound() {
   const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
   ready_ = failed() ? at_ : at_ + std::min(loaded, left());

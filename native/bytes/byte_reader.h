@@ -119,7 +119,7 @@ class ByteReader {
   }
   std::uint32_t count_slowly(std::uint32_t element_size);
   /// Calls take(at, n) for runs of n values at address `at` until all values are taken. A run ends
-  /// with the loaded bytes.
+  /// where the loaded bytes end.
   template <std::size_t kSize, class Take>
   bool for_runs(std::size_t n, const Take& take);
   bool check_left(std::uint64_t bytes);
@@ -133,8 +133,9 @@ class ByteReader {
   std::uint64_t end_ = 0;
   std::uint32_t max_count_ = 0xFFFFFFFF;
   // [first_, loaded_) are the loaded bytes, from offset window_begin_ of the source on: the
-  // window's, or all bytes of a source in memory. [at_, ready_) are the bytes that may be read at
-  // once: they lie inside the region of enter(), and there are none after a failure.
+  // window's, or all bytes of a source in memory. [at_, ready_) are the bytes that can be read
+  // without a further check: they lie inside the region of enter(), and there are none after a
+  // failure.
   std::uint64_t window_begin_ = 0;
   const std::uint8_t* first_ = nullptr;
   const std::uint8_t* at_ = nullptr;

@@ -216,7 +216,8 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// Assigns each column its offset in the block, in the order of control and group.
+// Assigns each column its offset in the rig's block of joint values. The columns are sorted by
+// control, and those of one control by group.
 Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entries, RigData& out,
                      KeptMatrices& kept) {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -268,8 +269,8 @@ Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatr
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   RISORIUS_TRY(place_columns(groups, entries, out, kept));
   list_by_group(entries, out);
-  // With these counts the evaluator may read the columns of a control at 0 if that costs less. All
-  // values must be finite, because 0 times infinity is not 0.
+  // With these counts the evaluator may read all columns if that costs less than selecting the
+  // columns of controls other than 0. All values must be finite, because 0 times infinity is not 0.
   if (finite || all_finite(kept)) count_reads(entries, out);
   return ok();
 }

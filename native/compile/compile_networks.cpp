@@ -286,8 +286,8 @@ class GraphCompiler {
   std::uint32_t first_ = 0;  // first operation of the type
 };
 
-// Three rows, the directions of the axes x, y, z. In: axes  0 left, 1 right, 2 up, 3 down, 4 front,
-// 5 back
+// Three rows, the directions of the axes x, y, z as (right, up, front).
+// In: axes  0 left, 1 right, 2 up, 3 down, 4 front, 5 back
 std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>& axes) {
   std::array<std::array<float, 3>, 3> rows{};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -194,7 +194,7 @@ void drop_layer(std::string_view id, Dna& dna) {
   });
   dna.unread_controls = {};
   const ControlCounts after = control_counts(dna);
-  // The difference must not be negative: without layer rbfe each pose is a control, so that
+  // The last difference is at least 0, although without layer rbfe each pose is a control, so that
   // removing that layer may raise the number of pose controls.
   dna.unread_controls = {before.psd - after.psd, before.ml - after.ml,
                          before.rbf_pose - std::min(before.rbf_pose, after.rbf_pose)};

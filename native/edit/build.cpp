@@ -22,7 +22,7 @@ using Indices = std::vector<std::uint16_t>;
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 28;
 constexpr std::size_t kMost = 65535;  // rows or columns
 
-// The key of a new joint group. Groups are written in ascending order of keys. If two groups
+// The sort key of a new joint group. Groups are written in ascending order of it. If two groups
 // write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // higher layers come first

@@ -18,7 +18,7 @@ struct Turn {
   double x = 0, y = 0, z = 0, w = 1;
 };
 
-/// The transform of a joint relative to its parent.
+/// The translation, rotation and scale of a joint in its parent's space.
 struct Local {
   Vector translation{};
   Turn rotation;

@@ -17,7 +17,7 @@ using author::Triangle;
 using author::Vector3;
 
 /// A surface of triangles in a search tree of boxes. It owns its points. Several threads may search
-/// at once.
+/// at the same time.
 class ClosestPoints {
  public:
   static constexpr std::size_t kMostTriangles = 4'000'000;

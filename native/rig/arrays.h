@@ -45,7 +45,7 @@ struct RowRun {
 };
 
 /// A corrective ("pose space deformation", hence Psd): a control that corrects the combined effect
-/// of several controls, such as lips that are pulled and pressed at once. Its value is min(1,
+/// of several controls, such as lips that are both pulled and pressed. Its value is min(1,
 /// weight * the product of its factors); each factor is another control clamped to [0, 1].
 struct Psd {
   std::uint16_t output = 0;         // the control that the corrective writes
@@ -78,8 +78,8 @@ struct JointGroup {
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
-/// Numbers of coefficients and columns that one control, or all controls together, make an
-/// evaluation read in the joint groups of a LOD.
+/// Numbers of coefficients and columns of the joint groups that an evaluation of a LOD reads for
+/// one control, or for all controls together.
 struct ControlReads {
   std::uint32_t values = 0;   // coefficients that an evaluation reads
   std::uint32_t columns = 0;  // the columns that hold these coefficients
@@ -101,8 +101,8 @@ struct QuaternionJoint {
 };
 
 /// A column that rotates joints by quaternions. The columns are ordered by group, and within a
-/// group as in the file. The rotations are multiplied in this order, because quaternions do not
-/// commute.
+/// group as in the file. The rotations are multiplied in this order, each from the left, because
+/// quaternions do not commute.
 struct QuaternionColumn {
   std::uint32_t control = 0;
   std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
@@ -192,8 +192,9 @@ struct MlJoint {
 /// A twist or swing setup. Four controls are a rotation, which consists of a *twist* about an axis
 /// and a *swing* of that axis. Joints get shares of one of them, for example along a neck.
 struct TwistSwing {
-  // The rotation of which joints get shares. kTwist: the twist; kUntwist: the inverse of the twist;
-  // kSwing: the inverse of the swing; in addition each joint gets the whole inverse of the twist.
+  // The rotation that is distributed over the joints. kTwist: the twist; kUntwist: the inverse of
+  // the twist; kSwing: the inverse of the swing, and each joint also gets the whole inverse of the
+  // twist.
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
   std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
   std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
@@ -232,8 +233,8 @@ enum StepList : std::uint32_t {
   // correctives.
   kChained,
   // Steps that depend on themselves, directly or through others, and steps that depend on them. A
-  // settled evaluation does not run them, so that their outputs remain at rest. A latent one runs
-  // their correctives.
+  // settled evaluation does not run them, so that their outputs keep their initial values. A latent
+  // one runs their correctives.
   kCyclic,
   // For latent evaluation: networks and then solvers, in the order of the file.
   kReference,
@@ -272,7 +273,7 @@ struct RigArrays {
   A<std::uint32_t> text_ends;
 
   A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
-  A<float> initial_controls;  // [controls]: the control vector at rest
+  A<float> initial_controls;  // [controls]: values before any step runs
   // The table from GUI controls to raw controls. For the inverse, gui_ranges lists ranges of rows
   // with equal bounds, sorted by GUI control and then by their first rows.
   A<ConditionalRow> gui_rows;

@@ -110,14 +110,14 @@ struct alignas(128) Workspace {
   std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
   // Solvers and networks.
   std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
-  std::vector<float> masks;    // [regions]: at 0 the networks of the region rest
+  std::vector<float> masks;    // [regions]: 0 skips the region's networks
   core::AlignedVector<float> operation_values;  // results of operations
   core::AlignedVector<float> layers[2];         // input and output of a network layer
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
   std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in some frame
-  core::AlignedVector<float> frame_weights;  // [controls, kFrames]: their values; those of
-                                             // correctives and networks are 0 between calls
+  core::AlignedVector<float> frame_weights;  // [controls, kFrames]: values of the controls; between
+                                             // calls 0 for correctives and networks
 };
 
 /// Make a pose and a workspace of the sizes that the rig needs.

@@ -16,7 +16,7 @@ template <class T>
 constexpr T rounded_up(T rows) {
   return (rows + kWidest - 1) / kWidest * kWidest;
 }
-/// Number of frames that a batch kernel evaluates at once.
+/// Number of frames that a batch kernel evaluates together.
 inline constexpr std::size_t kFrames = 8;
 
 /// A column of a matrix and the index of its weight.
@@ -139,8 +139,8 @@ struct Kernels {
 
   /// Packs matrices of bones for the `skin` function of the same table.
   /// In:  matrices  float32[n, 3, 4], by rows
-  /// Out: rows      float32[n, kSkinRow], each minus the identity, so that a bone at rest adds
-  ///                nothing
+  /// Out: rows      float32[n, kSkinRow], each minus the identity, so that a bone in its rest
+  ///                pose adds nothing
   void (*skin_rows)(const float* matrices, std::size_t n, float* rows);
   /// out[v] = points[v] + (sum of weight * (M - 1)) points[v]; a vertex without influences does not
   /// move. Influences are added in their order, for each vertex independently.

@@ -17,7 +17,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts sixteen rotations at once, four in a register. The function for the sines then loads
+// Converts sixteen rotations together, four in a register. The function for the sines then loads
 // exactly these registers; loads that span two stores of half a register would have to wait for
 // both. The number after each rotation is read and written with it.
 struct SixteenByFour {
@@ -120,7 +120,7 @@ struct AllColumns {
     const __m512i column = _mm512_setr_epi32(x, x, x, x, y, y, y, y, z, z, z, z, w, w, w, w);
     return _mm512_mul_ps(sum.whole(), _mm512_maskz_permutexvar_ps(kAll, column, four));
   }
-  // Adds the first and third quarter, and the second and fourth quarter, of two vertices.
+  // For each of two vertices a and b: first plus third quarter, second plus fourth quarter.
   RISORIUS_INLINE static __m512 halves(__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_maskz_shuffle_f32x4(kAll, a, b, 0x44),
                          _mm512_maskz_shuffle_f32x4(kAll, a, b, 0xEE));

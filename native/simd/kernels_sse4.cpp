@@ -19,7 +19,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts four rotations at once. The number after each rotation is read and written with it.
+// Converts four rotations together. The number after each rotation is read and written with it.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {

@@ -15,7 +15,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts eight rotations at once; the registers have the fifth to eighth in their upper halves.
+// Converts eight rotations together; the registers have the fifth to eighth in their upper halves.
 // The function for the sines then loads exactly these registers; loads that span two stores of half
 // a register would have to wait for both. The number after each rotation is read and written with
 // it.

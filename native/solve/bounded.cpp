@@ -123,8 +123,8 @@ struct Descent {
     }
     return largest;
   }
-  /// A Newton step in the free coordinates: coordinates strictly between their bounds and not at
-  /// rest. The step is shortened so that no coordinate crosses a bound or its rest.
+  /// A Newton step in the free coordinates: coordinates strictly between their bounds and different
+  /// from `rest`. The step is shortened so that no coordinate crosses a bound or its `rest` value.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {

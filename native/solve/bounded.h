@@ -22,7 +22,7 @@ void least_change(std::size_t rows, std::size_t columns, const double* a, const 
                   const double* low, const double* high, double ridge, double* x);
 
 /// A quadratic function with bounds: 1/2 x^T h x - g^T x + sum of sparse_i |x_i - rest_i|, for low
-/// <= x <= high.
+/// <= x <= high. rest_i is the value at which x_i costs nothing in the last term.
 struct Quadratic {
   std::size_t count = 0;
   const double* h = nullptr;  // [count, count], symmetric, positive semidefinite

@@ -100,7 +100,7 @@ void Probe::list_users() {
   is_marked_.resize(points_.size());
 }
 
-// Makes a frame of the last evaluation the base pose of the differences.
+// Makes a frame of the last evaluation the base pose, from which difference quotients are taken.
 void Probe::take(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;

@@ -80,7 +80,7 @@ class Probe {
   std::vector<std::uint32_t> joint_users_begins_, joint_users_, channel_users_begins_,
       channel_users_;
 
-  // The base pose of the differences.
+  // The base pose, from which difference quotients are taken.
   std::vector<float> deltas_;   // [joints_, 9]
   std::vector<float> weights_;  // [channels_]
   std::vector<Matrix> world_, skin_;

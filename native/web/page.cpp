@@ -29,7 +29,7 @@ struct PageMesh {
   const std::uint32_t* channels;  // [targets]
   const std::uint32_t* moves;     // [moved]: positions
   const Four* deltas;             // [moved]
-  const Four* normals;            // [positions] at rest; null: computed from the triangles
+  const Four* normals;            // [positions] undeformed; null: computed from the triangles
   Four* shaped;                   // [positions]
   Four* placed;                   // [positions]
   Four* turned;                   // [positions]
@@ -54,7 +54,8 @@ void add_shapes(const PageMesh& mesh, const float* channels) {
   }
 }
 
-// Deforms positions and normals by the joints. In: matrices  four columns for each joint
+// Deforms positions and normals by the joints. In: matrices  the four columns of each joint's
+// skinning matrix
 void add_joints(const PageMesh& mesh, const Four* matrices) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) {
     Four x{}, y{}, z{}, w{};

@@ -127,7 +127,8 @@ TRACKS = {
     "noseNostrilDilate*": [(64, 0), (70, 0.4), (76, 0.8), (96, 0.6)],
 }
 
-# Bone -> (frame, rotation in degrees); x nods, y tilts to a shoulder, z turns.
+# Bone -> (frame, Euler angles in degrees about x, y and z, see turn() in demo.py). Positive: x nods
+# down, y tilts to the left shoulder, z turns to the left.
 BONES = {
     "head": [
         (1, (0, 0, 0)),

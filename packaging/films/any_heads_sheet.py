@@ -127,7 +127,7 @@ class Face:
         Args:
             row: name -> value of controls, as for raw_of().
             size: size of the picture, pixels.
-            turn: turn about the vertical axis, radians.
+            turn: rotation to the face's right about the vertical axis, radians.
         """
         points, triangles = self._points(row), np.concatenate(self._triangles)
         c, s = np.cos(turn), np.sin(turn)

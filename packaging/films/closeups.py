@@ -26,7 +26,8 @@ from mathutils import Vector  # noqa: E402
 
 GROWN = 0.063  # metres between the eyes of an adult head, to which VIEWS refers
 # View -> (origin, target of the camera, place of the camera, focal length in mm). Target and place
-# are in mm from the origin: the midpoint between the eyes, lowered to the teeth for "teeth".
+# are in mm from the origin: x to the face's left, y to the back, z up. The origin is the midpoint
+# between the eyes, lowered to the teeth for "teeth".
 VIEWS = {
     "eye": ("eyes", (32, -5, 0), (32, -180, 4), 60),
     "mouth": ("teeth", (0, 0, 0), (0, -200, 8), 70),

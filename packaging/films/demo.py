@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the demo in Blender: installs the extension, imports the face, keys the acting, renders.
+"""Makes the demo in Blender: installs the extension, imports the face, adds the acting, renders.
 
 demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
@@ -60,11 +60,11 @@ def curves(action):
 
 
 def turn(bone, degrees):
-    """Turn a pose bone about the scene's axes.
+    """Set the XYZ Euler angles of a pose bone, given about the armature's axes.
 
     Args:
         bone: the pose bone.
-        degrees: angles about x, y and z in degrees.
+        degrees: angles about the armature's x, y and z; converted to the bone's axes.
     """
     bone.rotation_mode = "XYZ"
     to_bone = bone.bone.matrix_local.to_3x3().inverted()
@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Key the tracks of acting.py on the bone `face`, and the rotations of BONES on other bones."""
+    """Insert keyframes: tracks of acting.py on the bone `face`, rotations of BONES on others."""
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

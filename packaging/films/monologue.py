@@ -44,7 +44,7 @@ def go_to(seconds):
 
 
 def add_moods(controls):
-    """Key each mood's expression at the beginning and the end of its time."""
+    """Insert keyframes of each mood's expression at the beginning and the end of its time."""
     for begin, end, name, strength, flip in acting.MOODS:
         for seconds in (begin, end):
             go_to(seconds)
@@ -54,7 +54,7 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """Drag a vertex of the mouth's corner up, which sets one control, and key the result."""
+    """Drag up a vertex of the mouth's corner, which sets one control, and insert a keyframe."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex, way = corner_of_mouth(path)
@@ -139,7 +139,7 @@ def come_nearer(controls):
 
 
 def add_gaze(controls):
-    """Let the eyes follow an Empty that is keyed between the letter and a listener."""
+    """Let the eyes follow an Empty with keyframes at the letter and at a listener."""
     eyes, height = eyes_of(controls)
     letter = bpy.data.objects.new("Looked At", None)
     letter.empty_display_size = 0.04 * height
@@ -153,7 +153,7 @@ def add_gaze(controls):
 
 
 def turn_head(controls):
-    """Key the head bone. The rig turns the neck by a part of the head's turn."""
+    """Insert keyframes of the head bone. The rig turns the neck by a part of the head's turn."""
     head = controls.pose.bones["head"]
     for seconds, degrees in acting.TURNS:
         demo.turn(head, degrees)

@@ -19,7 +19,7 @@ LINES = [
 
 INTENSITY = 0.75  # of the speech; below 1, because a mood has already moved the mouth
 
-# Moods: (first and last second at full strength, expression, strength, mirrored).
+# Moods: (first and last second at full strength, expression, strength, whether mirrored).
 MOODS = [
     (0.0, 0.6, "relief", 0.15, False),
     (1.4, 4.6, "doubt", 0.7, False),
@@ -53,7 +53,8 @@ LOOKS = [
     (17.3, (-0.1, 3.0, 0.05)),
     (20.0, (-0.1, 3.0, 0.05)),
 ]
-# (second, rotation of the head in degrees): nod, tilt to a shoulder, turn.
+# (second, (nod, tilt, turn) of the head in degrees); positive: down, to the left shoulder, to the
+# left.
 TURNS = [
     (0.0, (-2, 0, 10)),
     (1.2, (-1, 0, 9)),

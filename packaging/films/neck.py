@@ -41,7 +41,7 @@ def parse():
 
 
 def turn(controls, bone, angles):
-    """Turn a control bone by yaw, pitch and roll about the face's axes, radians."""
+    """Rotate a control bone by Rz(yaw) Rx(-pitch) Ry(roll) in the face's axes, radians."""
     yaw, pitch, roll = angles
     matrix = Matrix.Rotation(yaw, 3, "Z") @ Matrix.Rotation(-pitch, 3, "X")
     matrix = matrix @ Matrix.Rotation(roll, 3, "Y")

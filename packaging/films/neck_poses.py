@@ -108,7 +108,7 @@ def _add_controls(dna: risorius.Dna, names: list[str], poses: int) -> None:
 
 
 def _turns_of(name: str, joint_turns: dict[int, tuple[str, float]]) -> dict[int, np.ndarray]:
-    """Joint -> its quaternion x, y, z, w about the face's axes in a pose.
+    """Joint -> quaternion x, y, z, w of its rotation from rest pose to a pose, in the face's axes.
 
     Args:
         name: key of LIMITS; any other name gives the rest pose.

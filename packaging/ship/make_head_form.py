@@ -116,15 +116,15 @@ class Heads:
         self.axes = self._axes()
 
     def shape(self, name: str) -> Doubles:
-        """float32[kept, 3]: the displacements of a target, decimetres. Results are cached."""
+        """float32[kept, 3]: a shape of the data as displacements, decimetres. It is cached."""
         if name not in self._read:
             self._read[name] = self.source.target(name, self.count)[self.kept].astype(np.float32)
         return self._read[name]
 
     def _axes(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-        """(targets of the low end, targets of the high end) of each feature.
+        """(shapes of the low end, shapes of the high end) of each feature of the data.
 
-        An end has two targets, left and right, if the feature has a target for each side. The low
+        An end has two shapes, left and right, if the feature has a shape for each side. The low
         end is empty if the feature has only one direction.
         """
         names = {
@@ -350,7 +350,7 @@ def weights_face(weights: Doubles) -> NDArray[np.bool_]:
 
 
 def ear_vertices(heads: Heads) -> Ints:
-    """Indices of the base mesh's vertices that the targets of the ears' size move."""
+    """Indices of the base mesh's vertices that the data's shapes for the size of ears move."""
     moved = np.zeros(heads.count)
     for side in "lr":
         way = heads.source.target(f"{TARGETS}ears/{side}-ear-scale-incr.target.gz", heads.count)

@@ -184,7 +184,7 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
 }
 
 /// The repair of a pose with one part, whose removal changes nothing, so that only the least
-/// squares solve can help. The faults of the sheet at rest are allowed.
+/// squares solve can help. The faults of the undeformed sheet are allowed.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));

@@ -326,7 +326,7 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
 
 TEST(Fit, WhatIsImportantIsNotSmoothedAway) {
   Shapes shapes = sheet(1);
-  for (std::size_t y = 1; y < kSide; y += 2) {  // peaks between resting vertices
+  for (std::size_t y = 1; y < kSide; y += 2) {  // peaks between vertices that stay
     for (std::size_t x = 1; x < kSide; x += 2) at(shapes, y * kSide + x, 0, 2) = 0.1f;
   }
   const std::size_t peak = 11 * kSide + 11;
@@ -353,7 +353,7 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto fit = fit_joints(shapes, few(9));
   ASSERT_TRUE(fit);
   std::vector<GivenJoint> joints(fit->joints.size());
-  for (std::size_t j = 1; j < joints.size(); ++j) {  // the first joint rests
+  for (std::size_t j = 1; j < joints.size(); ++j) {  // the first joint never moves
     joints[j].position = fit->joints[j];
     const auto first = fit->motions.begin() + static_cast<std::ptrdiff_t>(3 * j);
     joints[j].motions.assign(first, first + 3);
@@ -474,7 +474,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
   options.given[0].motions.resize(3);
-  options.given[0].motions[1].translation = {0.0, 0.0, 0.1};  // no joint rests
+  options.given[0].motions[1].translation = {0.0, 0.0, 0.1};  // every joint moves
   weights.joints[7] = 0;
   refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);

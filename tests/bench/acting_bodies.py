@@ -38,8 +38,8 @@ class Skin:
 
     Attributes:
         corners: int64[n, 4], vertices whose mean is the sample; a vertex may occur twice.
-        normals: float64[n, 3] of the samples at rest.
-        places: float64[n, 3] at rest.
+        normals: float64[n, 3] of the samples in the neutral pose.
+        places: float64[n, 3] in the neutral pose.
     """
 
     corners: Ints
@@ -55,7 +55,7 @@ def skin_samples(places: Floats, faces: Sequence[Sequence[int]]) -> Skin:
     """All samples of a mesh.
 
     Args:
-        places: [V, 3] at rest.
+        places: [V, 3], neutral.
         faces: vertex indices of each face, three or more.
     """
     normals = np.zeros_like(places)
@@ -111,7 +111,7 @@ class Ball:
         return table
 
     def depth(self, places: Floats) -> Floats:
-        """Depth of places [n, 3] below the surface of the ball at rest; negative outside."""
+        """Depth of places [n, 3] below the neutral ball's surface; negative outside."""
         rays = places - self.middle
         far = np.linalg.norm(rays, axis=1).clip(1e-9)
         up = np.arccos((rays[:, 1] / far).clip(-1.0, 1.0)) / np.pi * self.ROWS
@@ -131,7 +131,7 @@ class Arch:
         """Make the table.
 
         Args:
-            places: [V, 3] at rest.
+            places: [V, 3], neutral.
             triangles: [F, 3] of one row.
             back: z of the axis.
         """
@@ -188,8 +188,8 @@ class Cards:
         """Find the triangles.
 
         Args:
-            hairs: [n, 3] at rest.
-            places: [V, 3] of the skin at rest.
+            hairs: [n, 3], neutral.
+            places: [V, 3] of the neutral skin.
             triangles: [F, 3] of the skin.
         """
         first = np.zeros(len(places), np.int64)

@@ -10,7 +10,7 @@ table has two rows per head, before and after the repair, over all expressions a
 *cut*: the greatest depth of the outer lids in the eye;
 *lips*, *lips in*: the widest gap and the deepest cut of the lips in the pose that closes the mouth
 of an open jaw;
-*teeth*: volume of skin in teeth and gums beyond rest, measured by SkinChecker, summed over the
+*teeth*: volume of skin in teeth and gums beyond the neutral face's, by SkinChecker, summed over the
 `--deepest` expressions with the largest volume;
 *torn*: number of polygons that grow to more than 2.5 times their area, over all expressions.
 """

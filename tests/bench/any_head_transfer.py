@@ -53,7 +53,7 @@ def skin_of(person, source) -> TemplateFace:
 
 
 def truth_on(face: TemplateFace, target: Surface) -> tuple[np.ndarray, dict]:
-    """bool[V]: target vertices on the true skin; and pose -> true displacements [V, 3]."""
+    """bool[V]: whether a target vertex is on the true skin; pose -> true displacements [V, 3]."""
     own = face.surface
     near = ClosestPoints(own.points, own.triangles)
     triangle, shares, _ = near.nearest(target.points, target.normals(), 0.5, 0.1)

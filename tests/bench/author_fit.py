@@ -101,7 +101,7 @@ def row(name, positions, moved, reached, weights, edges, wall, cpu):
 
 def ours(joints, positions, moved, edges, bound):
     rest = np.tile(np.eye(3, 4), (len(moved), 1, 1, 1))
-    options = FitOptions(joints=joints - 1)  # the given joint at rest counts too
+    options = FitOptions(joints=joints - 1)  # the given joint, which never moves, counts too
     begin, cpu = time.perf_counter(), time.process_time()
     fit = fit_joints(
         positions,

@@ -10,7 +10,7 @@ CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 class Bare:
-    """Replays poses that the add-on has computed: vertices, or bones and live shape keys."""
+    """Replays poses that the add-on has computed: vertices, or (LIVE) bones and shape keys."""
 
     def __init__(self, rigs):
         # Names instead of objects, because an undo replaces all objects.

@@ -95,7 +95,7 @@ def capture(frames: int = 3600) -> Curves:
 
 def speech(frames: int = 3600) -> Curves:
     """Visemes of speech: 40 of 260 controls move, each in some of 15 sounds. Every sound rises and
-    falls as a squared cosine; silence follows each phrase. At rest a control is 0."""
+    falls as a squared cosine; silence follows each phrase. Outside its sounds a control is 0."""
     rng = np.random.default_rng(SEED + 2)
     curves = np.zeros((CONTROLS, frames))
     shapes = rng.random((15, 40)) * (rng.random((15, 40)) < 0.28)

@@ -9,7 +9,7 @@ installed. FULL.dna is a file of real size (tests/fullscale/generate.py): 60 of 
 at every frame, by an NLA strip with a second strip in Add mode above it. Each row times
 `scene.frame_set` with the whole dependency graph, without drawing.
 
-    add-on, AUTO / LIVE / KEYS   the add-on: Direct, Live and real shape keys
+    add-on, AUTO / LIVE / KEYS   the add-on in the shape modes Direct, Live, Shape Keys
     floor of AUTO / LIVE         a bare handler alternates between two poses of the add-on
     plain way                    a handler evaluates the same rig natively and writes all bones and
                                  all shape key values to the originals, in bulk; no drivers

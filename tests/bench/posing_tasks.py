@@ -22,8 +22,8 @@ error is left, after as many drags as the pose has active controls, or when no d
 twentieth of the initial error.
 
 Error: root mean square distance in mm of the vertices that the pose moves by more than 0.1 mm;
-*way* is this distance at rest. The last number of a cell is the number of sliders that end away
-from rest; left and right count as one.
+*way* is this distance of the neutral face. The last number of a cell is the number of sliders that
+end away from their neutral value; left and right count as one.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class Face:
         return tuple(self.screen @ (place - self.middle) * self.mm * PIXELS_A_MM)
 
     def pairs(self, raw):
-        """The number of sliders that are not at rest; left and right count as one."""
+        """The number of sliders away from their neutral value; left and right count as one."""
         away = np.flatnonzero(np.abs(raw) > 1e-3)
         return len({min(int(c), int(self.partners[c])) for c in away})
 
@@ -269,7 +269,10 @@ def is_mirrored(face, goal):
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, raw controls, start, end, key events) of the best drag, or None."""
+    """(error in mm, raw controls, start, target, key events) of the best drag, or None.
+
+    Start and target are places of the dragged vertex.
+    """
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
     picked, order = [], np.argsort(-off)
@@ -369,7 +372,7 @@ def tell(table, openings, keys, ways):
         table: array [pose, method, (events, pixels, mm, sliders)].
         openings: for each pose, the number of events that opened regions of sliders.
         keys: for each pose, the number of key events of its drags.
-        ways: for each pose, its root mean square distance from rest in mm.
+        ways: for each pose, its root mean square distance from the neutral pose in mm.
     """
     sliders, drags = table[:, 0], table[:, 3]
     near = drags[:, 2] <= 0.2 * ways

@@ -103,7 +103,7 @@ void add_cold(const std::string& name, Step step, const Frames& frames) {
   b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Adds a benchmark that evaluates many frames or faces at once. Several threads are measured by
+// Adds a benchmark that evaluates many frames or faces together. Several threads are measured by
 // wall time and in rounds, because starting a thread on an idle core of a virtual machine takes as
 // long as hundreds of frames. One thread is measured by its processor time, which does not count
 // the time of other processes.
@@ -459,7 +459,7 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
   // 60 and 100 are first, because in captured animations 60 to 100 raw controls move.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // For small faces only the rows with 20 and 60 controls are measured, to which others are
+    // For small faces only the rows with 20 and 60 controls are measured, with which other rows are
     // compared.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr

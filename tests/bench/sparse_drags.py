@@ -3,11 +3,11 @@
 
     python tests/bench/sparse_drags.py man.dna [--seed N]
 
-Each case is one drag from rest. There are three sets: the poses of posing_tasks.py, dragged at the
-vertex that moves furthest on the screen; 100 random vertices with a random pose of three sliders
-that each move the vertex by more than 2 mm; and 100 random vertices pulled by 4 to 21 pixels in a
-random direction, often out of the face's reach. The add-on's two kinds of drags are compared:
-*Exact* (least squares) and *Near* (sparse).
+Each case is one drag of the neutral face. There are three sets: the poses of posing_tasks.py,
+dragged at the vertex that moves furthest on the screen; 100 random vertices with a random pose of
+three sliders that each move the vertex by more than 2 mm; and 100 random vertices pulled by 4 to 21
+pixels in a random direction, often out of the face's reach. The add-on's two kinds of drags are
+compared: *Exact* (least squares) and *Near* (sparse).
 
 *sliders*: sliders that change by more than 0.0001, left and right as one; *extra*: this number
 minus the number of sliders of the artist's pose. *px off*: distance from the target at 1.25 pixels
@@ -40,7 +40,7 @@ METHODS = {
 
 @dataclass
 class Case:
-    """A drag from rest: vertices of the largest mesh, their targets, and raw controls or None."""
+    """A drag of the neutral face: vertices of the largest mesh, targets, raw controls or None."""
 
     vertices: list[int]
     targets: list[np.ndarray]
@@ -135,7 +135,9 @@ def pulls(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
 
 
 def drag(face: Skin, case: Case, method: str, ease: bool = False):
-    """The raw controls of a solved drag, and the solver's CPU seconds without local_ease()."""
+    """The raw controls of a solved drag, and the CPU seconds of solve_drag() alone.
+
+    With `ease`, local_ease() makes it cheap to change controls that mainly move the vertex."""
     zero = np.zeros(len(face.names))
     reach = face.surface.jacobian(zero, face.mesh, np.array(case.vertices[:1]))
     free = np.ones(len(zero), bool)

@@ -8,7 +8,7 @@ installed. FULL.dna is a file of real size (tests/fullscale/generate.py); the .b
 opening and saving contains ten characters of SAMPLE.dna. The floor is the time in the same scene
 with the add-on disabled; both are measured alternately, three times each. For frames and slider
 steps, a bare handler writes two poses alternately: vertex positions recorded from the add-on, or
-with --mode LIVE its bones and live shape keys. For undo, the same handler runs after a change of a
+with --mode LIVE its bones and shape keys. For undo, the same handler runs after a change of a
 property. Files and edit mode need no handler. Times are medians in ms.
 """
 

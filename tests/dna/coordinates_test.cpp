@@ -495,8 +495,8 @@ TEST(DnaCoordinates, MixedRotationRowsComeWithTheFirstOfThem) {
   EXPECT_EQ(warnings[1].where, "behavior.joint_groups[0].lods");
 }
 
-// A rotation about x by 90 and then y by 30 degrees equals a rotation about z by -30 and then x by
-// 90 degrees.
+// About fixed axes, a rotation about x by 90 and then y by 30 degrees equals a rotation about z by
+// -30 and then x by 90 degrees.
 TEST(DnaCoordinates, RotationRowsOfZerosAreLeftOut) {
   Dna dna = bare_rig(1, 1);
   dna.behavior.joint_groups = std::vector<JointGroup>{make_group({2}, {3, 4}, {90, 30})};

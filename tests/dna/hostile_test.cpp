@@ -213,8 +213,8 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
 
 // ---- a file that changes during reading
 
-// From a given read on, every fourth byte that is read is increased by one. In one of the
-// four phases these are the lowest bytes of counts.
+// From a given read on, every byte whose offset leaves the remainder `phase` when divided by 4 is
+// increased by one. For one of the four phases these are the lowest bytes of counts.
 class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)

@@ -160,7 +160,7 @@ TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
 }
 
 // Sizes just above a power of two: a list that doubles its capacity then has its old and its new
-// buffer at once.
+// buffer at the same time.
 constexpr std::size_t kSizes[] = {4097, 8193};
 // Heap memory in addition to the factors: windows of readers, messages, and the stack of open
 // containers.

@@ -30,8 +30,8 @@ void add_channels(dna::Dna& dna, std::uint32_t seed) {
   dna.behavior.blend_shape_channels.output_indices = std::move(outputs);
 }
 
-// Each raw control drives two runs of rows of different maps. For every third control a map is not
-// 0 at rest.
+// Each raw control drives two runs of rows of different maps. For every third control a map
+// is not 0 while the control is 0.
 void add_maps(dna::Dna& dna) {
   dna.definition.animated_map_names = names("map", kInputs);
   dna::Conditionals& table = dna.behavior.animated_maps.conditionals;

@@ -84,8 +84,8 @@ struct Armature {
     return m;
   }
 
-  // The pose of a bone as Blender defines it: pose of the parent * rest relative to the parent *
-  // transform.
+  // The pose of a bone as Blender defines it: pose of the parent * rest matrix relative to the
+  // parent * transform.
   Matrix pose(std::size_t b) const {
     const Matrix own = kept(&location[b * 3], &rotation[b * 4], &scale[b * 3]);
     if (parents[b] < 0) return product(rest_of(b), own);

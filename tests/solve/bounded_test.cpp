@@ -23,7 +23,7 @@ Doubles random(std::mt19937& random, std::size_t n, double low, double high) {
 
 /// How far x violates the conditions of a minimum with bounds; 0: not at all.
 /// In: slope  gradient of the smooth part
-///     kink   slope of the sparse part on both sides of rest
+///     kink   slope of the sparse part on both sides of x = rest
 double violation(const Doubles& x, const Doubles& slope, const Doubles& low, const Doubles& high,
                  const Doubles& rest, const Doubles& kink) {
   double worst = 0.0;

@@ -62,7 +62,7 @@ def best(message: str, language: str, depth: int) -> _Found:
     Args:
         message: the English message.
         language: a language of `tables.languages`, not "".
-        depth: number of messages that contain this message as a value or place.
+        depth: number of longer messages of which this message is a part; 0 for a whole message.
     """
     found = _Found(message)
     if " " not in message or len(message) > _LONGEST or depth > _DEEPEST:

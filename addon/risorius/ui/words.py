@@ -64,7 +64,7 @@ def width_of(text: str, points: float, font: str = "") -> float:
 def prop_or(
     layout: UILayout, owner: bpy.types.bpy_struct, name: str, empty: float | str, meaning: str
 ) -> None:
-    """Draw a property, and below it the meaning of its special value.
+    """Draw a property; if it has its special value, draw the meaning of this value below it.
 
     Args:
         layout: layout of the panel or dialog.

@@ -17,7 +17,8 @@ double squared_to_box(const Vec3& p, const Vec3& low, const Vec3& high) {
   return (p - p.cwiseMax(low).cwiseMin(high)).squaredNorm();
 }
 
-/// Whether a ray passes through a box (Kay and Kajiya 1986). In: inverse  1 / its direction
+/// Whether a ray passes through a box (Kay and Kajiya 1986).
+/// In: inverse  1 / the ray's direction, for each axis
 bool passes(const Vec3& from, const Vec3& inverse, const Vec3& low, const Vec3& high) {
   const Vec3 a = (low - from).cwiseProduct(inverse), b = (high - from).cwiseProduct(inverse);
   return std::max(a.cwiseMin(b).maxCoeff(), 0.0) <= a.cwiseMax(b).minCoeff();

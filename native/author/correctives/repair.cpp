@@ -34,8 +34,8 @@ constexpr double kBeyond = 0.5;
 // in each of at most kBacks rounds.
 constexpr double kKept = 0.91, kLess = 0.2;
 constexpr std::size_t kBacks = 12;
-// A repair may move the deepest vertex of the skin deeper by kDeeper mm, and multiply the largest
-// stretch of a face by kWider.
+// A repair may move the deepest vertex of the skin deeper by at most kDeeper mm, and multiply the
+// largest stretch of a face by at most kWider.
 constexpr float kDeeper = 0.09f, kWider = 1.005f;
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
@@ -310,7 +310,7 @@ struct Best {
 
 /// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
 /// In: undo   [V] the displacement in mm that undoes the part everywhere
-///     reach  mm from a fault at which nothing is undone
+///     reach  mm: vertices at least this far from every fault keep their whole motion
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;

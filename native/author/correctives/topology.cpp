@@ -151,13 +151,14 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
 }
 
 /// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A vertex that
-/// lies behind the other surface in the neutral pose does not touch it: the skin is thin there.
+/// lies behind the other surface in the neutral pose is left out, because the skin is thin there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
   const Nearest nearest(region.triangles, skin);
   for (const std::uint32_t v : region.vertices) {
-    // A resting vertex needs no check: the vertex that moves into it finds the contact.
+    // A vertex at its neutral position needs no check: a vertex that moves into it finds the
+    // contact.
     if ((skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
     const auto& near = topology.around[v];
     const auto takes = [&](std::uint32_t t) {

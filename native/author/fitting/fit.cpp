@@ -161,7 +161,7 @@ void thin_out(const Problem& problem, double least_effect, State& state, std::ve
   }
 }
 
-/// Adds new joints at rest, each in the middle of its vertices or at its pivot.
+/// Adds new joints without motions, each in the middle of its vertices or at its pivot.
 core::Status take_new_joints(const Problem& problem, const StartWeights& weights,
                              const std::vector<std::uint32_t>& at, State& state) {
   const std::size_t given = state.joints.size();

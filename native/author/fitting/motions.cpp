@@ -74,7 +74,7 @@ Shared share(const Moments& m, const Vec3& a, const Vec3& b) {
 }
 
 /// The 6 x 6 block of the stiffness matrix that couples two joints.
-/// In: s            sums with the arms at rest
+/// In: s            sums with the arms in the neutral pose
 ///     turn, other  present rotations of the two joints
 Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
   const Mat3 qp = other * s.qp * turn.transpose();
@@ -399,8 +399,8 @@ Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t 
 }
 
 /// The step of an expression that rotates joints far, by conjugate gradients on the stiffness in
-/// their present rotations. The preconditioner is the stiffness at rest, applied in the joints'
-/// rotated axes: it is exact if neighbouring joints have equal rotations.
+/// their present rotations. The preconditioner is the stiffness in the neutral pose, applied in the
+/// joints' rotated axes: it is exact if neighbouring joints have equal rotations.
 Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
                              const Eigen::VectorXd& right) {
   const Sparse matrix = system.matrix([&](std::size_t j) { return state.joints[j].rotations[e]; });

@@ -35,7 +35,7 @@ void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
 }
 
 /// Converts displacements to the fit's unit. An expression without a partner on the other side gets
-/// a mirrored copy, so that the middle and both sides have the same goals.
+/// a mirrored copy, so that the fit treats both sides of the face alike.
 void take_displacements(const Shapes& shapes, Problem& problem) {
   std::vector<std::uint32_t> alone;
   if (!problem.mirror.empty()) {
@@ -226,7 +226,7 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
       problem.pivots[i].mirrored = k;
       problem.pivots[k].mirrored = i;
     }
-    // A pivot without a mirrored pivot that is near the plane x = 0 is moved into it.
+    // A pivot that has no mirrored pivot and is near the plane x = 0 is moved into this plane.
     if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
       problem.pivots[i].position.x() = 0.0;
     }

@@ -16,7 +16,7 @@ core::Status check(const Shapes& shapes, const FitOptions& options);
 
 /// The problem without its pivots. In: shapes, options  must have been checked
 Problem make_problem(const Shapes& shapes, const FitOptions& options);
-/// Adds the pivots, in the fit's unit, each with the pivot of the other side.
+/// Adds the pivots, converted to the fit's unit, and pairs each with the pivot of the other side.
 void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
 /// The state with the given joints. If all of them move, a joint without motion, the head, is
 /// added. The first joint without motion gets all vertices. Also fills problem.nearest_given.

@@ -14,9 +14,9 @@ namespace {
 
 constexpr int kCandidates = 22;  // joints that a vertex tries at most
 constexpr double kLeast = 1e-4;  // smaller weights are dropped
-// For smoothness, weights are drawn to a mean of their present value, with this share, and the mean
-// of the neighbours. With share 0, momentum would make the weights of neighbours oscillate. Tried
-// from 0 to 0.7.
+// For smoothness, each weight is drawn to a goal: kOwn * its present value + (1 - kOwn) * the mean
+// of its neighbours' weights. With kOwn = 0, momentum would make the weights of neighbours
+// oscillate. Tried from 0 to 0.7.
 constexpr double kOwn = 0.4;
 constexpr double kLeastOnward = 0.1;  // share of a weight that momentum leaves at least
 
@@ -127,8 +127,8 @@ class Simplex {
  public:
   Simplex(Matrix gram, Column right) : gram_(std::move(gram)), right_(std::move(right)) {
     // The small ridge gives two joints that move alike equal weights, and keeps rounding errors
-    // from making one negative. The sum is a further row of the least squares, weighted so heavily
-    // that it is 1 up to rounding.
+    // from making one negative. The goal that the weights sum to 1 is a further row of the least
+    // squares, weighted so heavily that the sum is 1 up to rounding.
     gram_.diagonal().array() += 1e-7 * gram_.diagonal().maxCoeff();
     const double heavy = 1e4 * (gram_.diagonal().maxCoeff() + 1e-30);
     gram_.array() += heavy;
@@ -136,7 +136,8 @@ class Simplex {
     weights_ = Column::Zero(right_.size());
   }
 
-  /// In: start  candidates that are in the first passive set
+  /// Solves by the active set method of NNLS.
+  /// In: start  candidates of the first passive set, whose weights may be above 0
   void solve(const std::vector<int>& start) {
     passive_ = start;
     for (const int c : start) weights_[c] = 1.0 / static_cast<double>(start.size());

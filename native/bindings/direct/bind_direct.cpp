@@ -85,7 +85,7 @@ void forget_meshes(PyDirectFace& face) {
 }
 
 // The memory that receives a mesh's vertices. In: value  an array, which `kept` keeps alive, or
-// (address, vertices)
+// (address, number of vertices)
 float* target_argument(const py::handle& value, py::ssize_t vertices,
                        std::vector<py::object>& kept) {
   if (!py::isinstance<py::tuple>(value)) {
@@ -146,7 +146,7 @@ struct Request {
   const rig::FaceParts& parts(std::size_t f) const { return faces[f]->face->parts(); }
 
   // Adds the memory that receives the vertices of a face's meshes. In: object  {mesh: array or
-  // (address, vertices)}
+  // (address, number of vertices)}
   void add_targets(std::size_t f, const py::object& object) {
     if (!py::isinstance<py::dict>(object)) {
       throw py::value_error("targets: {mesh: array or (address, vertices)} was expected for each");

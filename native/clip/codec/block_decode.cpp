@@ -20,7 +20,7 @@ using core::fail;
 // bit 6       the symbol repeats the last value; bit 7: no code begins with these bits
 // bits 8-11   length of the code; 16-20: number of extra bits
 // bit 14      the prediction error has the opposite sign of the one before
-// bit 15      the 1 above the extra bits
+// bit 15      the highest bit of the error or count, whose lower bits are the extra bits
 // bits 24-27  number of the prefix code of the next symbol
 using Entry = std::uint32_t;
 constexpr Entry kIsRest = 1u << 6, kIsNone = 1u << 7;

@@ -70,8 +70,8 @@ Code make_code(std::span<const std::uint32_t, kMostSymbols> counts) {
   Code code;
   std::array<std::uint32_t, kMostSymbols> weights{};
   std::copy(counts.begin(), counts.end(), weights.begin());
-  // If a code is too long, the weights are made more equal, which shortens it; the loss is far
-  // below a percent.
+  // If a code is too long, the weights are made more equal, which shortens it; the encoded bytes
+  // grow by far less than a percent.
   while (measure(weights, code) > kLongestCode) {
     for (std::uint32_t& weight : weights) weight = weight == 0 ? 0 : weight / 2 + 1;
   }

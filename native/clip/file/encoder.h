@@ -30,7 +30,7 @@ class Encoder {
   /// Encodes the remaining frames and the index. Afterwards no frame may be appended.
   void finish();
 
-  /// Removes the bytes that are finished and returns them.
+  /// Returns the finished bytes, and removes them from the encoder.
   Bytes take();
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_ + filled_; }

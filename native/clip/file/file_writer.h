@@ -11,9 +11,9 @@
 
 namespace risorius::clip {
 
-/// Writes each full block of frames to PATH.part at once. close() renames it to PATH when it is on
-/// the disk. A writer that is not closed leaves the .part file: Reader opens it with
-/// Ends::kMayBeCut.
+/// Writes each block of frames to PATH.part as soon as the block is full. close() renames this file
+/// to PATH when its bytes are on the disk. A writer that is not closed leaves the .part file, which
+/// Reader opens with Ends::kMayBeCut.
 class FileWriter {
  public:
   /// Opens the .part file.

@@ -29,7 +29,7 @@ class Player {
 
   Reader reader_;
   std::uint64_t begin_ = 0, end_ = 0;  // the decoded frames
-  std::vector<std::uint32_t> moving_;  // controls that do not rest in these frames
+  std::vector<std::uint32_t> moving_;  // controls that change in these frames
   std::vector<float> curves_;          // [moving, frames]
   std::vector<float> values_;          // of the last frame
 };

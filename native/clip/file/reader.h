@@ -36,7 +36,8 @@ class Reader {
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_; }
   const std::vector<Event>& events() const { return events_; }
-  /// Bytes of the file that belong to the clip; more bytes follow only if the file was cut.
+  /// Number of bytes of the file that belong to the clip. Only a file that was cut has more: the
+  /// bytes of an incomplete block.
   std::uint64_t byte_count() const { return end_; }
   /// First frame of each block, followed by the number of frames.
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }

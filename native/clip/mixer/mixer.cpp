@@ -8,8 +8,8 @@ namespace risorius::clip {
 
 namespace {
 
-// Frame numbers and repeats that differ from an integer by less than this, relative to its size,
-// are rounded to it.
+// Frame numbers and numbers of repeats that differ from an integer by less than this, relative to
+// the integer's size, are rounded to it.
 constexpr double kLost = 1e-9;
 
 double snapped(double x) noexcept {

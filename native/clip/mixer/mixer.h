@@ -94,7 +94,7 @@ class LayerCurves {
 /// times in seconds of the clip. Without a warp the clip's part [first, last] begins at start,
 /// lasts (last - first) * scale and is played repeat times; end is derived. With a warp the layer
 /// lasts from start to end; scale, repeat and reverse are ignored, and a descending warp plays
-/// backwards. A single frame is held from start to end, by default always.
+/// backwards. A single frame is held from start to end, which by default is at all times.
 struct Layer {
   static constexpr double kAlways = std::numeric_limits<double>::infinity();
 
@@ -111,8 +111,8 @@ struct Layer {
   bool mute = false, solo = false;
 };
 
-/// Part of a reaction: controls that share one envelope. Attack and release follow x * x * (3 - 2 *
-/// x).
+/// Part of a reaction: controls that share one envelope. During `attack` it rises and during
+/// `release` it falls along x * x * (3 - 2 * x), where x goes from 0 to 1 and back.
 struct ReactionPart {
   std::vector<std::uint32_t> controls;
   std::vector<float> weights;                                   // [controls], in [0, 1]
@@ -120,8 +120,8 @@ struct ReactionPart {
 };
 using Reaction = std::vector<ReactionPart>;
 
-/// While `by` are on, `of` are reduced: of *= 1 - amount * s, where s in [0, 1] is the highest,
-/// lowest or mean value of `by`.
+/// The controls `by` reduce the controls `of`: each of `of` is multiplied by 1 - amount * s, where
+/// s in [0, 1] is the highest, lowest or mean value of `by`.
 struct Yield {
   enum class Measure : std::uint8_t { kMax, kMin, kMean };
   std::vector<std::uint32_t> by, of;
@@ -157,7 +157,7 @@ class Mixer {
  public:
   /// In:    controls   names, each once
   ///        low, high  [controls], low <= high
-  ///        max_fired  largest number of reactions that are active at once
+  ///        max_fired  largest number of reactions that are active at the same time
   /// Fails: kInvalidLength, kInvalidValue.
   static core::Result<Mixer> make(std::vector<std::string> controls, std::vector<float> low,
                                   std::vector<float> high, std::size_t max_fired = 256);

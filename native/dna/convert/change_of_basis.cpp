@@ -17,7 +17,8 @@ std::array<std::size_t, 3> axis_order(std::uint32_t sequence) {
   return kOrders[sequence];
 }
 
-// Multiplies R by the rotation about one axis. In: angle  radians
+// Multiplies R from the right by the matrix, for row vectors, of a rotation about one axis.
+// In: angle  radians
 void rotate(Matrix& r, std::size_t axis, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;

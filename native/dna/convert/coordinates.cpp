@@ -359,7 +359,8 @@ bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_c
   return true;
 }
 
-// Converts the axes of quaternions. If the basis mirrors, the sense of rotation is reversed.
+// Converts quaternions from the source's axes to the target's. If the basis mirrors, the sense of
+// rotation is reversed.
 Array<float> converted_quaternions(const Basis& basis, const Array<float>& values) {
   std::vector<float> out(values.begin(), values.end());
   for (std::size_t i = 0; i + 3 < out.size(); i += 4) {
@@ -411,7 +412,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// The numbers of the networks are not converted. Instead, keys 3 to 9 of MlJoints name the
+// The numbers of the networks are not converted. Instead, parameters 3 to 9 of MlJoints name the
 // coordinate system to which the numbers refer.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;

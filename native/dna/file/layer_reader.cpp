@@ -267,7 +267,8 @@ void LayerReader::targets(Mesh& m) {
 void LayerReader::add_place(const Place& place) { places->note(r_.where(), place); }
 
 std::optional<std::uint64_t> Places::find(std::string where) const {
-  // The index of the first list element that was removed from the end of the path.
+  // The list index that was last cut from the end of `where`, such as 3 for "[3]"; empty if a name
+  // was cut last.
   std::optional<std::size_t> index;
   while (!where.empty()) {
     if (const auto at = places_.find(where); at != places_.end()) {

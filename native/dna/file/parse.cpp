@@ -148,8 +148,8 @@ class Parser {
       for (std::uint32_t& offset : offsets) offset = r_.u32();
     }
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges{{0, r_.position()}};
-    // Sections have no sizes in this version: a section ends where the next one begins. Unwanted
-    // sections are then not read.
+    // Version 2.1 stores no sizes of sections: a section ends where the next one begins. With the
+    // ends known, unwanted sections need not be read.
     const auto end_of = [&](std::uint64_t begin) {
       std::uint64_t end = std::max(begin, file_end);
       for (const std::uint64_t other : offsets) {

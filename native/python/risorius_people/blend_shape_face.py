@@ -96,7 +96,7 @@ def bind_displacement(
     exactly the expression's displacement.
 
     Args:
-        positions: float64[v, 3], positions at rest in decimetres.
+        positions: float64[v, 3], neutral positions in decimetres.
         weights: float64[v, 9], skin weights of the vertices.
         expression: displacements of the same vertices, and the motions of its joints.
         joints: name of a joint -> float64[3], its position in decimetres.

@@ -29,7 +29,7 @@ class Expression:
     """The motion of a raw control at 1, and the part of it that joints perform."""
 
     displacement: Floats  # [V, 3], decimetres: the whole motion, including that of the joints
-    # joint -> (rotation [3, 3], translation [3] in decimetres)
+    # joint -> (rotation matrix [3, 3] about the joint's position, translation [3] in decimetres)
     joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
 

@@ -97,7 +97,7 @@ def _levels(what: str, value: float) -> list[tuple[str, float]]:
 
 
 class _Reader:
-    """Reads the values of a person's table; an invalid value raises an error that names its key."""
+    """Reads the values of a person's table; an invalid value raises an error with its TOML key."""
 
     def __init__(self, where: str, table: dict[str, Any]) -> None:
         self.where, self.table = where, dict(table)
@@ -168,7 +168,7 @@ class _Reader:
 
 
 def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
-    """Reads a person from a table. Raises: ValueError: an invalid key; the message names it."""
+    """Reads a person from a TOML table. Raises: ValueError: an invalid key, which it names."""
     read = _Reader(where, table)
     values: dict[str, Any] = dict(vars(like)) if like else {}
     values |= read.take("name", read.text) | read.take("gender", read.gender)
@@ -206,11 +206,11 @@ def read_person(path: Path) -> Person:
     """Reads a person from a TOML file.
 
     Args:
-        path: path of the file; cast.toml explains the keys.
+        path: path of the file; cast.toml explains its TOML keys.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: not TOML, or an invalid key.
+        ValueError: not TOML, or an invalid TOML key or value.
     """
     table = toml.read(path)
     like = table.pop("like", None)

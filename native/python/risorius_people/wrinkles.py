@@ -275,7 +275,7 @@ def relief(tensors: Floats, there: Floats) -> Floats:
 
 
 def normals(heights: Floats, places: Floats) -> Floats:
-    """float64[h, w, 3] in [0, 1]: normals of a relief in texture space.
+    """float64[h, w, 3]: unit normals n of a relief in texture space, stored as 0.5 + 0.5 n.
 
     Args:
         heights: float64[h, w], in decimetres.

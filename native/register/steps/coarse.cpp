@@ -86,7 +86,7 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
   for (std::size_t e = 0; e < nodes.edges.size(); ++e) {
     const std::uint32_t a = nodes.edges[e][0], b = nodes.edges[e][1];
     const double weight = stiffness * stiff[e];
-    // The motion of each node, applied to the other node's position, should give that node's own
+    // The motion of a node, applied to its neighbour's position, should give the neighbour's own
     // motion.
     const Row4 here = row(a, at(b)), there = row(b, at(a)), place(1, 0, 0, 0);
     Block cross = -weight * (here * place.transpose() + place * there.transpose());

@@ -10,7 +10,8 @@ namespace risorius::registering::steps {
 
 class Coarse {
  public:
-  /// Keeps references to the arguments. In: rest  [V] positions at the beginning, in millimetres
+  /// Keeps references to the arguments. In: rest  [V] positions before any step,
+  /// in millimetres
   Coarse(const Nodes& nodes, const Points& rest);
   ~Coarse();
 

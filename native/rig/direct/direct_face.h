@@ -24,7 +24,7 @@ struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
     std::shared_ptr<const Skin> skin;
-    std::vector<float> base;  // [vertices, 3]: the vertices without channels and bones
+    std::vector<float> base;  // [vertices, 3], which channels and bones then move
   };
   std::shared_ptr<const Rig> rig;
   std::shared_ptr<const BoneSpace> space;
@@ -47,8 +47,8 @@ struct Target {
 /// raw    float32[R]; nullptr: the pose is given
 /// pose   with raw: the rig's output, null pointers are ignored; without raw: the input, joints and
 ///        blend_shapes are read
-/// turns  float32[turned, 4], w x y z: rotations that are multiplied from the left to the rotations
-///        of the bones FaceParts::turned; nullptr: none
+/// turns  float32[turned, 4], quaternions w x y z in each bone's rest axes. They are multiplied
+///        from the left to the rotations of the bones FaceParts::turned; nullptr: none
 /// anew   write all targets, even if nothing changed
 struct FaceFrame {
   const float* raw = nullptr;
@@ -67,11 +67,11 @@ class DirectFace {
   static core::Result<std::unique_ptr<DirectFace>> make(FaceParts parts);
 
   const FaceParts& parts() const { return parts_; }
-  /// Sets the transforms of all bones: location [bones of chain, 3], rotation [.., 4], scale [..,
-  /// 3]. The rig's own bones get new transforms in each frame.
+  /// Sets the transforms of all bones of FaceParts::chain: location [bones, 3], rotation [bones, 4]
+  /// as w x y z, scale [bones, 3]. The bones that the rig moves get new transforms in each frame.
   void keep(const float* location, const float* rotation, const float* scale);
-  /// Sets the vertices of a mesh without channels and bones. In: mesh  below the number of meshes;
-  /// base  float32[vertices, 3]
+  /// Sets the base vertices of a mesh, which its channels and bones then move.
+  /// In: mesh  below the number of meshes; base  float32[vertices, 3]
   void set_base(std::uint32_t mesh, const float* base);
   /// Makes the next frame write every mesh.
   void forget() noexcept;

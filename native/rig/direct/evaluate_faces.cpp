@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kWorthAThread = 8192;
 constexpr std::size_t kMostThreads = 64;
 
-// One list of tasks for all threads: first a begin for each face, then the blocks of all meshes. A
-// thread that takes a block waits until another thread has finished the begin of its face. Threads
+// One list of tasks for all threads: first the begin() of each face, then the blocks of all meshes.
+// A thread that takes a block waits until the begin() of the block's face has finished. Threads
 // share ownership of the list: the caller waits until all tasks are done, not until each thread has
 // started, which takes longer than a frame on a busy machine. A thread that starts too late finds
 // no task.

@@ -18,9 +18,10 @@ struct SpaceConvention {
   float scale = 1;
 };
 
-/// Converts poses to the bones of another program. A bone rests in the neutral pose n of its joint.
-/// A pose with the deltas dt, dr and ds gives the bone the transform R(n)^-1 T(dt) R(n + dr) S(1 +
-/// ds), in the axes of the other program.
+/// Converts poses to the bones of another program. The rest pose of a bone is the neutral pose of
+/// its joint, with the rotation angles n. A pose with the deltas dt, dr and ds gives the bone the
+/// transform R(n)^-1 T(dt) R(n + dr) S(1 + ds) relative to its rest pose, in the axes of the other
+/// program.
 struct BoneSpace {
   struct Bone {
     std::uint32_t joint;
@@ -34,7 +35,7 @@ struct BoneSpace {
 };
 
 /// Prepares the conversion of some joints' poses to bones.
-/// In:  neutral_rotations  float32[joint_count, 3] in the file's unit
+/// In:  neutral_rotations  float32[joint_count, 3], Euler angles in the file's unit and order
 ///      bones              the joint of each bone, below joint_count
 BoneSpace make_bone_space(const SpaceConvention& convention, const float* neutral_rotations,
                           std::uint32_t joint_count, const std::vector<std::uint32_t>& bones);

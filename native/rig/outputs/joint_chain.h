@@ -17,22 +17,23 @@ struct JointChain {
   std::vector<std::int32_t> parents;      // -1: none
   std::vector<std::uint32_t> order;       // parents come before their children
   std::vector<Affine> rest;               // in the armature's space
-  std::vector<Affine> inverse;            // of rest
+  std::vector<Affine> inverse;            // of the rest matrices
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(parents.size()); }
 };
 
 /// Checks a hierarchy of bones and prepares its evaluation.
 /// In:    parents  [bones] in any order, -1: none
-///        rest     float64[bones, 4, 4], in the armature's space
+///        rest     float64[bones, 4, 4], rest matrices in the armature's space
 /// Fails: kInvalidIndex (a parent that does not exist, or a cycle of parents); kInvalidValue (a
 ///        matrix that is not finite, cannot be inverted, or whose last row is not 0 0 0 1)
 core::Result<JointChain> make_joint_chain(std::span<const std::int32_t> parents,
                                           const double* rest);
 
-/// Computes the skinning matrices: pose times the inverse of rest, in the armature's space. The
-/// pose of a bone is the pose of its parent times its rest relative to the parent times T(location)
-/// R(rotation) S(scale). Computed in double; the bits are the same on every CPU.
+/// Computes the skinning matrices: pose matrix times inverse rest matrix, in the armature's space.
+/// The pose matrix of a bone is its parent's pose matrix times its rest matrix relative to the
+/// parent times T(location) R(rotation) S(scale). Computed in double; the bits are the same on
+/// every CPU.
 /// In:  location  float32[bones, 3]
 ///      rotation  float32[bones, 4], w x y z of any length; 0 0 0 0 is half a turn about x as in
 ///                Blender

@@ -22,7 +22,7 @@ float corrective(const Rig& rig, const Psd& psd, const float* values) noexcept {
 }
 
 // Appends the controls from begin up to end that are not 0. Runs of eight controls that are 0 are
-// skipped at once, because most controls are 0 in most frames.
+// skipped by one test, because most controls are 0 in most frames.
 // Out: number of controls appended
 std::size_t append_active(const float* controls, std::uint32_t begin, std::uint32_t end,
                           std::uint16_t* active) noexcept {
@@ -136,7 +136,7 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
 }
 
 // Reads one value of every list that these controls will need. These reads do not depend on each
-// other, so that a cold cache loads all of them at once, and their pages are in memory when the
+// other, so that a cold cache loads them in parallel, and their pages are in memory when the
 // columns are read. In a batch only the first frame does it, because the other frames need mostly
 // the same memory.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
@@ -159,8 +159,8 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
-// Calls touch(), unless the evaluation before had the same active controls: then its lists are used
-// again, and these name the columns in one run.
+// Calls touch(), unless the evaluation before had the same active controls. Then its lists are used
+// again; they list the columns in one run of memory, so that touch() is not needed.
 // Out: whether the evaluation before had the same active controls
 bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
            Workspace& work) noexcept {

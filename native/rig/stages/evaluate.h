@@ -18,8 +18,8 @@ namespace risorius::rig {
 ///       lod     clamped to the last LOD
 ///       settle  true: networks, solvers and correctives run in the order of their dependencies, so
 ///               that the pose is a function of raw alone; false: networks, then solvers, then
-///               correctives; each reads the rest values of later stages, as in the first call of
-///               the reference evaluator
+///               correctives; each reads the initial values of later stages, as in the first call
+///               of the reference evaluator
 /// Out:  pose    every field is overwritten
 /// From: RigLogic; dna-format 12
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,

@@ -60,8 +60,8 @@ const Pose& Instance::evaluate(const float* raw) noexcept {
   if (has_latency) before_ = pose_.controls;  // of equal size: no allocation
   detail::latent_controls(*rig_, lod_, work_, pose_.controls.data());
   detail::outputs(*rig_, lod_, work_, view(pose_));
-  // If a control depends on a later stage it changes one frame later. The pose is at rest only when
-  // an evaluation changes no control.
+  // If a control depends on a later stage it changes one frame later. With equal raw controls the
+  // pose stays the same only after an evaluation that changed no control.
   at_rest_ = !has_latency || std::memcmp(before_.data(), pose_.controls.data(),
                                          before_.size() * sizeof(float)) == 0;
   return pose_;

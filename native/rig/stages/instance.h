@@ -22,7 +22,7 @@ class Instance {
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
   /// One value for each region, mesh after mesh. At 0 the networks of the region are skipped and
-  /// their outputs are at rest. Other values have no effect.
+  /// their outputs keep their initial values. Other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
   /// In: index below the number of masks.
   void set_mask(std::size_t index, float value) noexcept;

@@ -16,8 +16,8 @@ namespace {
 constexpr std::uint64_t kListed =
     sizeof(JointColumn) + 2 * sizeof(std::uint32_t) + 2 * sizeof(simd::Column);
 
-// The numbers of columns and values in the joint groups that the active controls make an evaluation
-// read. Only `columns` is counted if the rig has no control_reads.
+// The numbers of columns and values of the joint groups that an evaluation reads for the active
+// controls. Only `columns` is counted if the rig has no control_reads.
 ControlReads count_active(const Rig& rig, std::uint32_t lod,
                           std::span<const std::uint16_t> active) noexcept {
   ControlReads sum;

@@ -63,7 +63,7 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
 }
 
 // Rotates the quaternion joints: multiplies the rotations of the active columns in the order of the
-// file.
+// file, each from the left.
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept {
   if (rig.quaternion_joints.empty()) return;

@@ -14,16 +14,16 @@ namespace {
 
 double square(double v) { return v * v; }
 
-// Reduces a quaternion to its rotation about an axis. For the quaternion 0 0 0 0 the result is NaN,
-// so that the input is near no pose.
+// Reduces a quaternion to its twist, the rotation about an axis. For the quaternion 0 0 0 0 the
+// result is NaN, so that the input is near no pose.
 void twist_only(double* q, std::uint32_t axis) noexcept {
   const double length = std::sqrt(square(q[axis]) + square(q[3]));
   for (std::uint32_t i = 0; i < 3; ++i) q[i] = i == axis ? q[i] / length : 0.0;
   q[3] /= length;
 }
 
-// Removes the rotation about an axis from a quaternion. A rotation of 180 degrees about an axis
-// perpendicular to it needs no change.
+// Replaces a quaternion q by its swing q * twist^-1, where twist is its rotation about the axis. A
+// rotation of 180 degrees about a perpendicular axis needs no change.
 void swing_only(double* q, std::uint32_t axis) noexcept {
   const double t = q[axis], w = q[3];
   const std::uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;

@@ -92,9 +92,9 @@ void frame_channels_and_maps(const Rig& rig, std::uint32_t lod, std::size_t coun
 /// Lists the columns that a frame, or frames together, need: the columns of active controls, or all
 /// columns if reading them costs less than listing.
 /// In:  active  controls, ascending
-/// Out: work    also live_blocks and live
-///      the columns by group: the columns of group i are from its columns_begin up to
-///      work.column_ends[i]
+/// Out: work    column_ends, live_blocks and live
+///      returns the columns sorted by group: the columns of group i are from its columns_begin up
+///      to work.column_ends[i]
 const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
                                  std::span<const std::uint16_t> active, Workspace& work) noexcept;
 

@@ -17,7 +17,7 @@ Quaternion inverse(const Quaternion& q) {
                         : Quaternion{c.x / square, c.y / square, c.z / square, c.w / square};
 }
 
-// The part of a rotation that rotates about one axis.
+// The twist of a rotation: its part that rotates about the given axis.
 Quaternion twist(const Quaternion& q, std::uint32_t axis) {
   const float t = axis == 0 ? q.x : (axis == 1 ? q.y : q.z);
   const float length = std::sqrt(t * t + q.w * q.w);

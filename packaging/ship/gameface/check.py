@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """check.py FOLDER FACE.dna [TAKE.csv]: compares three.js in chromium with the file and the rig.
 
-FOLDER has node_modules, page.html and combinations.js. With each target alone, the vertices in
-three.js must equal both the sum of the exported file's numbers and the rig's vertices. For frames
+FOLDER has node_modules, page.html and combinations.js. The face is exported as glTF. With each
+morph target alone, the vertices in three.js must equal both the sum of the exported file's numbers
+and the rig's vertices. For frames
 of a take, they must equal the sum of the file's numbers. The distance from the rig is printed with
 and without the combination driver; with it, the distance must be at most DRIVEN_MM.
 """
@@ -40,7 +41,7 @@ async def client(one: Browser, weights: Mapping[str, float], *, table: bool) -> 
 
     Args:
         one: the browser.
-        weights: target -> weight.
+        weights: morph target -> weight.
         table: use the combination driver.
     """
     found = await one.evaluate(f"at({json.dumps(dict(weights))}, {json.dumps(table)})")

@@ -66,7 +66,7 @@ async def try_file(one: Browser, folder: Path, name: str) -> None:
     at_file = {mesh: found.positions(mesh) * sides for mesh in found.meshes()}
     worst = apart(rest, at_file)
     [hair] = [mesh for mesh in rest if mesh.startswith("hair")]
-    # The head turns at once, and the hair follows later.
+    # The head turns immediately, and the hair follows later.
     turned = await one.evaluate("at({jawOpen: 1.0}, {head: 0.6}, null)")
     later = await one.evaluate("wait()")
     for state in (turned, later):

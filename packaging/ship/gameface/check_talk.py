@@ -65,7 +65,7 @@ async def try_file(
 
 
 async def try_voice(one: Browser, folder: Path, found: GlbFile, kind: str, voice: Path) -> float:
-    """Speak a voice. Returns the largest distance in mm of a vertex from the file's numbers.
+    """Let the avatar speak. Returns the largest distance in mm of a vertex from the file's numbers.
 
     Args:
         one: the browser.

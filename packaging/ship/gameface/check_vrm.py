@@ -2,7 +2,7 @@
 """check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests exported VRM files in three-vrm.
 
 With each expression alone, the vertices must equal both the sum of the file's numbers and the
-rig's vertices. A real take plays by the 52 ARKit units, and a voice by the visemes. Also checks
+rig's vertices. A real take is played by the 52 ARKit units, a voice by visemes. Also checks
 that emotions override blinks as the file says, that the head turns, and that the eyes look at a
 target by expressions.
 """
@@ -80,7 +80,7 @@ class Shown:
 
 
 def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
-    """Target -> its weight. Asserts that all meshes have the same weights."""
+    """Morph target -> its weight. Asserts that all meshes have the same weights."""
     out: dict[str, float] = {}
     for weights in state["weights"].values():
         for name, weight in weights.items():
@@ -89,7 +89,7 @@ def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
 
 
 def expect(weights: Mapping[str, float], wanted: Mapping[str, float]) -> None:
-    """Check that the wanted targets have their weights, clamped to 0..1, and all others have 0."""
+    """Check that the wanted morph targets have their weights, clamped to 0..1, all others 0."""
     for name, weight in weights.items():
         asked = min(1.0, max(0.0, wanted.get(name, 0.0)))
         if abs(weight - asked) > 1e-3:
@@ -199,7 +199,7 @@ async def try_gaze(shown: Shown, found: GlbFile) -> None:
 
 
 def turned(rest: Any, at: Any) -> Any:
-    """float64[3, 3]: the rotation that fits the posed vertices of an eye to the neutral ones.
+    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto the posed ones.
 
     Args:
         rest: neutral vertices [V, 3].

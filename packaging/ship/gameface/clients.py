@@ -83,7 +83,8 @@ def from_the_file(
     Args:
         found: the file.
         state: the client's vertices, weights and joints, from places.js.
-        mixes: target that the client made itself -> targets of the file -> factors of their sum.
+        mixes: morph target that the client made itself -> morph target of the file -> its factor in
+            the sum that the client made.
     """
     numbers = {node["name"]: i for i, node in enumerate(found.json["nodes"])}
     world = {

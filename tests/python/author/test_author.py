@@ -33,7 +33,7 @@ from risorius.author.geometry.simplify import (
     simplified,
 )
 from risorius.author.input import matching, shape_face, spec
-from risorius.author.level_meshes import level_meshes, shape_of
+from risorius.author.level_meshes import level_meshes, shapes_of
 from risorius.author.work import TOLERANCE, begin
 from risorius.cli import main
 from risorius.cli.faces import author
@@ -184,7 +184,7 @@ def test_levels_end_before_the_picture_breaks(folder, tmp_path):
                 neutral, _ = face_shapes.head()
                 fine = np.linalg.norm(points[:, None] - neutral, axis=2).argmin(axis=1)
                 points = points + face_shapes.expressions(neutral)[name][fine]
-            slivers, folds = shape_of(points, triangles)
+            ((slivers, folds),) = shapes_of([points], triangles)
             assert slivers <= 0.02
             assert folds <= 0.045
 

@@ -24,7 +24,7 @@ class Bezier:
 
     Attributes:
         co: float64[keys, 2], frame and value of each key.
-        left, right: float64[keys, 2], frame and value of each handle's end. Its frame lies a third
+        left, right: float64[keys, 2], frame and value of each handle's end. The frame lies a third
             of the way to the neighbouring key, so that the value is a cubic polynomial of the
             frame.
     """

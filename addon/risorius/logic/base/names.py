@@ -14,7 +14,7 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
 
     Args:
         name: any text; bytes that are not UTF-8 appear as lone surrogates.
-        limit: bytes.
+        limit: largest number of bytes.
 
     Returns:
         The same text, or a shorter one that is valid UTF-8; never empty.

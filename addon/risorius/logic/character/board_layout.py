@@ -545,7 +545,7 @@ def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Li
 
 
 def track_of(handle: Handle) -> list[Line]:
-    """A handle's frame with marks at rest, relative to the rest place. Args: handle  the handle."""
+    """Lines of a handle's frame and its mark at rest, relative to the handle's rest place."""
     left, bottom, right, top = frame_of(handle)
     frame = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
     if handle.x is not None and handle.y is not None:

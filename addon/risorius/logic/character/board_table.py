@@ -33,7 +33,7 @@ _OPPOSITES = (
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a conditional: if low <= value <= high, slope * value + cut is added to an output.
+    """A row of a conditional: adds slope * value + cut to a raw control if low <= value <= high.
 
     Attributes:
         gui, raw: indices of the GUI control and of the raw control.
@@ -55,8 +55,8 @@ class BoardTable:
 
     Attributes:
         names: names of the GUI controls, such as CTRL_L_eye_blink.ty.
-        rows: in the file's order; of several rows with the same control and output, the first whose
-            range contains the value is used.
+        rows: in the file's order; of several rows with the same GUI control and raw control, the
+            first whose range contains the value of the GUI control is used.
         raw_count: R, number of raw controls of the face.
         is_own: True: the table was made from names of raw controls, so `cut` is 0 in all rows.
     """

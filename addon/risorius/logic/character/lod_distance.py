@@ -11,7 +11,7 @@ SLACK = 0.1  # the viewport changes the level 10 % beyond a threshold distance
 def default_distances(count: int, size: float) -> list[float]:
     """The distances from the camera at which a level of detail (LOD) changes to the next coarser.
 
-    The first distance is six times the size of the face; each other is twice its predecessor.
+    The first distance is six times the size of the face; each later one is twice the one before.
 
     Args:
         count: number of LODs.

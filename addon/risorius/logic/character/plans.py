@@ -309,7 +309,8 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
     reach = float(np.max(np.ptp(heads, axis=0), initial=0.0)) or 1.0
-    # In float32, a very short bone loses its direction, so bones get at least 3 % of `reach`.
+    # In float32, a very short bone loses its direction, so each bone is at least 3 % as long as the
+    # largest extent of all joints.
     lengths = np.full(count, reach * 0.03)
     for joint, parent in enumerate(parents.tolist()):
         if joint != parent:
@@ -343,7 +344,7 @@ def _check(indices: NDArray[np.int64], limit: int, what: str) -> None:
     if len(indices) and int(indices.max()) >= limit:
         raise PlanError(
             told(
-                "The file's {what} leads to number {max} of {limit}.",
+                "The file's {what} leads to number {max} of {limit}, which does not exist.",
                 what=what,
                 max=int(indices.max()),
                 limit=limit,

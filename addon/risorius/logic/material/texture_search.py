@@ -64,7 +64,7 @@ _ROLE_WORDS = {
     "alpha": "alpha",
     "opacity": "alpha",
 }
-# Words in texture names that are ignored.
+# Words that are ignored in texture names.
 _FILLERS = {"t", "tx", "map", "maps", "main", "base", "animated", "baked", "vt", "inst", "lod0"}
 _SIZE = re.compile(r"^(\d+|\d+k|u?1001)$")
 _SET = re.compile(r"^([cw]m)([1-9])$")

@@ -51,7 +51,7 @@ class Track:
 @dataclass
 class Counts:
     """Totals over the written F-curves: number of keyframes, number of keyframes before the
-    reduction, largest error of the reduction, and number of F-curves."""
+    key reduction, largest error of the key reduction, and number of F-curves."""
 
     keys: int = 0
     all_keys: int = 0
@@ -81,7 +81,7 @@ def write(
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the reduction, see reduce_keys; 0 keeps a key at every frame.
+        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
         counts: totals, which this call increases.
 
     Returns:
@@ -110,7 +110,7 @@ def add_tracks(
         bag: receives the F-curves; must not contain curves of these properties.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the reduction, see reduce_keys; 0 keeps a key at every frame.
+        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
         counts: totals, which this call increases.
     """
     times = np.asarray(frames, np.float32)

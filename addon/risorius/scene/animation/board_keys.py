@@ -45,7 +45,9 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about raw controls that a conversion changed by more than board.SEEN, or None.
+    """A sentence about the raw controls that a conversion changed most.
+
+    None if it changed no raw control by more than board.SEEN.
 
     Args:
         loss: differences of raw controls before and after the conversion.
@@ -127,7 +129,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
 
 
 def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]:
-    """Convert the slider keys of a new action to keys of handles if the face board leads.
+    """Convert slider keys of a new action to keys of board handles if the face board leads.
 
     Args:
         rig: the character that will play it.
@@ -190,10 +192,10 @@ def _leading_curves(
 def convert(
     rig: ArmatureObject, action: bpy.types.Action, by_board: bool
 ) -> tuple[board_fit.Loss, int]:
-    """Convert the keys of an action in place between sliders and handles.
+    """Convert the keys of an action in place between sliders and handles of the face board.
 
-    The new keys are linear, within TOLERANCE of the earlier curves. Controls without keys keep
-    their current value.
+    The new keys are linear; the lines between them are within TOLERANCE of the converted
+    values. Controls without keys keep their current value.
 
     Args:
         rig: the character.

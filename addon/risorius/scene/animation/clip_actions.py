@@ -246,9 +246,9 @@ def _add_turn(
     turns: NDArray[np.float64],
     fitter: Fitter | None,
 ) -> None:
-    """Add F-curves of a bone's rotation in its rotation mode.
+    """Add F-curves of a bone's rotation, in the rotation mode of the bone.
 
-    turns: float64[n, 4], quaternions in the armature's axes.
+    turns: float64[n, 4], quaternions (w x y z) in the armature's axes.
     """
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
@@ -262,14 +262,17 @@ def rotation_path(bone: bpy.types.PoseBone) -> str:
 
 
 def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions float64[n, 4] in the armature's axes, converted to the bone's axes."""
+    """Convert quaternions float64[n, 4], w x y z, from the armature's axes to the bone's axes."""
     rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
     back = rest * [1.0, -1.0, -1.0, -1.0]
     return clip_units.multiply(clip_units.multiply(back, turns), rest)
 
 
 def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternions as values of a rotation mode, float64[n, 3 or 4], angles in radians."""
+    """Convert quaternions float64[n, 4], w x y z, to values of a rotation mode.
+
+    Returns: float64[n, 3 or 4], angles in radians.
+    """
     if mode == "QUATERNION":
         return turns
     if mode == "AXIS_ANGLE":
@@ -420,7 +423,8 @@ def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.
 
     Args:
         action: any action.
-        owner: the object or the shape keys; of an action with slots, only its slot is read.
+        owner: the object or the shape keys; of an action with slots, only the slot of this
+            owner is read.
     """
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
@@ -560,12 +564,14 @@ def add_sound(
         made = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
         said = str(error).strip().removeprefix("Error: ")
-        raise clip_units.ClipError(told("no sound strip: {said}", said=said)) from error
+        raise clip_units.ClipError(told("no sound strip was added: {said}", said=said)) from error
     strip = cast("bpy.types.SoundStrip", made)
     sound = strip.sound
     if strip.frame_final_duration <= 1 and (sound is None or not sound.samplerate):
         strips.remove(strip)
-        raise clip_units.ClipError(told("no sound strip: Blender cannot read the sound file"))
+        raise clip_units.ClipError(
+            told("no sound strip was added: Blender cannot read the sound file")
+        )
     return strip
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inserts keys by Blender's settings: auto-key, keying set, only needed, key type, group.
+"""Inserts keyframes (keys) by Blender's settings: auto-key, keying set, only needed, key type.
 
 Code that moves sliders or control bones for the animator does so in a function that it passes to
-`by_hand`, or calls `changed` after the move.
+`by_hand`, or calls `changed` after the move. While a tweak is on, edits go into its additive layer.
+Either the sliders or the face board lead, that is, move the face; the others have no effect.
 """
 
 from __future__ import annotations
@@ -121,7 +122,7 @@ def pose_of(controls: ArmatureObject) -> Pose:
 def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
     """The sliders that the face board moves, and the bones of all its handles.
 
-    If the sliders lead, the board moves no slider.
+    If the sliders lead, the first set is empty.
     """
     handles = {handle.bone for handle in live.handles}
     if not board.leads(controls, live):
@@ -160,17 +161,17 @@ def by_hand(
         context: has the settings and the current frame.
         rig: the character.
         move: a function that moves sliders and bones from their current values. It returns the
-            names of the sliders that it handled, or None if it did nothing.
+            names of all sliders that it set, even to equal values; None if it did nothing.
         at_selected: True: move at every frame with a selected key of this face, and key all
             changes; False: move at the current frame.
-        at: a function that is called with the frame before each move.
+        at: a function that is called before each move; its argument is the frame of the move.
 
     Returns:
         The number of keyed properties.
 
     Raises:
-        FaceError: no key is selected, or an active tweak does not reach this frame. Nothing has
-            changed.
+        FaceError: with at_selected, no key is selected or a tweak is active; without it, an active
+            tweak does not include the current frame. Nothing has changed.
     """
     controls = parts.controls_there(rig)
     shown_keys.show_some(controls)
@@ -428,7 +429,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of a curve's newest key if it has at most two keys."""
+    """Set interpolation and handle types of the newest key of a curve with at most two keys."""
     if len(curve.keyframe_points) > 2:
         return  # Blender copied them from the previous key
     for key in (

@@ -56,10 +56,10 @@ class Bones:
     """Rotations and gaze target of the control bones.
 
     Attributes:
-        turns: rotations of "head", "neck", "eye_L", "eye_R" in the axes of the armature; bones at
-            rest are left out.
-        target: location of the gaze target relative to rest, in the axes of the target's bone;
-            None at rest.
+        turns: "head", "neck", "eye_L", "eye_R" -> Quaternion in the axes of the armature; bones
+            that are not rotated are left out.
+        target: offset of the gaze target from its rest location, in the axes of the target's
+            bone; None without an offset.
     """
 
     turns: dict[str, Quaternion] = field(default_factory=dict)
@@ -153,7 +153,7 @@ def mix(
         return raw, bones  # the action of baked controls contains the layers
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    # The evaluated armature lacks a layer that was added after the last evaluation. Its weights
+    # If a layer was added after the last evaluation, the evaluated armature lacks it. All weights
     # then come from the original armature.
     there = len(layers.places(seen)) == len(layers.places(controls))
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
@@ -165,7 +165,7 @@ def mix(
 
 
 def _numbers(bones: Bones) -> NDArray[np.float32]:
-    """float32[len(clip_units.BONES)]: angles of bones in radians, then the gaze target."""
+    """float32[n] in the order of clip_units.BONES: angles in radians, then the gaze target."""
     found: list[float] = []
     for name, group in clip_logic.TURNS.items():
         turn = bones.turns.get(name)
@@ -359,7 +359,7 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
     """Times in seconds at which a layer plays a constant pose: always, from the start of the layer
-    on, or for its length."""
+    on, or for the length of the layer."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}

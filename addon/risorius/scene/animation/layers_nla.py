@@ -179,7 +179,7 @@ def _set_influence(
 def _action_of(
     scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
 ) -> tuple[bpy.types.Action, bool]:
-    """An action with the curves that a layer's mask allows, and whether it is a constant pose.
+    """An action with the curves that a layer's mask allows; whether the action is a constant pose.
 
     The layer's action itself is returned if the mask allows all its curves.
     """

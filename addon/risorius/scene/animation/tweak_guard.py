@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moves edits by Blender's own buttons into the active tweak.
+"""Moves edits by Blender's own buttons into the active tweak (additive layer, see tweaks.py).
 
 Blender inserts its keys into the action of the face. While a tweak is on, the .blend file has a
 copy of that action, so that undo and redo restore the copy too. New keys of the action are removed

@@ -3,7 +3,7 @@
 
 While a tweak is on, the layer stores the difference between an edited slider and the keys below,
 and the slider returns to the value of these keys. The same applies to the bones of head, neck and
-eyes, to the gaze target, and to the handles of a leading face board.
+eyes, to the gaze target, and to the handles of a face board that leads (moves the face).
 """
 
 from __future__ import annotations
@@ -162,17 +162,18 @@ def take(
     Args:
         controls: control armature with an active tweak.
         labels: sliders to store.
-        frame: of the scene.
-        bones: data paths of `paths_of`; others are ignored.
-        held: True: controls without a difference get a key too if the tweak moves them already.
+        frame: frame of the scene.
+        bones: data paths of bones to store; paths that `paths_of` does not contain are ignored.
+        held: True: controls that were not edited get a key too if the tweak already has keys of
+            them.
         old: curves to which the changes are added, from `curves_so_far`; None: the current curves.
 
     Returns:
         The number of tweaked sliders and bones.
 
     Raises:
-        FaceError: the frame is outside the tweak, or its weight is too small for such a large
-            rotation.
+        FaceError: the frame is outside the tweak, or the weight of the tweak at this frame is too
+            small to store a large rotation.
     """
     tweak = of(controls)
     assert tweak is not None
@@ -389,7 +390,7 @@ def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     Args:
         controls: the control armature.
         tweak: the active tweak.
-        frame: of the scene.
+        frame: frame of the scene.
     """
     base = Stand(
         dict(tweak.base),

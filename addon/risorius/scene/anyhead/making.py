@@ -18,6 +18,7 @@ Cancelled = Callable[[], bool]
 
 FIT, JOINTS = "FIT", "JOINTS"  # stages of a task
 _FITTED = 0.6  # share of the total time after which the head has its expressions
+_CARRIED = 0.9  # of that, at the end of the transfer of expressions
 
 
 class HeadTask(Task[Result], Generic[Result]):
@@ -29,7 +30,7 @@ class HeadTask(Task[Result], Generic[Result]):
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """Begin a stage of the task. Returns: a function that receives its progress, 0 to 1.
+        """Begin a stage of the task. Returns: a function that takes the stage's progress, 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
@@ -85,7 +86,7 @@ class Made(NamedTuple):
     Attributes:
         finding: the landmarks of the head.
         shapes: the head with its expressions.
-        rigged: the joint rig.
+        rigged: the joint rig that was made from the head.
     """
 
     finding: finding.Finding
@@ -109,7 +110,8 @@ def rig_task(
         tell = telling(task.part(FIT, 0.0, _FITTED), cancelled)
         made, read = _carry_over(head, template, transfer, tell)
         tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
-        rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell)
+        few = native.part("anyhead.onto").FIT_VERTICES
+        rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell, few)
         if not cancelled():
             _write(rig.dna, read, wishes.path)
         found = finding.on_object(head, made.landmarks)
@@ -138,12 +140,16 @@ def _carry_over(
         wishes=parts.Wishes(mesh=head.named, scale=1.0),
     )
     name = head.parts[0].name
-    made: native.Onto = onto.onto(name, head.parts, "cm", dna, options, progress)
+    made: native.Onto = onto.onto(
+        name, head.parts, "cm", dna, options, lambda share: progress(_CARRIED * share)
+    )
     made.shapes.name = name
     if template.path:
         lend = native.part("anyhead.borrowing").lend_materials
         lend(made.shapes.parts, dna, Path(template.path), own)
-    return made, onto.shape_face(made, dna, name)
+    return made, onto.shape_face(
+        made, dna, name, lambda share: progress(_CARRIED + (1 - _CARRIED) * share)
+    )
 
 
 def _write(dna: native.Dna, read: native.Read, path: str) -> None:

@@ -73,7 +73,7 @@ def words(rig: ArmatureObject) -> str:
     if not kind:
         return ""
     state = _kept(rig if kind == RESULT else parts.controls_there(rig))
-    what = told("Baked: it plays its actions")
+    what = told("Baked face: it plays its actions")
     if kind == CONTROLS:
         what = told("The controls are baked; layers, NLA and drivers rest")
     return told(

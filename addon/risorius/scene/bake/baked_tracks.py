@@ -58,7 +58,7 @@ def rig_tracks(
         live: the character's Runtime.
         samples: inputs of the face, from sampling.sample.
         pose: from `evaluate`.
-        wanted: parts to bake; "BONES" and "MAPS" count here.
+        wanted: parts to bake; only "BONES" and "MAPS" have an effect here.
         target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:

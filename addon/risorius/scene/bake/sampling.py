@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the inputs of a face (sliders, rotations, other animation) at the frames of a range.
 
-Blender evaluates actions, NLA, drivers, constraints and bodies in a separate scene that has only
-the two armatures of the face and the objects they depend on. The result of every frame equals frame
-stepping in the user's scene. Other objects of that scene are not evaluated, and its current frame
-does not change. A few features need the user's scene itself (`_needs_whole_scene`); its frame is
-restored afterwards.
+Blender evaluates actions, NLA, drivers and constraints in a separate scene that has only the two
+armatures of the face and the objects they depend on, such as the armature of its body. The result
+of every frame equals frame stepping in the user's scene. Other objects of the user's scene are not
+evaluated, and its current frame does not change. A few features need the user's
+scene itself (`_needs_whole_scene`); its frame is restored afterwards.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ class Samples:
         times: float64[N], frames at which Blender reads actions; they differ from `frames` if the
             scene uses Time Stretching.
         raw: float32[N, R], the raw controls for the rig, with layers.
-        sliders: float32[N, R], like raw, before the eye bones add to the look controls.
-        turns: for each frame, rotations as "neck", "head" -> Quaternion, see inputs.read_inputs.
-        basis: control bone -> float64[N, 4, 4], relative to its rest, after constraints and layers.
+        sliders: float32[N, R], like raw, but before the eye bones add to the look controls.
+        turns: for each frame, "neck" and "head" -> Quaternion, see inputs.read_inputs.
+        basis: control bone -> float64[N, 4, 4], matrices relative to its rest pose, after
+            constraints and layers.
         places: float64[N, 4, 4], world matrices of the control armature.
         bones: property such as "location" -> float32[N, bones, width], values of the deforming
             armature's bones from the user's own animation; None if there is no such animation.
@@ -273,7 +274,7 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the matrices of the control bones for one frame.
+        """Store the matrices of the control bones for one frame, see Samples.basis.
 
         Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
         gaze target after the layers are mixed.

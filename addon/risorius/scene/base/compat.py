@@ -43,7 +43,7 @@ def _strips(layer: bpy.types.ActionLayer) -> list[bpy.types.ActionKeyframeStrip]
 
 
 def make_node_tree(material: bpy.types.Material) -> None:
-    """Give a material a node tree. Since Blender 5.0 it has one, and setting use_nodes warns."""
+    """Give a material a node tree. Since 5.0 it always has one, and setting use_nodes warns."""
     if material.node_tree is None:
         material.use_nodes = True
 
@@ -120,7 +120,7 @@ def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot 
     """The slot of an action that fits a datablock; None before Blender 4.4 or if none fits.
 
     First choice is the slot in use, then the slot with the datablock's name, then the first slot
-    for its type.
+    for the datablock's type.
 
     Args:
         action: any action.

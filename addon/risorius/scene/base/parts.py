@@ -195,7 +195,7 @@ def meshes_pointing_at(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def active_rig(context: Context) -> ArmatureObject | None:
-    """The character of the active object, or the only one of the scene, or None.
+    """The character of the active object, or else the only character of the scene, or None.
 
     Linked characters are left out, because they cannot be changed.
     """

@@ -124,7 +124,7 @@ def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
 def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]:
     """Context manager: the control armature, evaluated at a frame.
 
-    The evaluation includes its action, NLA strips and drivers.
+    The evaluation includes action, NLA strips and drivers of the armature.
 
     A property without animation keeps its present value. Blender also writes the animated values to
     the original; the caller must restore the user's edits.

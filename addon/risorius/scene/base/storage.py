@@ -173,7 +173,7 @@ def _unpack(packed: bytes, limit: int) -> bytes:
                 )
             )
         if count > limit:
-            raise ContentError(told("its bytes unpack to more than {limit:,}", limit=limit))
+            raise ContentError(told("its bytes unpack to more than {limit:,} bytes", limit=limit))
         if not piece and not rest and not unpacking.eof:
             raise ContentError(told("its bytes end too early"))
         pieces.append(piece)

@@ -186,7 +186,7 @@ def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
 
     Args:
         rig: the deforming armature.
-        controls: the control armature; its evaluated copy has its bones already.
+        controls: the control armature; its evaluated copy must already have its bones.
     """
     data = rig.animation_data
     path = f'["{parts.PULL}"]'
@@ -222,7 +222,7 @@ def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
 
     Args:
         rig: the deforming armature.
-        controls: the control armature; its evaluated copy has its bones already.
+        controls: the control armature; its evaluated copy must already have its bones.
     """
     driver = _pulling(rig)
     if driver is not None:

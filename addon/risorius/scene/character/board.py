@@ -214,7 +214,7 @@ def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats
     Args:
         gui: float32[G], values of GUI controls.
         live: the character's Runtime.
-        sliders: float32[R], values of raw controls without a GUI control; None: at rest.
+        sliders: float32[R], values of raw controls without a GUI control; None: rest values.
 
     Returns:
         float32[R], values of raw controls.

@@ -180,7 +180,7 @@ def _sideways(live: runtime.Runtime) -> dict[int, float]:
 
 
 def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
-    """float64[J, 3]: joint positions, Blender units. Args: deltas  float32[J, 9] of a Pose."""
+    """float64[J, 3]: joint positions in Blender units. Args: deltas  float32[J, 9] of a Pose."""
     dna, space = live.dna, live.space
     angles = np.asarray(dna.neutral_joint_rotations, np.float64)
     if live.rig.rotation == "euler":
@@ -191,7 +191,10 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 
 
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """The position and unit of a primary board, which is beside the head meshes."""
+    """The position and unit of a primary board, which is beside the head meshes.
+
+    The primary board has about 30 handles, see primary_table.
+    """
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
 
@@ -217,7 +220,8 @@ def _box(
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
     """The position and unit of a complete board.
 
-    The board is beside the head at +x, and _SHARE times as high as the head.
+    The board is beside the face at +x. Its height is _SHARE times the largest extent of the
+    meshes and joints of the face.
     """
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())

@@ -196,7 +196,7 @@ def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
 
 def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]:
     """Scale of the outline in bone lengths, and its translation in the bone's space."""
-    # Bones of an extremely small or large face may have length 0.
+    # Bones of an extremely small or large face may have length 0; 1 avoids a division by 0.
     length, head = bone.length or 1.0, bone.head_local
     if name == "head":  # a ring above the hair
         radius = 0.9 * room.wide

@@ -27,13 +27,13 @@ class BuildOptions:
     Attributes:
         lods: levels of detail whose meshes are built; 0 is the finest.
         mode: LIVE, KEYS or AUTO, see change_mode.
-        normals: keep the file's normals.
-        materials: build materials.
-        textures: load textures from the folders near the file and from texture_folder.
+        normals: whether the file's normals are kept as custom normals.
+        materials: whether materials are built.
+        textures: whether to load textures from the folders near the file and from texture_folder.
         texture_folder: folder to search first; "": none.
-        simple_materials: make materials without subsurface, relief and animated maps.
+        simple_materials: whether to make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None: the scene's unit.
-        nearest_lods: build the finest level of the file if the file has no level of `lods`.
+        nearest_lods: whether to build the finest level of the file if it has no level of `lods`.
     """
 
     lods: tuple[int, ...] = (0,)

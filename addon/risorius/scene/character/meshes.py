@@ -310,7 +310,7 @@ def add_channel_key(
 
 
 def remove_channel_key(item: MeshObject, block: bpy.types.ShapeKey) -> None:
-    """Remove a shape key of add_channel_key with its driver.
+    """Remove a shape key that add_channel_key made, and its driver.
 
     Args:
         item: the mesh object.

@@ -39,7 +39,11 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
 
 
 def has_strayed(rig: ArmatureObject) -> bool:
-    """Whether the user or a script moved a rig that follows its controls. Args: rig  original."""
+    """Whether the user or a script moved a rig that follows its controls.
+
+    Args:
+        rig: the original (not evaluated) deforming armature.
+    """
     last = last_written.places.get(rig.session_uid)
     return isinstance(last, bytes) and _follows(rig) and not _is_at(rig, np.frombuffer(last))
 
@@ -127,7 +131,7 @@ def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
 
 
 def _named(bones: Iterable[bpy.types.Bone], word: str) -> str:
-    """The bone nearest to the root whose name contains the word as a whole word, or ""."""
+    """Of the bones whose names contain a whole word, the bone nearest to the root; "" if none."""
     pattern = re.compile(rf"(?:^|[^a-z]){word}(?![a-z])", re.IGNORECASE)
     found = [b for b in bones if pattern.search(_split(b.name))]
     found.sort(key=lambda b: (len(b.parent_recursive), b.name))
@@ -207,7 +211,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; bones at rest are left out.
+        "neck" and "head" -> Quaternion in the control armature's axes; without unrotated bones.
     """
     hold = body_of(controls)
     if hold is None:
@@ -246,7 +250,7 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 
 
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
-    """Move the face so that its head bone meets the body's head bone in rest position.
+    """Move the face so that its head bone at rest meets the body's head bone at rest.
 
     Without head bones, the neck bones are used. `scale`: also scale the face, so that its neck is
     as long as the neck of the body.

@@ -173,8 +173,9 @@ class Chain:
 
     Attributes:
         joints: int64[n], indices of the joints, root first.
-        angles: float64[n, 3], neutral rotations in the file's units.
-        offsets: float64[n, 3], neutral translations in Blender's units and axes.
+        angles: float64[n, 3], neutral Euler angles relative to the parent, in the file's units.
+        offsets: float64[n, 3], neutral translations relative to the parent, in Blender's units
+            and axes.
     """
 
     joints: NDArray[np.int64]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mirrors poses, copies or links the sides of a face, and sets poses of regions."""
+"""Mirrors poses, copies or links the sides of a face, and sets poses of regions.
+
+Either the sliders or the face board lead, that is, move the face; the others have no effect.
+"""
 
 from __future__ import annotations
 
@@ -111,7 +114,10 @@ def mirror(rig: ArmatureObject, region: str = "") -> None:
 
 
 def mirror_bones(controls: ArmatureObject) -> None:
-    """Mirror the transforms of control bones at x = 0; the eye bones exchange their rotations."""
+    """Mirror the transforms of control bones at the armature's plane x = 0.
+
+    The left and the right eye bone exchange their mirrored transforms.
+    """
     bones = controls.pose.bones
     turned = {}
     for name in runtime.CONTROL_BONES:

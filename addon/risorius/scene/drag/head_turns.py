@@ -109,9 +109,9 @@ class HeadTurns:
         return (result @ self._place.T)[:, :3]
 
     def of_joint(self, joint: int) -> Float:
-        """float64[4, 4]: motion of a joint on top of its evaluated pose, in the armature's axes.
+        """float64[4, 4]: matrix in armature space, applied to a joint's posed vertices (v' = M v).
 
-        It includes the motions of the joint's parents.
+        It contains motions of the joint and its parents that the raw controls do not contain.
         """
         if joint not in self._known:
             parent = int(self._live.dna.joint_parents[joint])

@@ -76,8 +76,10 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
 def _first(
     context: Context, origin: Vector, direction: Vector
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
-    """The first object on a ray that is not drawn as wire or bounds: (original object, location,
-    polygon, object matrix)."""
+    """The first object that a ray meets, except objects drawn as wire or bounds.
+
+    Returns: (original object, location in world space, index of the polygon, world matrix).
+    """
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
         met, place, _normal, index, item, matrix = context.scene.ray_cast(
@@ -119,8 +121,8 @@ def _nearest(
 def computed(
     context: Context, rig: ArmatureObject, live: runtime.Runtime, skin: Skin, mesh: int
 ) -> NDArray[np.float64]:
-    """float64[V, 3]: vertices of a mesh in world space, after the armature and without the other
-    modifiers.
+    """float64[V, 3]: vertices of a mesh in world space, deformed by the armature but not by the
+    other modifiers.
 
     Args:
         context: has the visible scene.
@@ -172,7 +174,7 @@ def handles_of(
 
 
 def size_of(rig: ArmatureObject, live: runtime.Runtime) -> float:
-    """The largest extent of the first mesh at rest, in world space.
+    """The largest extent of the neutral first mesh of the DNA file, in world space.
 
     Args:
         rig, live: the character and its Runtime.

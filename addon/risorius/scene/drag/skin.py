@@ -34,7 +34,7 @@ class Skin:
         surface: the face in file space (axes and unit of the DNA file), at the visible level of
             detail.
         items: mesh index -> mesh object.
-        size: largest extent of the face at rest, in Blender units.
+        size: largest extent of the neutral face, in Blender units.
         depsgraph: dependency graph of the view.
         live: Runtime of the character.
         pressed: float64[3], world position of the dragged vertex at the mouse press, or None.
@@ -120,7 +120,7 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex nearest to the mirror image of a vertex, both at rest; None if none is near.
+        """The vertex nearest to the mirror image of a vertex in the neutral face, or None if far.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.

@@ -2,6 +2,7 @@
 """Converts between sliders and the raw controls of the drag solver.
 
 The raw controls include the animation layers; the sliders do not.
+Either the sliders or the face board lead, that is, move the face; the others have no effect.
 """
 
 from __future__ import annotations

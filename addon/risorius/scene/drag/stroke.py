@@ -42,7 +42,7 @@ class Options:
         symmetric: move the mirrored point too.
         method: "near": few sliders that mainly move the dragged area; "least_squares": all sliders;
             or "transpose", see solve_drag.
-        single: move only the best control; with `symmetric` its partner too.
+        single: move only the best control; with `symmetric` also its partner on the other side.
         choice: with `single`: 0: the best control, 1: the second best, and so on.
         region: use only controls of the region of the point.
         others: points that move together with the dragged point.
@@ -139,7 +139,7 @@ class Stroke:
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
         """Move the point to its target, and insert keys.
 
-        Controls that changed very little during the drag get their values before the drag again.
+        Controls that changed very little during the drag are reset to their values before the drag.
 
         Args:
             context: has the settings for keys.
@@ -170,13 +170,17 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Restore the sliders of the mouse press. Args: context  with the visible view layer."""
+        """Restore the slider values of the mouse press.
+
+        Args:
+            context: its view layer is evaluated with the restored sliders.
+        """
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)
 
     def moved(self, count: int = 3) -> list[tuple[str, float]]:
-        """(name, change) of the controls that changed most. Args: count  largest number of them."""
+        """(name, change since the press) of the `count` controls that changed most."""
         change = (self.raw - self.state.seen).astype(np.float64)
         order = np.argsort(-np.abs(change), kind="stable")[:count]
         return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]
@@ -364,7 +368,11 @@ def begin(context: Context, rig: ArmatureObject, point: Point, options: Options)
     if not 0 <= vertex < skin.surface.vertex_counts[mesh]:
         found, count = vertex, skin.surface.vertex_counts[mesh]
         raise FaceError(
-            told("A vertex below {count} was expected, found {found}.", count=count, found=found)
+            told(
+                "A vertex number below {count} was expected, found {found}.",
+                count=count,
+                found=found,
+            )
         )
     state = sliders.read(rig, live, depsgraph)
     reach = skin.surface.jacobian(state.seen, mesh, [vertex], lowest=state.low, highest=state.high)

@@ -120,8 +120,8 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         known = _objects.now
         _notice_copies(depsgraph.updates)
-        # Blender reports a change of an image's colour space as an update, but does not report a
-        # change of its pixels.
+        # Blender reports a change of an image's colour space as an update, so only then are colour
+        # spaces compared. It reports no change of pixels, so the other checks always run.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
@@ -196,7 +196,7 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters whose controls were updated, or their body, or the camera.
+    """The characters to evaluate, because their controls, their body or the camera was updated.
 
     The body of a character is the armature to which its face is attached.
     """

@@ -115,7 +115,7 @@ def source(shader: Node, *names: str) -> Source:
     """Find the source of the values of a shader's input.
 
     Args:
-        shader: the node.
+        shader: the shader node.
         names: names of the input in different Blender versions; the first existing one is used.
 
     Returns:

@@ -191,8 +191,11 @@ def _color_of(material: bpy.types.Material | None) -> list[float]:
 def _pixels(
     image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
 ) -> NDArray[np.float32] | None:
-    """float32[h, w, 4]: an image, scaled down to at most _TEXELS. Without alpha, the mean of its
-    colours is the alpha. None if its file is missing."""
+    """float32[h, w, 4]: an image, scaled down to at most _TEXELS in width and height.
+
+    If the image has no transparent pixels, its alpha becomes the mean of red, green and blue.
+    None if its file is missing.
+    """
     if image.name_full not in known:
         copy = image.copy()
         try:

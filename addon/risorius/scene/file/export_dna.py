@@ -51,7 +51,7 @@ def export(
         the imported file.
 
     Raises:
-        ExportError: the polygons of a mesh differ from its file, a mesh is in edit mode, or the
+        ExportError: the polygons of a mesh differ from the DNA file, a mesh is in edit mode, or the
             data of the file are missing.
     """
     options = options or ExportOptions()
@@ -271,7 +271,7 @@ class _Job:
             self.edited = True
             self.report.append(
                 told(
-                    "Joint {joint}: {distance:.3f} mm, {angle:.3f} degrees.",
+                    "Joint {joint}: moved by {distance:.3f} mm, rotated by {angle:.3f} degrees.",
                     joint=self._dna.joint_names[joint],
                     distance=edit.distance * self._unit * 1000,
                     angle=np.degrees(edit.angle),

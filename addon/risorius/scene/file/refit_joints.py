@@ -121,7 +121,7 @@ def _relative(
 
 
 def _fresh_rest(context: Context, plan: plans.CharacterPlan) -> NDArray[np.float64]:
-    """float64[J, 4, 4]: rest matrices of all joints after an import."""
+    """float64[J, 4, 4]: rest matrices of all joints after an import, in the armature's space."""
     made = []
     workshop = bpy.data.collections.new("rest")
     context.scene.collection.children.link(workshop)
@@ -184,8 +184,8 @@ def _new_rest(
     moved: Sequence[int],
     edited: Mapping[int, JointEdit],
 ) -> tuple[dict[int, NDArray[np.float64]], set[int]]:
-    """Rest matrices of the new joints with the user's edits, and the joints whose bones must be
-    changed in edit mode."""
+    """The rest matrices of the new joints in the armature's space, with the user's edits; and the
+    joints whose bones must be changed in edit mode."""
     back = {k: j for j, k in enumerate(moved) if k >= 0}
     rest, changed = {}, set()
     bent = set()  # edited joints and their descendants, whose rest differs from the file

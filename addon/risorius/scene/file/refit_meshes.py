@@ -165,7 +165,7 @@ def read_shape(live: runtime.Runtime, item: MeshObject, old: plans.MeshPlan, kno
         live: Runtime of the old file.
         item: mesh object.
         old: the mesh in the old file.
-        known: whether the object's number of vertices equals the old file.
+        known: whether the object has as many vertices as the mesh in the old file.
     """
     points = meshes.basis_of(item)
     shape = Shape(points, np.zeros(points.shape))

@@ -25,7 +25,7 @@ def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
 
     Args:
         path: path of the new DNA file; its folder may contain the data package (.whl).
-        person: a key of the sample package's PEOPLE.
+        person: name of the sample person, from the dict PEOPLE of the package of sample people.
         offline: True: do not download.
     """
     sample = native.sample_module()

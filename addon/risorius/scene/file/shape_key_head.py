@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -96,7 +97,7 @@ def shapes_of(
         context: its scene gives the unit.
         item: mesh object of the head with shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
-        height_mm: height from the chin to the top to which the head is scaled; 0: no scaling.
+        height_mm: the head is scaled to this height from chin to top of the head; 0: no scaling.
         said: the user's assignment of shape keys to controls, see risorius.author.input.said.
 
     Raises:
@@ -305,7 +306,11 @@ def make_rig(
 
 
 def joint_rig(
-    dna: native.Dna, wishes: RigWishes, kept: Sequence[str], progress: Callable[[float], bool]
+    dna: native.Dna,
+    wishes: RigWishes,
+    kept: Sequence[str],
+    progress: Callable[[float], bool],
+    fit_vertices: int | None = None,
 ) -> native.JointRig:
     """Make a joint rig from a face of blend shapes.
 
@@ -315,6 +320,8 @@ def joint_rig(
         kept: texts; a mesh whose name contains one of them keeps its skin weights and blend shapes,
             see RigOptions.
         progress: function that is called with the progress, 0 to 1; it returns False to cancel.
+        fit_vertices: number of vertices to which joints are fitted, see RigOptions; None: the
+            default.
     """
     author = native.part("author")
     options = author.RigOptions(
@@ -324,6 +331,8 @@ def joint_rig(
         lods=author.LodOptions(count=wishes.levels),
         kept=tuple(kept),
     )
+    if fit_vertices is not None:
+        options = dataclasses.replace(options, fit_vertices=fit_vertices)
     rig: native.JointRig = author.make_joint_rig(dna, options, progress)
     return rig
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...logic.character import user_edits
 from ..base.blender_types import Attribute, Values
 
-# Names of attributes that the import or Blender creates, and not the user.
+# Attributes that the import or Blender creates. Attributes with other names belong to the user.
 _OURS = {"position", "UVMap", "custom_normal", "material_index"}
 _SHADING = {"sharp_edge", "sharp_face"}
 OUR_PREFIX = "risorius_"  # prefix of attributes that the add-on's materials read

@@ -25,7 +25,7 @@ from . import lateness
 
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
-# Session uid of the user's scene -> temporary scene with its controls.
+# Session uid of a scene of the user -> temporary scene with the controls of the user's scene.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
 # _edited: whether the file may have been edited since the last frame. _simulated: whether the file
 # has a simulation.
@@ -168,7 +168,7 @@ def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
 
 
 def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
-    """Whether the inputs of a face depend on a face of `others`, which includes the face itself."""
+    """Whether the inputs of a face depend on a face of `others`; `others` contains this face."""
     made = stage.Stage(_roots([face]))
     try:
         with stage.alone(c for _rig, c in others):

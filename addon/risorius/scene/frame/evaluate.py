@@ -168,7 +168,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
                 continue
             was = last_written.inputs.get(rig.session_uid)
             if again:
-                # Animation of the rig's bones has overwritten the pose of the evaluator.
+                # Write the pose again, because animation of the rig's bones has overwritten it.
                 last_written.inputs.pop(rig.session_uid, None)
             if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
                 now = last_written.inputs.get(rig.session_uid)
@@ -177,7 +177,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """The inputs of a simple character, for comparison. Args: seen  evaluated control armature."""
+    """The inputs of a character for which _is_simple is True. Args: seen  evaluated controls."""
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
@@ -355,7 +355,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     """Show the change that an operator made: evaluate one character and the scene.
 
     Args:
-        context: its view layer is evaluated before and after.
+        context: its view layer is evaluated before and after the character.
         rig: deforming armature of the character.
     """
     context.view_layer.update()

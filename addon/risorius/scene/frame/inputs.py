@@ -38,7 +38,7 @@ def read_inputs(
 
     Returns:
         float32[R] raw controls, and rotations: "neck" and "head" -> Quaternion in the armature's
-        axes; bones at rest are left out.
+        axes; unrotated bones are left out.
     """
     raw, own = read_mixed(seen, live, depsgraph, maximum)
     return complete(seen, live, depsgraph, maximum, raw, own)
@@ -125,7 +125,7 @@ def complete(
 
 
 def read_leading(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
-    """Read the raw controls from the sliders, or from the face board if it leads.
+    """Read the raw controls from the sliders, or from the face board if the board moves the face.
 
     Args:
         seen: the evaluated control armature.
@@ -168,7 +168,7 @@ def _rests(bone: bpy.types.PoseBone) -> bool:
 
 
 def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
-    """A bone's rotation relative to rest and parent, in the armature's axes; None at rest."""
+    """A bone's rotation relative to rest and parent, in the armature's axes; None if it is 0."""
     if bone is None or _rests(bone):
         return None
     turn = rig_placement.own_turn(seen, bone)

@@ -58,7 +58,7 @@ def fill(
         live: the character's Runtime.
         depsgraph: graph for reading bones of the deforming armature, if needed.
         raw: float32[R], the raw controls.
-        turns: "neck" and "head" -> Quaternion in the armature's axes; bones at rest may be missing.
+        turns: "neck" and "head" -> Quaternion in the armature's axes; a missing bone is unrotated.
     """
     if not live.turning or not seen.risorius_neck_poses:
         return
@@ -98,6 +98,6 @@ def _bones(
 
 
 def _one_sign(turn: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """Return q or -q, so that the last component that is not 0 is positive."""
+    """Return q or -q (x y z w), so that the last component that is not 0 is positive."""
     last = next((part for part in reversed(turn) if abs(part) > _NOTHING), 1.0)
     return tuple(-part for part in turn) if last < 0.0 else turn

@@ -30,7 +30,7 @@ class Look:
 
     Attributes:
         solo: labels of the only controls that have an effect; empty: all.
-        muted: parts of the face without effect, from KINDS: joints, shapes, maps.
+        muted: parts of the pose that stay neutral, from KINDS: joints, blend shapes, animated maps.
         in_renders: whether renders use the setting too.
     """
 
@@ -81,7 +81,7 @@ def solo(rig: ArmatureObject, names: Collection[str]) -> None:
 
 
 def mute(rig: ArmatureObject, kind: str, on: bool) -> None:
-    """Mute or unmute joints, shapes or maps.
+    """Mute or unmute the joints, blend shapes or animated maps of a face.
 
     Args:
         rig: deforming armature.
@@ -104,7 +104,7 @@ def for_frame(rig: ArmatureObject, is_render: bool) -> Look:
 
 
 def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArray[np.float32]:
-    """Set the controls that solo excludes to rest.
+    """Set all controls outside the solo list to their rest values.
 
     Args:
         look: the setting.
@@ -121,7 +121,7 @@ def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArr
 
 
 def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> None:
-    """Set the muted parts of a pose (joints, shapes or maps) to rest.
+    """Set the muted parts of a pose (joints, blend shapes, animated maps) to their rest values.
 
     Args:
         look: the setting.

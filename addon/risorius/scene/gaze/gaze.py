@@ -62,8 +62,8 @@ def target_of(
         live: the character's Runtime.
         turns: rotations of "neck" and "head" in the armature's axes, including rotations of the
             body.
-        local: displacement of the target bone from rest, including layers, in the axes of the bone;
-            None at rest.
+        local: displacement of the target bone from its rest position, including layers, in the
+            axes of the bone; None without a displacement.
     """
     bone = seen.pose.bones.get("eyes")
     if bone is None:
@@ -90,7 +90,7 @@ def target_of(
 
 
 def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
-    """Displacement of a bone from rest in its own axes, including its constraints.
+    """Displacement of a bone from its rest position, in the bone's axes, with its constraints.
 
     Args:
         seen: the evaluated armature.
@@ -207,7 +207,7 @@ def add_look(
         live: the character's Runtime.
         raw: float32[R], changed in place.
         side: L or R.
-        yaw, pitch: radians.
+        yaw, pitch: the two angles in radians.
         maximum: upper limit of the control values.
     """
     for index, yaw_at_one, pitch_at_one in live.look[side]:
@@ -222,7 +222,7 @@ def frame_of(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion] | None = None,
 ) -> tuple[Float, Float]:
-    """Position and rotation of a joint, in the armature's axes.
+    """Position and rotation of a posed joint, in the armature's space.
 
     Args:
         live: the character's Runtime.
@@ -231,7 +231,8 @@ def frame_of(
         turns: rotations of "neck" and "head", applied as on the bones of the rig.
 
     Returns:
-        float64[3] position in Blender units and float64[3, 3] rotation; joint scales are ignored.
+        float64[3] position in Blender units, and float64[3, 3] rotation matrix whose columns are
+        the joint's axes; joint scales are ignored.
     """
     chain = live.chain(joint)
     moved = np.asarray(deltas[chain.joints], np.float64)
@@ -249,8 +250,10 @@ def frame_of(
 
 
 def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion]) -> Float | None:
-    """float64[3, 3]: rotation that a joint gets from the neck or head bone, or None. The neck
-    joints share the neck's rotation equally."""
+    """float64[3, 3]: rotation in the armature's axes that a joint gets from the neck or head bone.
+
+    None if the joint gets none. The neck joints share the neck's rotation equally.
+    """
     if joint == live.anchors.head and "head" in turns:
         return np.array(turns["head"].to_matrix())
     if joint in live.anchors.neck and "neck" in turns:

@@ -271,7 +271,9 @@ def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
 
 
 def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
-    """Wind strands about their path, nearly alike within a lock. Returns: the last node.
+    """Wind strands about their path. Returns: the last node.
+
+    The strands of a lock start at nearly the same angle, so that they stay together.
 
     Args:
         g: the tree.

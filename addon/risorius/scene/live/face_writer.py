@@ -83,7 +83,8 @@ def _turn_head(session: Session, controls: ArmatureObject, values: Mapping[str, 
     if session.turn is None:
         session.turn = _rotation(bone)
     yaw, pitch, roll = (values.get(f"{_HEAD}.{a}", 0.0) for a in ("yaw", "pitch", "roll"))
-    # The face looks along -y, its own left is +x: yaw about z, then pitch about -x, then roll.
+    # The face looks along -y, its own left is +x. Rotate about the axes of the head: yaw about z,
+    # then pitch about the rotated -x, then roll about the rotated y.
     turn = Quaternion((0.0, 0.0, 1.0), yaw) @ Quaternion((1.0, 0.0, 0.0), -pitch)
     turn = turn @ Quaternion((0.0, 1.0, 0.0), roll)
     rest = bone.bone.matrix_local.to_quaternion()

@@ -29,9 +29,9 @@ class Recording:
     """A finished or running recording.
 
     Attributes:
-        take: risorius.live.Take.
-        shaper: risorius.live.Shaper of the capture.
-        frame: frame of the scene at its start.
+        take: the recorded samples, a risorius.live.Take.
+        shaper: risorius.live.Shaper, which converted the captured faces to controls.
+        frame: frame of the scene at the start of the recording.
         face: name of the control armature.
     """
 

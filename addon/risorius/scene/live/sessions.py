@@ -60,13 +60,14 @@ class Session:
     Attributes:
         uid, name: session uid and last name of the control armature.
         key: (source, port, host) of its receiver.
-        shaper: risorius.live.Shaper.
+        shaper: risorius.live.Shaper, which converts captured faces to controls.
         subject: name of the subject; "" for the first one received.
         sequence: number of the last written frame.
         before: slider -> value before the capture.
         turn: (rotation mode, values of the rotation) of the head bone before the capture, or None.
         recording: the running Recording, or None.
-        recent: the last 3600 frames of any subject, one minute at 60 frames per second.
+        recent: the last 3600 captured frames, also of earlier subjects: one minute at 60 frames per
+            second.
         ranges_seen: value of range_properties.changes() when the shaper got the ranges.
         names: control names of the last frame.
         sliders: (slider, index in `names`) for each name that this character has.

@@ -13,7 +13,7 @@ from .nodes import Color, Graph, Value
 
 # Mesh attributes of each vertex. EYES: x and height relative to the eye's axis, in eye radii, and
 # 1 on the front half, else 0. TEETH: position along the arch, pi per tooth, and height, -1 to 1.
-# MOUTH: depth behind the foremost vertex, in eye distances.
+# MOUTH: depth behind the foremost vertex, divided by the distance between the eyes.
 EYES = "risorius_eye"
 TEETH = "risorius_teeth"
 MOUTH = "risorius_mouth"
@@ -27,9 +27,10 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Depth in the mouth in eye distances, and colour by which the surface is multiplied at this depth.
-# The factor imitates the shadows of lips and cheeks: in Material Preview and exports, which have no
-# cast shadows, molars would otherwise be as bright as incisors.
+# Depth in the mouth, divided by the distance between the eyes, and colour by which the surface is
+# multiplied at this depth. The factor imitates the shadows of lips and
+# cheeks: in Material Preview and exports, which have no cast shadows, molars would otherwise be as
+# bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -290,7 +291,7 @@ def lashes(graph: Graph, look: Look) -> None:
 
 
 def _strands(graph: Graph, look: Look) -> Socket:
-    """Noise that is stretched along the hairs: along v of the UV map, or else along y."""
+    """Noise that is stretched along the hairs: along v of the UV map, or y without a UV map."""
     where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
     reach = 1.0 if look.has_uvs else 1.0 / look.unit
     stretched = graph.vector("MULTIPLY", where, (110 * reach, 0.6 * reach, 110 * reach))

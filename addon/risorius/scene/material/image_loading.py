@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loads each texture once, packs it into the .blend, and sets its space: colours or numbers."""
+"""Loads each texture once, packs it into the .blend, and marks it as colours or numbers."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Look:
         base: mesh name without LOD.
         rig: the deforming armature of the character, whose animated maps the material reads.
         extent: float64[3] size of the mesh in Blender units.
-        unit: distance of the eyes in Blender units; patterns scale with it.
+        unit: distance between the eyes in Blender units; patterns scale with it.
         vertices: number of vertices of the finest mesh.
         has_uvs: whether the mesh has a UV map.
         simple: True leaves out subsurface scattering, relief and animated maps.
@@ -35,7 +35,7 @@ class Look:
         uses: effects of the animated maps of the face.
         areas: skin areas of a face, such as the forehead, that this mesh has.
         border: whether the mesh has an open border away from the face, such as at the neck.
-        found: texture_search.TexturePlan.
+        found: textures found for the face.
         images: loader of images.
         atlas, places: image with the wrinkle masks of all regions; region -> its tile and colour
             channel in this image.

@@ -257,7 +257,7 @@ def _add_areas(
 
 
 def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[V, 3]: x and height from the eye's axis in radii, and 1 on the front half, else 0."""
+    """float64[V, 3]: x and height from the eye's axis in eye radii; 1 on the front half, else 0."""
     points = points.astype(np.float64)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
     wide = np.ptp(points[:, 0]) > _WIDE * np.ptp(points[:, 2])

@@ -247,7 +247,7 @@ class Graph:
 
         Args:
             height: 0 to 1.
-            distance: relief in Blender units that a height of 1 means.
+            distance: height of the relief in Blender units where `height` is 1.
             normal: normal without the relief; None for the surface's own.
             strength: 0 to 1.
         """

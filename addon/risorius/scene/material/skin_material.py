@@ -25,13 +25,14 @@ _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
-# Spatial frequency of the folds: phase in radians per eye distance, for each kind of fold.
+# Spatial frequency of the folds: phase in radians over the distance between the eyes, for each
+# kind of fold.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # factor of blushes without a painted mask, which must stay faint
 _PORE_DEPTH = 0.032
 _GRAIN_DEPTH = 0.006
-# Distance in eye distances that light travels inside pale skin; smallest factor of this distance,
-# for dark skin.
+# Distance that light travels inside pale skin, divided by the distance between the eyes; smallest
+# factor of this distance, for dark skin.
 _SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
@@ -352,8 +353,8 @@ class Skin:
     def _normal_map(self) -> Socket | None:
         """The normal from the normal textures; None if there are none.
 
-        The normals of the texture sets are mixed into the normal of the base texture by their
-        amounts.
+        The normals of the texture sets are mixed into the normal of the base texture; the
+        amount of each set is its factor.
         """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)

@@ -142,7 +142,7 @@ def show(
         context: Blender context.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: region -> number of a parent -> share, for regions with separate shares.
+        regions: region -> index of a parent in `paths` -> share, for regions with separate shares.
 
     Raises:
         ValueError: invalid shares.
@@ -196,7 +196,7 @@ def write(
         path: path of the new file.
         paths: paths of matching parents.
         shares: share of each parent.
-        regions: region -> number of a parent -> share, for regions with separate shares.
+        regions: region -> index of a parent in `paths` -> share, for regions with separate shares.
         progress: called with the finished share, 0 to 1.
 
     Returns:

@@ -181,7 +181,7 @@ def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
 
 
 def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
-    """Control -> the blend shape channels that it drives at the current LOD."""
+    """Index of a control -> blend shape channels that the control drives at the current LOD."""
     table = now.live.dna.blend_shape_channels
     count = int(table.lods[now.lod]) if now.lod < len(table.lods) else 0
     found: dict[int, list[int]] = {}

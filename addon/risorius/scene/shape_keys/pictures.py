@@ -73,7 +73,7 @@ class Job(NamedTuple):
     samples: Sequence[str]
 
 
-# Pictures of the heads of this file: session_uid of the mesh -> key name -> path.
+# Pictures of the heads of this file: session uid of the mesh -> name of a shape key -> path.
 _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo", "load"))
 
 
@@ -172,7 +172,7 @@ def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
 
 
 def draw(model: Model, key: str) -> Floats:
-    """Draw a head with one key and its motion in colour.
+    """Draw a head with one shape key at value 1; the parts that the key moves are orange.
 
     Args:
         model: the head.

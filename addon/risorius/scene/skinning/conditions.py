@@ -50,8 +50,8 @@ class _Kept:
     """State of a face at the last check.
 
     Attributes:
-        plan: Plan.
-        signature: see _signature.
+        plan: the Plan of the face.
+        signature: settings that are compared to notice changes, from _signature.
         is_fresh: False if an edit since then may have changed the plan.
     """
 
@@ -157,7 +157,7 @@ class _Edits:
 
     Attributes:
         told: number of the last write that the graph reported before.
-        meshes: session uids of characters' mesh objects that were not edited by this add-on.
+        meshes: session uids of characters' mesh objects that anyone but this add-on edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object outside all characters was edited.
     """

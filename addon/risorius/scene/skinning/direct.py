@@ -43,8 +43,8 @@ class Frame:
     """The data for writing the meshes of a face.
 
     Attributes:
-        live: the Runtime.
-        shape: Shape.
+        live: Runtime of the character.
+        shape: the inputs of the shown pose.
         bones: bones of the deforming armature.
         writer: writer of the bones that the evaluator owns.
     """
@@ -71,8 +71,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class _Face:
-    """Compiled data of a face. Attributes: face  all meshes; skins  session uid of a mesh object ->
-    its Skin, in the order of `face`; bones, writer  see Frame."""
+    """Compiled data of a face.
+
+    Attributes:
+        face: compiled skinning of all meshes in Direct mode.
+        skins: session uid of a mesh object -> its Skin, in the order of the meshes in `face`.
+        bones, writer: see Frame.
+    """
 
     face: native.DirectFace
     skins: dict[int, skins.Skin]
@@ -82,8 +87,14 @@ class _Face:
 
 @dataclass(frozen=True)
 class Job:
-    """A face to write. Attributes: face  compiled; frame  its inputs; items  index in `face` ->
-    mesh object; anew  write unchanged values too."""
+    """A face whose vertex positions are written.
+
+    Attributes:
+        face: compiled skinning of its meshes.
+        frame: the inputs of the face.
+        items: index of a mesh in `face` -> mesh object.
+        anew: whether unchanged values are written too.
+    """
 
     face: native.DirectFace
     frame: Frame
@@ -259,7 +270,7 @@ def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
 
 
 def write(jobs: Sequence[Job]) -> None:
-    """Write final vertex positions to the live shape keys of all given faces at once.
+    """Write final vertex positions to the live shape keys of all given faces together.
 
     Args:
         jobs: see `prepare`.

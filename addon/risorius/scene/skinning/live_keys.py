@@ -78,7 +78,7 @@ def bears_simulation(item: bpy.types.Object) -> bool:
 
 
 def reach(depsgraph: Depsgraph) -> None:
-    """Tag live shape keys for an update if a dependency graph has other positions.
+    """Tag live shape keys for an update if their copies in a graph have other positions.
 
     This happens if positions were written without notifying Blender, and the graph belongs to a
     render or an exporter.

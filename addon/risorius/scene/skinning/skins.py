@@ -47,8 +47,8 @@ class Skin:
     Attributes:
         mesh: its index in the DNA file.
         skin: risorius.Skin of its vertex groups.
-        base: float32[V, 3], its basis key.
-        mark: see _mark.
+        base: float32[V, 3], basis shape key of the mesh.
+        mark: values that change when undo reloads the mesh, from _mark.
         names: Bones.names when the skin was compiled.
     """
 

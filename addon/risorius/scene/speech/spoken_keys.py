@@ -105,7 +105,7 @@ def note(
         clip: clip of a correctable voice.
         timing: maps the times of the clip to frames of the action.
         tolerance: tolerance of the action's keys; 0 if each sample has a key.
-        intensity: intensity of the clip.
+        intensity: strength of mouth and brows with which the clip was made.
         visemes: visemes of the face, used for the clip.
     """
     said = of(action)

@@ -73,7 +73,7 @@ def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]
 
 
 def _places(item: MeshObject) -> np.ndarray:
-    """float64[V, 3] the vertices of a mesh at rest, in the world."""
+    """float64[V, 3]: the neutral vertices of a mesh in world space."""
     world = np.array(item.matrix_world, np.float64)
     return np.asarray(basis_of(item) @ world[:3, :3].T + world[:3, 3])
 
@@ -149,7 +149,7 @@ def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
 
 
 def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
-    """The matrix of a camera or lamp at a position, directed at a target."""
+    """The matrix of a camera or lamp at a position, directed at a target, all in one space."""
     way = Vector(target) - Vector(place)
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 

@@ -58,7 +58,7 @@ class _Moved:
     stands: Matrix
 
 
-# Session uid of a part or its child -> its stored state.
+# Session uid of an object (part of a face, or child of a part) -> stored state of this object.
 _noted: dict[int, _Seen] = session.table("applied_transforms.noted", ("undo", "load"))
 # Session uid of a deforming armature -> sentence about the last undone step.
 _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "load"))

@@ -97,7 +97,8 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
 def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
     """Make the shape keys of an override follow the controls.
 
-    Meshes with a live key are copied into this file, because drivers cannot move a live key.
+    Meshes with a live key (one key with the sum of all channels) are copied into this file, because
+    drivers cannot move a live key.
 
     Args:
         rig: the override's deforming armature.
@@ -161,8 +162,8 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
         if material.name not in owned:
             owned[material.name] = _local_copy(material)
         item.data.materials[index] = owned[material.name]
-    # Remove the old overrides. Without their hierarchy, Blender 5.2 reports them as errors when the
-    # file is opened.
+    # Remove the old mesh and material overrides. They no longer belong to a hierarchy of overrides,
+    # so Blender 5.2 would report them as errors when the file is opened.
     for old in dict.fromkeys(left):
         if old is not None and old.override_library is not None and old.users == 0:
             bpy.data.batch_remove([old])

@@ -101,7 +101,7 @@ def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
 
 
 def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """Let head rotations drive neck poses, unless the user has set the sliders of the rotations."""
+    """Let head rotations drive RBF poses, unless sliders of joint rotations are set by hand."""
     if not joint_turns.are_set_by_hand(rig, controls):
         return []
     controls.risorius_neck_poses = False

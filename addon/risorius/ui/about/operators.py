@@ -97,7 +97,7 @@ def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
 
 
 class RISORIUS_OT_self_test(Operator):
-    """Test and time on this machine how faces load, move and are written; copy a report"""
+    """Test on this machine whether and how fast faces load, move and are written; copy a report"""
 
     bl_idname = "risorius.self_test"
     bl_label = "Self-Test"

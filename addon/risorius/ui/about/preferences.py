@@ -48,7 +48,7 @@ class RISORIUS_Preferences(AddonPreferences):
         name="Left and Right",
         description="Point of view for the names and places of the left and right sliders",
         items=(
-            ("SEEN", "As Seen", "Left is on the left of a face that looks at you"),
+            ("SEEN", "As Seen", "Left is on your left when the face looks at you"),
             ("OWN", "The Character's", "Left is the character's own left, as in a body's bones"),
         ),
     )

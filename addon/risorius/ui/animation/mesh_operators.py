@@ -57,8 +57,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
     )
     use_colour: bpy.props.BoolProperty(
         name="Show Remaining Distance",
-        description="Colour the face by the distance to the mesh that the controls "
-        "cannot remove, as the color attribute risorius_residual",
+        description="Colour the face by the remaining distance to the mesh; the color "
+        "attribute risorius_residual contains the colours",
     )
 
     @classmethod
@@ -150,8 +150,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         return [
             words.say(
                 (
-                    "Left over: {mean} mm (root mean square), at most {most} mm; the "
-                    "worst frame is {frame}."
+                    "Left over: {mean} mm of distance to the mesh (root mean "
+                    "square), at most {most} mm; the worst frame is {frame}."
                 ),
                 mean=f"{np.sqrt((frames**2).mean()):.3f}",
                 most=f"{solved.largest * mm:.3f}",

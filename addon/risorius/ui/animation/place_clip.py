@@ -124,7 +124,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Set all controls that the animation leaves unchanged to rest, or report their number."""
+        """Set to rest all controls that the animation does not move, or report their number."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that sets all controls to rest that no animation moves."""
+"""The operator that sets to rest all controls that no animation moves."""
 
 from collections.abc import Collection
 

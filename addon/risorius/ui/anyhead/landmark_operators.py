@@ -267,7 +267,7 @@ class RISORIUS_OT_landmark_names(_OfLandmarks, Operator):
 
 
 class RISORIUS_OT_save_landmarks(_OfLandmarks, Operator, ExportHelper):
-    """Write the landmarks of this head into a file, such as for risorius author --landmarks"""
+    """Write the landmarks of this head to a file, for example for risorius author --landmarks"""
 
     bl_idname = "risorius.save_landmarks"
     bl_label = "Save Landmarks"

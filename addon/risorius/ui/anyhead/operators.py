@@ -168,7 +168,9 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
             return making.Template(runtime.there(rig).dna, _source(rig))
         if self.template == "FILE":
             if not self.template_file:
-                raise FaceError(told("Choose the DNA file that lends its expressions."))
+                raise FaceError(
+                    told("Choose the DNA file of the face that lends its expressions to the head.")
+                )
             return making.Template(path=system_path(self.template_file))
         path = native.bundled_sample("man")
         if path is None:

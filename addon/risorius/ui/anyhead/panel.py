@@ -54,7 +54,7 @@ def _draw_points(layout: UILayout, there: Mapping[str, points.Point]) -> None:
     counts = {state: 0 for state in (points.FOUND, points.MOVED, points.PLACED)}
     for point in there.values():
         counts[point.state] += 1
-    text = "{found} found, {moved} moved, {placed} placed"
+    text = "Landmarks: {found} found, {moved} moved, {placed} placed"
     said = words.say(
         text,
         found=counts[points.FOUND],

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that bake faces to plain actions and remove them again."""
+"""Operators that bake faces to plain actions, and that remove these actions again."""
 
 import time
 import traceback
@@ -34,7 +34,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
                 "Bones, Shapes, Maps",
                 "The face itself: the actions play without the add-on",
             ),
-            (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
+            (bake_face.CONTROLS, "Controls", "Sliders and control bones, baked into one action"),
         ),
     )
     wanted: bpy.props.EnumProperty(

@@ -61,7 +61,7 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Start drawing for an operator. Args: user  name of the operator; `end` gets the same."""
+    """Start drawing for an operator. Args: user  name of the operator, also passed to `end`."""
     _users.add(user)
     if not _handles:
         view = bpy.types.SpaceView3D

@@ -14,9 +14,9 @@ METHODS = (
         "NEAR",
         "Near",
         (
-            "A few sliders that belong to this place: a dragged brow turns no eye. "
-            "The point lags behind the pointer if these sliders do not reach the "
-            "pointer"
+            "A few sliders that belong to the dragged part of the face: a "
+            "dragged brow turns no eye. The point lags behind the pointer if "
+            "these sliders do not reach the pointer"
         ),
     ),
     (

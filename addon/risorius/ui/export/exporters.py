@@ -57,7 +57,7 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
         "export_frame_step": whole_step(operator),
         "export_force_sampling": True,
         "export_optimize_animation_size": False,
-        # If True, Blender 4.5 exports wrong bones for two armatures.
+        # If True, Blender 4.5 writes wrong bones if two armatures are exported together.
         "export_optimize_disable_viewport": False,
         "export_skins": True,
         "export_all_influences": operator.influences == 0,

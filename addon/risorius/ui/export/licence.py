@@ -38,7 +38,7 @@ class LicenceForm:
     avatar: _choice(
         "Who May Use the Avatar",
         ("onlyAuthor", "The Author", ""),
-        ("onlySeparatelyLicensedPerson", "Persons with a Licence", ""),
+        ("onlySeparatelyLicensedPerson", "Separately Licensed Persons", ""),
         ("everyone", "Everyone", ""),
     )
     violence: _allowed("Violence")

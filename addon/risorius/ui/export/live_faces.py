@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Warns if Blender's own exporters would write live faces at rest."""
+"""Warns if Blender's own exporters would write live (not baked) faces in their rest pose."""
 
 from collections.abc import Mapping
 
@@ -32,7 +32,7 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def live_faces(active_scene: bool, selected: bool) -> list[str]:
-    """The names of faces that are not baked, which an export would write at rest.
+    """The names of faces that are not baked, which an export would write in their rest pose.
 
     Args:
         active_scene: True: only the scene of the context is exported.

@@ -79,8 +79,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         name="Units",
         description="Place in the FBX file that stores the unit",
         items=(
-            ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
-            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
+            ("FBX_SCALE_NONE", "On Objects", "Objects have scale 100, as Unreal expects"),
+            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1, as Unity expects"),
         ),
     )
     lod_groups: bpy.props.BoolProperty(
@@ -99,8 +99,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     texture_size: bpy.props.IntProperty(
         name="Texture Size",
-        description="Pixels of a side of the images that are baked; images that a material shows "
-        "unchanged keep their own size",
+        description="Width and height of the baked images in pixels; images that a "
+        "material shows unchanged keep their own size",
         default=1024,
         min=64,
         max=8192,
@@ -186,7 +186,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
-                raise FaceError(told("a file holds the controls of one face: select one"))
+                raise FaceError(told("a file contains the controls of one face: select one face"))
             scene = context.scene
             clip = export_animation.clip(
                 *characters[0], frame_rate(scene), scene.frame_start, self.maps
@@ -197,7 +197,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
                 if self.bake_materials:
                     run(context, plain_materials.flatten(override, loans, self.texture_size))
                 # Blender's exporters overwrite an existing file from its start, so a failure would
-                # damage it.
+                # damage it. So they write another file, which then replaces the existing file.
                 with native.part("files.fileio").staging(path) as made:
                     export(self, override, made)
                     if self.bake_materials and self.format == "ALEMBIC":

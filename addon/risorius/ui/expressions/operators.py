@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators that apply an expression to the sliders, at once or by dragging."""
+"""Operators that apply an expression to the sliders, by a click or by dragging."""
 
 from collections.abc import Collection
 from typing import Any, cast
@@ -82,7 +82,7 @@ class Mixes(HandOperator):
 
 
 class Applies(Mixes):
-    """Base of operators that set an expression at once."""
+    """Base of operators that set an expression by a click, without dragging."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         """Set the expression at a click; Ctrl flips it, Shift adds it.

@@ -17,7 +17,8 @@ from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
 _ICON = 20.0  # pixels of an icon, and of a picture per unit of its size
-# Looks of characters for which this session has started to draw pictures automatically.
+# Hashes (thumbnails.look_of) of characters for which this session has started to draw pictures
+# automatically.
 _asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 

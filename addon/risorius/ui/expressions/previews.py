@@ -29,7 +29,7 @@ def icon_of(path: Path) -> int:
 
 
 def load(path: Path) -> int:
-    """Like icon_of, but Blender reads the picture at once, as search lists need it.
+    """Like icon_of, but Blender reads the picture immediately, as search lists need it.
 
     Args:
         path: path of the picture.

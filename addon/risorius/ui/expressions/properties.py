@@ -13,7 +13,8 @@ from ..blender_types import Context, Item
 from ..words import say
 
 ALL, STARRED = "ALL", "STARRED"
-# Strings of dynamic enum items, kept alive here because Blender keeps no references to them.
+# "regions" or "categories" -> items of a dynamic enum property. The items are kept alive here,
+# because Blender keeps no references to their strings.
 _known: dict[str, list[Item]] = session.table("expressions.properties.known", ("unregister",))
 
 

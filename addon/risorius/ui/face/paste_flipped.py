@@ -27,7 +27,8 @@ from ..words import say
 _MARK = 0.3215  # a marker value that no user sets
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
-# "last" -> Blender's last operator that was checked; "selected" -> its setting Selected Only.
+# "last" -> (pointer, bl_idname) of the last operator that was checked; "selected" -> setting
+# Selected Only of the last flipped paste.
 _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 

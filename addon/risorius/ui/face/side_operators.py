@@ -65,7 +65,13 @@ class RISORIUS_OT_copy_side(HandOperator, Operator):
         rig = face_rig(context)
         count = sides.copy_across(rig, self.from_left, self.region)
         if not count:
-            self.report({"WARNING"}, say("No control here has two sides that are free."))
+            self.report(
+                {"WARNING"},
+                say(
+                    "No control here has two sides that are free. A left and a right "
+                    "slider that are not linked were expected."
+                ),
+            )
         return sides.values_of(rig, self.region) if count else ()
 
 

@@ -192,7 +192,7 @@ def _corners(rig: ArmatureObject) -> NDArray[np.float64]:
 
 
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
-    """Centre and radius of a ball around the corners of the head, in world space."""
+    """Centre and radius of a ball around the head's bounding boxes, in world space."""
     corners = _corners(rig)
     low, high = corners.min(axis=0), corners.max(axis=0)
     return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

@@ -81,7 +81,7 @@ class RISORIUS_OT_move_outlines(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         count = outlines.stand_beside(face_rig(context))
         if not count:
-            self.report({"INFO"}, say("The outlines stand beside the face already."))
+            self.report({"INFO"}, say("The outlines are beside the face already."))
             return {"CANCELLED"}
         self.report({"INFO"}, say("{count} outlines moved", count=count))
         return {"FINISHED"}

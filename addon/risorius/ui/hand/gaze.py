@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Operators for eyes and head: target of the gaze, share of a body's rotation, blinks."""
+"""The panel Eyes and Head, and its operators: blinks, and the target that the eyes follow."""
 
 import bpy
 

@@ -135,7 +135,7 @@ class _Waiting(OperatorBase):
             self.report(
                 {"ERROR"},
                 say(
-                    "There is no recording {number}: {count} wait.",
+                    "There is no recording {number}: {count} wait to be finished.",
                     number=self.index,
                     count=len(found),
                 ),

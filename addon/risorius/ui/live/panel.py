@@ -61,7 +61,9 @@ def _draw_waiting(layout: UILayout) -> None:
     for index, recording in enumerate(recordings.waiting()):
         box = layout.box()
         count = len(recording.take)
-        text = words.say("{name}: {count} faces wait", name=recording.face, count=count)
+        text = words.say(
+            "{name}: {count} faces wait in a recording", name=recording.face, count=count
+        )
         words.show(box, names.printable(text, 60), "REC")
         row = box.row(align=True)
         row.operator("risorius.live_finish").index = index
@@ -82,7 +84,9 @@ def _draw_status(layout: UILayout, session: sessions.Session) -> None:
     else:
         rate = f"{status.per_second:.0f}"
         words.show(
-            column, words.say("{name}: {rate} a second", name=status.subject, rate=rate), "USER"
+            column,
+            words.say("Faces from {name}: {rate} a second", name=status.subject, rate=rate),
+            "USER",
         )
         age = f"{(status.age or 0.0) * 1000:.0f}"
         words.show(column, words.say("Last face {age} ms ago", age=age), "BLANK1")

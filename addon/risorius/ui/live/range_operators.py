@@ -40,7 +40,8 @@ class _Learns(FaceOperator):
         Args:
             context: context with the face.
             clip: clip of raw controls.
-            performance: True: the clip shows acting, which need not contain all extremes.
+            performance: True: the clip shows acting, which need not contain all extremes; False:
+                the clip shows one extreme after another.
 
         Raises:
             risorius.RisoriusError: no range can be learned from the clip.

@@ -63,7 +63,9 @@ def draw_mix(layout: UILayout, context: Context) -> None:
     column.operator("risorius.mix_add", icon="ADD")
     column.operator("risorius.mix_add_scene", icon="USER")
     if len(rows) == 0:
-        words.write(layout, words.say("Faces of one topology, such as the sample people."))
+        words.write(
+            layout, words.say("The mix needs faces of one topology, such as the sample people.")
+        )
         return
     column = layout.column(align=True)
     shown = parents.preview(context) is not None

@@ -31,7 +31,9 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
         name="Share", description="Share of this face in the whole mix", default=1.0, **_SHARE
     )
     show_regions: bpy.props.BoolProperty(
-        name="Regions", description="Take some regions from this face", default=False
+        name="Regions",
+        description="Take only some regions of the new face from this face",
+        default=False,
     )
     brow: bpy.props.FloatProperty(name="Brows", description=_HERE, **_SHARE)
     eyes: bpy.props.FloatProperty(name="Eyes", description=_HERE, **_SHARE)

@@ -119,7 +119,11 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
         description="Motion that the colours show",
         items=(
             ("POSE", "From Neutral", "Distance of the current pose from the neutral pose"),
-            ("CONTROL", "Reach of a Control", "Motion of the neutral face by one control"),
+            (
+                "CONTROL",
+                "Reach of a Control",
+                "Motion of the neutral face when one control goes to its full value",
+            ),
             ("CORRECTIVE", "A Corrective", "Share of a corrective in the current pose"),
             ("LAYER", "A Layer", "Share of a layer in the current pose"),
             ("OFF", "Off", "Remove the colours; views return to their earlier shading"),

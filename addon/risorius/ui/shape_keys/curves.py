@@ -40,7 +40,7 @@ class _OfCurves(FaceOperator):
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:
-            cls.poll_message_set(words.say("All curves of the last import are known."))
+            cls.poll_message_set(words.say("The last import has no curves with unknown names."))
             return False
         return True
 

@@ -39,7 +39,7 @@ WAYS = (
 _AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 
 EnumItem = tuple[str, str, str, int, int]
-# Items of an enum; Blender keeps no references to their strings.
+# Items of an enum, kept alive here because Blender keeps no references to their strings.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
@@ -191,7 +191,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Save the assignments of shape keys to a file, for other heads and risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -201,7 +201,10 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
     use_all: bpy.props.BoolProperty(
         name="All Keys",
-        description=("Include guesses from names, so that you can edit them as text"),
+        description=(
+            "Also save the controls that Risorius guessed from names of shape "
+            "keys, so that you can edit these guesses as text"
+        ),
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -226,7 +229,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Load assignments of shape keys from a file that this list or risorius author wrote"""
+    """Load assignments of shape keys from a file of this list or of the command risorius author"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
@@ -316,7 +319,7 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         )
 
     def cancelled_text(self) -> str:
-        return words.say("Finished pictures are kept.")
+        return words.say("Pictures that are already drawn are kept.")
 
 
 CLASSES = (

@@ -25,7 +25,8 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # height of the large picture, in lines
 _LITTLE = 2.0  # height of a picture in the list, in lines
-# (head, sample) for which the panel has already started to draw missing pictures.
+# (session uid of a head's mesh, value of its sample picture) for which the panel has already
+# started to draw missing pictures.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
@@ -139,10 +140,14 @@ class RISORIUS_PT_shape_key_names(FacePanel, Panel):
 def _draw_count(layout: UILayout, names: assigned.Names) -> None:
     count, unknown = len(names.rows), names.unknown
     if unknown:
-        text = words.say("{unknown} of {count} unknown", unknown=unknown, count=count)
+        text = words.say(
+            "Shape-key names: {unknown} of {count} unknown", unknown=unknown, count=count
+        )
         words.show(layout, text, "QUESTION")
     else:
-        words.show(layout, words.say("All {count} known", count=count), "CHECKMARK")
+        words.show(
+            layout, words.say("Shape-key names: all {count} known", count=count), "CHECKMARK"
+        )
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
@@ -179,7 +184,7 @@ def _icon(paths: Mapping[str, Path] | None, key: str) -> int:
 
 
 def _ask_once(mesh: int, sample: str) -> None:
-    """Start to draw missing pictures once, after the panel is drawn."""
+    """Start to draw missing pictures after the panel is drawn, once for each mesh and sample."""
     if (mesh, sample) in _asked or bpy.app.background:
         return
     _asked.add((mesh, sample))

@@ -225,8 +225,8 @@ class RISORIUS_OT_speech_update(_Corrects, Operator):
             return
         for name in spoken_markers.take(scene, action, placing):
             text = (
-                "{name} was moved past its neighbour and stays beside this "
-                "neighbour: sounds keep their order."
+                "The marker {name} was moved past its neighbour and stays "
+                "beside this neighbour: sounds keep their order."
             )
             self.report({"WARNING"}, words.say(text, name=name))
 

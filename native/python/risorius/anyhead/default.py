@@ -35,9 +35,8 @@ def default_template() -> Path:
     if not _is_complete(path):
         if not package.is_fetched():
             raise AnyHeadError(
-                "a template was expected: name a DNA file with expressions, or build the sample "
-                "person once with `risorius sample man.dna`, whose data are then the template's "
-                "as well"
+                "a template was expected: name a DNA file with expressions, or run `risorius "
+                "sample man.dna` once, because it downloads the data of the default template"
             )
         _remove_earlier(folder)
         folder.mkdir(parents=True, exist_ok=True)

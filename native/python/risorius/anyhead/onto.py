@@ -8,14 +8,16 @@ meshes (author.heads.joining), and make a Dna (author.input.shape_face).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from .. import Conditionals, Dna
 from ..author.correctives import add_correctives
 from ..author.geometry.skeleton import Doubles
+from ..author.geometry.sparse import SparseShapes, subset
 from ..author.heads.joining import join
 from ..author.heads.parts import HeadPart, Wishes
 from ..author.input.matching import Assignment
@@ -28,6 +30,7 @@ from ..author.input.shape_face import (
     take_combined,
 )
 from ..author.input.spec import Read
+from ..base.patience import patiently
 from ..base.words import counted
 from .errors import Stopped
 from .fittings import Fittings, complete, head_parts, sort_parts
@@ -37,14 +40,18 @@ from .laying import lay
 from .repair import repair
 from .standing import Standing, stand
 from .surface import Surface
-from .transfer.template import Floats, Pose, Progress, read_template
+from .transfer.template import Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
+_READ, _CHECKED, _SHAPED = 0.1, 0.4, 0.8  # progress of shape_face
+FIT_VERTICES = 12_000  # joints are fitted to a head simplified to this, see RigOptions
 _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadForm
 # Finished share of the work, 0 to 1, after finding the face, reading the template, registering the
 # template onto the head, and transferring the displacements.
-_FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
+_FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.8
+# The same after fitting missing meshes, adding up correctives, repair, and moving lashes and brows.
+_COMPLETE, _WHOLE, _MENDED, _JOINED = 0.83, 0.85, 0.97, 0.99
 
 
 @dataclass(frozen=True)
@@ -117,7 +124,7 @@ def onto(
     tell("finding the face")
     _at(progress, 0.0)
     head = stand(where, parts, unit, o.wishes, o.marks, _part(progress, 0.0, _FACE))
-    found = sort_parts(head.parts)
+    found = patiently(partial(sort_parts, head.parts), lambda: _at(progress, _FACE))
     face = found.face
     target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
     tell("reading the template")
@@ -130,12 +137,17 @@ def onto(
     wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
     jaw = None if laid.jaw is None else jaw_by_teeth(laid.jaw, template, found)
     carried = transfer(source, target, laid.points, laid.trust, wanted, rest, jaw)
-    fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
-    mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
-    every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
-    every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
+    fitted = complete(found, template, laid.points, _part(progress, _CARRIED, _COMPLETE))
+    ways = whole_ways(carried.ways, _part(progress, _COMPLETE, _WHOLE))
+    del carried
+    mended = _mended(target, fitted, head, ways, o, _part(progress, _WHOLE, _MENDED), tell)
+    del ways
+    every = head_parts(fitted, _of_length(mended, single=True), _part(progress, _MENDED, _JOINED))
+    every[0].shapes.update(_of_length(mended, single=False))
     names = {name: [name] for name in source.controls}
-    joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
+    unchanged = Wishes(mesh=every[0].source)
+    joining = partial(join, where, every, "cm", unchanged, names, stands=True)
+    joined = patiently(joining, lambda: _at(progress, _JOINED))
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
     joint = head.found.pose.place(_JOINT)[0]
@@ -146,25 +158,38 @@ def _mended(
     target: Surface,
     fitted: Fittings,
     head: Standing,
-    ways: dict[Pose, Doubles],
+    ways: SparseShapes[Pose],
     o: OntoOptions,
     progress: Progress | None,
     tell: Say,
-) -> dict[Pose, Doubles]:
+) -> SparseShapes[Pose]:
     """The displacements of the poses, repaired unless the options forbid it."""
     if not o.repaired or not o.strength:
         return ways
     tell("repairing contacts of lids, lips, eyes and teeth")
     out = repair(
         target, fitted.face.mesh.faces, fitted, head.found.landmarks, None,
-        {pose[0]: way for pose, way in ways.items() if len(pose) == 1},
-        {pose: way for pose, way in ways.items() if len(pose) > 1},
+        _of_length(ways, single=True), subset(ways, [pose for pose in ways if len(pose) > 1]),
         progress,
     )  # fmt: skip
-    return {(name,): way for name, way in out.expressions.items()} | dict(out.combinations)
+    both = SparseShapes[Pose](ways.count)
+    for name in out.expressions:
+        both.take((name,), out.expressions, name)
+    for pose in out.combinations:
+        both.take(pose, out.combinations, pose)
+    return both
 
 
-def shape_face(made: Onto, template: Dna, where: str) -> Read:
+def _of_length(ways: SparseShapes[Pose], *, single: bool) -> SparseShapes[str]:
+    """The displacements of single controls or of combinations, by their names joined by +."""
+    out = SparseShapes[str](ways.count)
+    for pose in ways:
+        if (len(pose) == 1) == single:
+            out.take("+".join(pose), ways, pose)
+    return out
+
+
+def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None = None) -> Read:
     """The head with expressions as a face of blend shapes: the same type as spec.read_face()
     returns.
 
@@ -172,42 +197,53 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
         made: the head with expressions; its shapes are changed.
         template: the face whose GUI controls are copied.
         where: name of the head in error messages.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
         ArgumentError: no expression moves a vertex.
+        Stopped: `progress` returned False.
     """
     shapes = made.shapes
-    together = {  # without correctives of controls that the head lacks, such as a tongue's
-        name: delta
-        for name, delta in take_combined(shapes).items()
-        if set(name.split("+")) <= set(shapes.expressions)
-    }
-    odd = [note for note in check_shapes(shapes) if "moves nothing" not in note]
+    every = take_combined(shapes)
+    # Without correctives of controls that the head lacks, such as a tongue's.
+    known = set(shapes.expressions)
+    together = subset(every, [name for name in every if set(name.split("+")) <= known])
+    notes = check_shapes(shapes, lambda: _at(progress, _READ))
+    odd = [note for note in notes if "moves nothing" not in note]
     controls = {name: [name] for name in shapes.expressions}
-    dna = make_shape_face(shapes, controls)
+    dna = make_shape_face(shapes, controls, lambda: _at(progress, _CHECKED))
     looks = zip(dna.mesh_names, (part.material for part in shapes.parts), strict=True)
     materials = {name: look for name, look in looks if look is not None}
     rows = combined_rows(where, shapes, together, controls, dna.raw_control_names)
     if rows:
         face = shapes.parts[0]
+        _at(progress, _SHAPED)
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
-        dna = add_correctives(dna, 0, own)
+        adding = partial(add_correctives, dna, 0, own)
+        dna = patiently(adding, lambda: _at(progress, _SHAPED))
     _copy_board(template, dna)
     _place_head(dna, made.joint)
     return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
 
 
-def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
-    """float64[V, 3] by pose: the displacements with all controls of the pose at 1.
+def whole_ways(ways: SparseShapes[Pose], progress: Progress | None = None) -> SparseShapes[Pose]:
+    """The displacements [V, 3] by pose with all controls of the pose at 1.
 
     Args:
         ways: the result of `transfer`: for a control its displacements, for a corrective only its
             own addition to them.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
     """
-    out = {}
-    for pose in ways:
-        parts = [way for other, way in ways.items() if set(other) <= set(pose)]
-        out[pose] = np.sum(parts, axis=0, dtype=np.float64)
+    out = SparseShapes[Pose](ways.count)
+    for number, pose in enumerate(ways):
+        _at(progress, number / len(ways))
+        parts = [other for other in ways if set(other) <= set(pose)]
+        if len(parts) == 1:
+            out.take(pose, ways, pose)
+        else:
+            out[pose] = sum((ways[other] for other in parts), np.zeros(1))
     return out
 
 

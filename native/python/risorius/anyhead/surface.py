@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,8 +28,13 @@ class Surface:
             points: float64[V, 3], vertex positions.
             faces: vertices of each polygon, counter-clockwise seen from outside.
         """
-        fans = [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)]
-        return Surface(np.asarray(points, np.float64), np.array(fans, np.int64).reshape(-1, 3))
+        sizes = np.fromiter(map(len, faces), np.int64, len(faces))
+        corners = np.fromiter(itertools.chain.from_iterable(faces), np.int64, int(sizes.sum()))
+        fans = np.maximum(sizes - 2, 0)
+        first = np.repeat(np.cumsum(sizes) - sizes, fans)
+        step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+        rows = np.stack([first, first + step + 1, first + step + 2], axis=1)
+        return Surface(np.asarray(points, np.float64), corners[rows])
 
     def face_normals(self) -> Doubles:
         """float64[T, 3]: normals with twice the area of the triangle as length."""
@@ -40,17 +46,18 @@ class Surface:
         out = np.zeros_like(self.points)
         normals = self.face_normals()
         for k in range(3):
-            np.add.at(out, self.triangles[:, k], normals)
+            for axis in range(3):
+                out[:, axis] += np.bincount(self.triangles[:, k], normals[:, axis], len(out))
         length = np.linalg.norm(out, axis=1, keepdims=True)
         return np.divide(out, length, out=np.zeros_like(out), where=length > 0)
 
     def edges(self) -> Ints:
         """int64[E, 2], each edge once, the smaller vertex first."""
-        return np.unique(self._sides(), axis=0)
+        return self._edges()[0]
 
     def border(self) -> npt.NDArray[np.bool_]:
         """bool[V]: True for vertices of an edge that belongs to only one triangle."""
-        edges, times = np.unique(self._sides(), axis=0, return_counts=True)
+        edges, times = self._edges()
         out = np.zeros(len(self.points), bool)
         out[edges[times == 1]] = True
         return out
@@ -64,6 +71,9 @@ class Surface:
         """
         return np.einsum("nk,nkd->nd", shares, self.points[self.triangles[triangle]])
 
-    def _sides(self) -> Ints:
-        sides = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        return np.sort(sides, axis=1)
+    def _edges(self) -> tuple[Ints, Ints]:
+        """int64[E, 2], each edge once; int64[E], number of triangles at it."""
+        sides = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
+        count = max(len(self.points), 1)
+        key, times = np.unique(sides.min(axis=1) * count + sides.max(axis=1), return_counts=True)
+        return np.stack(np.divmod(key, count), axis=1), times

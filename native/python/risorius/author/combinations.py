@@ -19,6 +19,8 @@ import numpy as np
 from .. import BlendShapeTarget, Dna, Mesh
 from ..rigs.rotation import Convention
 from .geometry import skeleton as sk
+from .geometry.blocks import blocks_of, joined_targets, split_mesh
+from .geometry.fewer import Fewer
 from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
@@ -117,8 +119,15 @@ class _Skin:
 class Combinations:
     """The correctives of a face, sorted by the number of their controls."""
 
-    def __init__(self, work: Work, options: RigOptions) -> None:
-        self.work, self.options = work, options
+    def __init__(self, work: Work, options: RigOptions, fewer: Fewer[Work] | None = None) -> None:
+        """Prepare the solution.
+
+        Args:
+            work: the face; its meshes are made.
+            options: options of the rig.
+            fewer: simplified meshes for the solution, or None.
+        """
+        self.work, self.options, self.fewer = work, options, fewer
         self.columns = sk.column_count(work.source)
         self.order = sorted(work.combined, key=lambda c: (len(work.combined[c]), c))
         self.before = _Side(work.source, self.columns)
@@ -178,8 +187,10 @@ class Combinations:
         source, dna = self.work.source, self.work.dna
         out = []
         for m in listed_meshes(source, lod):
-            made = dna.meshes[dna.mesh_names.index(source.mesh_names[m])]
-            skin = _Skin(source, dna, source.meshes[m], made, self.columns)
+            mesh, made = source.meshes[m], dna.meshes[dna.mesh_names.index(source.mesh_names[m])]
+            if self.fewer is not None and m in self.fewer.made:
+                mesh, made = self.fewer.meshes[m].mesh, self.fewer.made[m]
+            skin = _Skin(source, dna, mesh, made, self.columns)
             if skin.hangs_on(self.first):
                 out.append(skin)
         return out
@@ -266,11 +277,14 @@ class Combinations:
         """float64[new joints, 6, correctives]: joint values of correctives, sorted as `order`."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
-    def finish(self, lods: int) -> list[Combination]:
+    def finish(
+        self, lods: int, tell: Callable[[float], None] = lambda share: None
+    ) -> list[Combination]:
         """Add blend shapes for the joints' errors, and return the errors of the finest meshes.
 
         Args:
             lods: number of LODs of the source.
+            tell: gets the finished fraction of each block of vertices.
         """
         work = self.work
         self.after = _Side(work.dna, self.columns)
@@ -289,18 +303,28 @@ class Combinations:
                     continue
                 done.add(name)
                 at = work.dna.mesh_names.index(name)
-                skin = _Skin(work.source, work.dna, work.source.meshes[m], meshes[at], self.columns)
-                if not skin.hangs_on(self.first):
-                    continue
-                targets = list(meshes[at].blend_shape_targets)
                 finest = dict(zip(self.order, out, strict=True)) if lod == 0 else {}
-                left = self._each(partial(self._left, skin, finest))
-                for target, column in zip(left, self.order, strict=True):
-                    if target is not None and column in channel:
-                        target.blend_shape_channel_index = channel[column]
-                        targets.append(target)
-                meshes[at].blend_shape_targets = targets
+                blocks, parts = blocks_of(np.asarray(meshes[at].positions, np.float64)), []
+                both = (split_mesh(mesh, blocks) for mesh in (work.source.meshes[m], meshes[at]))
+                for vertices, before, after in zip(blocks, *both, strict=True):
+                    skin = _Skin(work.source, work.dna, before, after, self.columns)
+                    if skin.hangs_on(self.first):
+                        left = self._each(partial(self._left, skin, finest), tell)
+                        parts.append((vertices, self._targets(left, channel)))
+                added = joined_targets(parts)
+                meshes[at].blend_shape_targets = [*meshes[at].blend_shape_targets, *added]
         work.dna.meshes = meshes
+        return out
+
+    def _targets(
+        self, left: Sequence[BlendShapeTarget | None], channel: dict[int, int]
+    ) -> list[BlendShapeTarget]:
+        """The blend shapes of the correctives that have a channel."""
+        out = []
+        for target, column in zip(left, self.order, strict=True):
+            if target is not None and column in channel:
+                target.blend_shape_channel_index = channel[column]
+                out.append(target)
         return out
 
     def _name(self, column: int) -> str:

@@ -7,7 +7,8 @@ groups store the motions. Blend shapes correct the errors that the joints leave.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,11 @@ from ..rigs.rotation import Convention
 from .combinations import Combination, Combinations
 from .fitting import FitOptions, Progress, fit_joints
 from .geometry import skeleton as sk
+from .geometry.blocks import LARGE
+from .geometry.fewer import fewer_vertices
+from .geometry.simplify import Floats
 from .geometry.skeleton import Doubles
+from .geometry.wanted import Wanted, joined_displacements
 from .level_meshes import LevelMeshes, level_meshes
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .lighter import Lightened, deltas_of, within_deltas
@@ -46,6 +51,9 @@ from .work import (
     resting,
 )
 
+# Progress at the ends of the preparation, of the fit and of the meshes.
+_BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
+_SOLVED = 0.6  # of the progress of correctives, at the end of their solution
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
 
 
@@ -94,7 +102,7 @@ def make_joint_rig(
     work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
     made.finish()
     names = list(work.dna.joint_names)[len(dna.joint_names) :]
-    combinations = _combine(work, made.options, regions, _part(progress, 0.8, 1.0))
+    combinations = _combine(work, made, regions, _part(progress, _MESHES, 1.0))
     made.meshes = list(work.dna.meshes)
     rig = JointRig(
         work.dna,
@@ -205,9 +213,10 @@ def _made(
         region.
     """
     o.lods.check()
-    work = begin(dna)
+    go_on = _counting(progress, sum(1 + len(m.positions) // LARGE for m in dna.meshes))
+    work = begin(dna, go_on)
     wanted, work.wanted = work.wanted, {}  # large arrays, so they are released early
-    needs = {m for m in wanted if needs_joints(work, dna.meshes[m], wanted[m])}
+    needs = {m for m in wanted if needs_joints(work, wanted[m])}
     needs = {m for m in needs if not any(word in dna.mesh_names[m] for word in o.kept)}
     if like is not None:  # meshes without joints in the reference keep their shapes
         needs = {m for m in needs if dna.mesh_names[m] in like.weights}
@@ -216,38 +225,77 @@ def _made(
     shaped = [m for m in listed_meshes(dna, 0) if m in needs]
     unit = MM.get(dna.translation_unit, 10.0)
     coarse = LevelMeshes(_level_count(dna, o.lods))
+    attributes: dict[int, Floats] = {}
     if like is None:
-        coarse = level_meshes(work, wanted, o.lods, coarse.count)
+        coarse = level_meshes(work, wanted, o.lods, coarse.count, attributes, go_on)
     work.levels = coarse.count
     o = replace(o, fit=replace(o.fit, least_effect=o.least_effect_mm / unit))
     if o.tolerance_mm is None:
         o = replace(o, tolerance_mm=o.tolerance * height_mm(dna))
+    on, fewer = work, None
     if like is None:
+        fewer = fewer_vertices(
+            work, shaped, wanted, o.fit_vertices, attributes, coarse.triangles, go_on
+        )
+        on = fewer.work if fewer is not None else work
+        fitted = fewer.wanted if fewer is not None else wanted
         # The fit takes most of the time, so it gets most of the progress.
-        fit, weights = _new_joints(work, shaped, wanted, o, _part(progress, 0.0, 0.7))
+        fit, weights = _new_joints(on, shaped, fitted, o, _part(progress, _BEGUN, _FIT))
+        _take_chosen(work, on)
     else:
         like.check(work)
         work.levels = len(like.levels)
         work.pivots = _pivots(work, shaped, wanted, _jaw(work))
         fit, weights = refit(work, like, shaped, wanted, o)
     beside = _beside_parents(work, fit)
-    held = new_weights(work, shaped, weights)
-    effects = _effects(work, shaped, beside, held)
-    names = like.names if like else _names(work, fit, effects, _places(work, shaped, fit, held))
+    held = new_weights(on, shaped, weights)
+    effects = _effects(on, shaped, beside, held)
+    names = like.names if like else _names(work, fit, effects, _places(on, shaped, fit, held))
     regions = _add_joints(work, fit, names)
     _add_behavior(work, beside, effects, regions, o)
-    made = Made(work, o, weights, coarse, like, whole=whole)
+    made = Made(work, o, weights, coarse, like, whole=whole, fewer=fewer)
     for lod in range(work.levels):
+        made.go_on = _asking(progress, _FIT + (_MESHES - _FIT) * lod / work.levels)
         made.add_level(lod, wanted, needs)
-        if progress is not None and progress(0.7 + 0.1 * (lod + 1) / work.levels) is False:
-            raise DnaError("stopped")
     return work, fit, made, regions
+
+
+def _take_chosen(work: Work, other: Work) -> None:
+    """Take joints of levels and parents that were chosen for the face with simplified meshes."""
+    work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
+    work.mirrored, work.heirs = other.mirrored, other.heirs
+
+
+def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
+    """As _asking(), with a share that grows with each call towards _BEGUN.
+
+    Args:
+        progress: gets the share.
+        least: after this number of calls the share is half of _BEGUN.
+    """
+    calls = itertools.count(1)
+
+    def ask() -> None:
+        done = next(calls)
+        _asking(progress, _BEGUN * done / (done + least))()
+
+    return ask
+
+
+def _asking(progress: Progress | None, share: float) -> Callable[[], None]:
+    """A function that tells a share of the work and raises DnaError if it was stopped."""
+
+    def ask() -> None:
+        if progress is not None and progress(share) is False:
+            raise DnaError("stopped")
+
+    return ask
 
 
 def _new_joints(
     work: Work,
     shaped: list[int],
-    wanted: dict[int, Doubles],
+    wanted: dict[int, Wanted],
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
@@ -264,18 +312,13 @@ def _new_joints(
 
 
 def _combine(
-    work: Work, options: RigOptions, regions: dict[str, list[str]], progress: Progress | None
+    work: Work, made: Made, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
     """Add joint values and blend shapes for the correctives. Returns the correctives' errors."""
     if not work.combined:
         return []
-    found = Combinations(work, options)
-
-    def tell(share: float) -> None:
-        if progress is not None and progress(share) is False:
-            raise DnaError("stopped")
-
-    found.solve(tell)
+    found = Combinations(work, made.options, made.fewer)
+    found.solve(lambda share: _asking(progress, _SOLVED * share)())
     # Expressions and correctives share one joint group, because all values of a joint must be in
     # one group.
     before = len(work.source.joint_names)
@@ -284,7 +327,8 @@ def _combine(
     group = _joint_group(work, values, [*work.columns, *found.order])
     work.dna.joint_groups = [*work.groups, group]
     work.dna = grouped(work.dna, regions)
-    return found.finish(max(1, work.source.lod_count))
+    lods = max(1, work.source.lod_count)
+    return found.finish(lods, lambda _share: _asking(progress, _SOLVED)())
 
 
 def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
@@ -365,7 +409,7 @@ def _mirrored_given(work: Work) -> dict[int, int]:
 def _fit(
     work: Work,
     meshes: Sequence[int],
-    wanted: dict[int, Doubles],
+    wanted: dict[int, Wanted],
     jaw: int | None,
     options: FitOptions,
     progress: Progress | None,
@@ -373,7 +417,7 @@ def _fit(
     """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh."""
     dna = work.source
     neutral = joined_positions(work, meshes)
-    moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
+    moved = joined_displacements(wanted, meshes).astype(np.float32)
     edges, begin = [], [0]
     for m in meshes:
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin[-1]))
@@ -404,9 +448,9 @@ def _fit(
 
 
 def _pivots(
-    work: Work, meshes: Sequence[int], wanted: dict[int, Doubles], jaw: int | None
+    work: Work, meshes: Sequence[int], wanted: dict[int, Wanted], jaw: int | None
 ) -> list[Pivot]:
-    moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
+    moved = joined_displacements(wanted, meshes).astype(np.float32)
     return find_pivots(
         work.names,
         joined_positions(work, meshes),

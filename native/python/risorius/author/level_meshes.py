@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from .. import Mesh, _native
-from .geometry.simplify import Floats, attributes_of, fan_triangles, fewer_triangles, pieces_of
+from ..base.patience import patiently
+from .geometry.blocks import LARGE
+from .geometry.simplify import Floats, fan_triangles, fewer_triangles, pieces_of
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted, known_attributes
 from .levels import LodOptions, mesh_budget, vertex_budgets
 from .work import Work, listed_meshes
 
@@ -40,7 +44,12 @@ class LevelMeshes:
 
 
 def level_meshes(
-    work: Work, wanted: Mapping[int, Doubles], options: LodOptions, levels: int
+    work: Work,
+    wanted: Mapping[int, Wanted],
+    options: LodOptions,
+    levels: int,
+    attributes: dict[int, Floats] | None = None,
+    go_on: Callable[[], None] = lambda: None,
 ) -> LevelMeshes:
     """Simplify the meshes of LOD 0 for each coarser LOD.
 
@@ -50,10 +59,14 @@ def level_meshes(
 
     Args:
         work: the face.
-        wanted: mesh of the source -> displacements float64[E, V, 3].
+        wanted: mesh of the source -> its displacements.
         options: the budgets.
         levels: largest number of LODs.
+        attributes: mesh of the source -> attributes for the simplification; missing ones are added.
+            None: they are forgotten.
+        go_on: called before each mesh; raises an error to stop.
     """
+    known = {} if attributes is None else attributes
     source = work.source
     had = max(1, source.lod_count)
     own = [sum(len(source.meshes[m].positions) for m in listed_meshes(source, lod))
@@ -61,9 +74,8 @@ def level_meshes(
     budgets = vertex_budgets(options, levels, own)
     fine = listed_meshes(source, 0)
     # The skin is the mesh that the expressions move most. Hair may have more vertices.
-    skin = max(fine, key=lambda m: float(np.vdot(wanted[m], wanted[m])))
+    skin = max(fine, key=lambda m: float(wanted[m].squares.sum()))
     out, check = LevelMeshes(min(levels, had)), _Skin(source.meshes[skin], wanted[skin])
-    attributes: dict[int, Floats] = {}
     for lod in range(had, levels):
         made: dict[tuple[int, int], Ints] = {}
         for m in fine:
@@ -72,9 +84,11 @@ def level_meshes(
             budget = mesh_budget(source.mesh_names[m], len(mesh.positions), share)
             if not budget:
                 continue
-            if m not in attributes:
-                attributes[m] = attributes_of(mesh, wanted[m])
-            triangles = fewer_triangles(mesh, attributes[m], budget)
+            go_on()
+            # A large mesh is simplified from level to level, because that takes less time.
+            finer = None if wanted[m].small else out.triangles.get((lod - 1, m))
+            features = known_attributes(known, m, wanted[m])
+            triangles = patiently(partial(fewer_triangles, mesh, features, budget, finer), go_on)
             if len(triangles):
                 made[lod, m] = triangles
         wrong = "" if options.vertices else check.wrong(made.get((lod, skin)))
@@ -90,7 +104,7 @@ class _Skin:
     """The skin in the neutral pose and in some expressions: the largest connected piece of a
     mesh."""
 
-    def __init__(self, mesh: Mesh, wanted: Doubles) -> None:
+    def __init__(self, mesh: Mesh, wanted: Wanted) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
         self.places = np.asarray(mesh.layout_positions, np.int64)
         self.pieces = pieces_of(mesh)
@@ -99,12 +113,12 @@ class _Skin:
         held = np.flatnonzero(self.mine)
         self.looked_at = held[:: max(1, len(held) // _LOOKED_AT)]
         self.size = float(np.ptp(self.positions[held], axis=0).max()) if len(held) else 1.0
-        most = np.argsort(-(wanted**2).sum(axis=(1, 2)), kind="stable")[:_POSES]
-        self.poses = [self.positions, *(self.positions + wanted[e] for e in most)]
+        most = np.argsort(-wanted.squares, kind="stable")[:_POSES]
+        self.poses = [self.positions, *(self.positions + way for way in wanted.ways(most))]
         fine = self.places[fan_triangles(mesh)]
         self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
         # A LOD may have as many slivers and folds as the finest mesh, which has some at lid rims.
-        self.had = [shape_of(points, self.fine) for points in self.poses]
+        self.had = shapes_of(self.poses, self.fine)
 
     def wrong(self, triangles: Ints | None) -> str:
         """The fault of the skin of a LOD as text; "" if there is none.
@@ -119,8 +133,18 @@ class _Skin:
         used, local = np.unique(corners, return_inverse=True)
         if len(used) < 4:
             return "no skin"
-        for points, (had_slivers, had_folds) in zip(self.poses, self.had, strict=True):
-            slivers, folds = shape_of(points, corners)
+        return "" if len(used) > LARGE else self._wrong(corners, used, local)
+
+    def _wrong(self, corners: Ints, used: Ints, local: Ints) -> str:
+        """The fault of a skin as text.
+
+        Args:
+            corners: int64[n, 3], triangles of vertices.
+            used: the distinct vertices of the triangles.
+            local: for each corner its index in `used`.
+        """
+        now = shapes_of(self.poses, corners)
+        for (slivers, folds), (had_slivers, had_folds) in zip(now, self.had, strict=True):
             if slivers > max(_SLIVERS, had_slivers):
                 return f"{slivers:.1%} slivers"
             if folds > max(_FOLDS, had_folds):
@@ -135,25 +159,32 @@ class _Skin:
         return ""
 
 
-def shape_of(points: Doubles, triangles: Ints) -> tuple[float, float]:
-    """The fractions of triangles that are slivers, and of edges folded by more than 120 degrees.
+def shapes_of(poses: Sequence[Doubles], triangles: Ints) -> list[tuple[float, float]]:
+    """For each pose, the fractions of triangles that are slivers, and of edges folded by more than
+    120 degrees.
 
     Args:
-        points: float64[V, 3], vertex positions.
+        poses: float64[V, 3] each, vertex positions.
         triangles: int64[n, 3], vertex indices.
     """
     if not len(triangles):
-        return 0.0, 0.0
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    twice = np.linalg.norm(normals, axis=1)
-    longest = np.max([np.linalg.norm(s, axis=1) for s in (b - a, c - b, a - c)], axis=0)
-    slivers = float((longest**2 > _LONG * twice).mean())
-    normals = normals / np.maximum(twice, 1e-30)[:, None]
+        return [(0.0, 0.0) for _ in poses]
     pairs = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
     faces = np.tile(np.arange(len(triangles)), 3)
-    _, edge, sides = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(edge.ravel(), kind="stable")
-    first = (np.cumsum(sides) - sides)[sides == 2]
-    dots = (normals[faces[order][first]] * normals[faces[order][first + 1]]).sum(axis=1)
-    return slivers, float((dots < _FOLDED).sum() / len(sides))
+    key = pairs[:, 0] * (int(triangles.max()) + 1) + pairs[:, 1]
+    order = np.argsort(key, kind="stable")
+    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
+    sides = np.diff(begins, append=len(key))
+    first = begins[sides == 2]
+    beside = faces[order[first]], faces[order[first + 1]]
+    out = []
+    for points in poses:
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        twice = np.linalg.norm(normals, axis=1)
+        longest = np.max([np.linalg.norm(s, axis=1) for s in (b - a, c - b, a - c)], axis=0)
+        slivers = float((longest**2 > _LONG * twice).mean())
+        normals = normals / np.maximum(twice, 1e-30)[:, None]
+        dots = (normals[beside[0]] * normals[beside[1]]).sum(axis=1)
+        out.append((slivers, float((dots < _FOLDED).sum() / len(sides))))
+    return out

@@ -11,6 +11,7 @@ from .. import Mesh
 from .between import Between, Ways
 from .fitting import FitOptions, fit_weights
 from .geometry import skeleton as sk
+from .geometry.blocks import SparseWeights
 from .geometry.skeleton import Doubles, Ints
 from .work import (
     Work,
@@ -109,6 +110,27 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
     return _HALVES * halves, still + _HALVES * (ways.made[0.5][rows] - still)
 
 
+def inherited(work: Work, rows: SparseWeights, lod: int) -> SparseWeights:
+    """Weights of a level, with the weights of joints that the level lacks on their heirs.
+
+    Args:
+        work: the face.
+        rows: weights of the finest level.
+        lod: the level.
+    """
+    before = len(work.source.joint_names)
+    there = {*range(before), *(before + work.new[lod]).tolist()}
+    heirs = np.array([_heir(work, joint, there) for joint in range(rows.count)], np.int32)
+    return SparseWeights(heirs[rows.joints], rows.weights, rows.count)
+
+
+def _heir(work: Work, joint: int, there: set[int]) -> int:
+    """The joint of a level that takes a joint's vertices; itself if the level has it."""
+    while joint not in there and joint in work.heirs:
+        joint = work.heirs[joint]
+    return joint
+
+
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
     """Move the weights of joints that a LOD lacks to the joints that replace them.
 
@@ -119,9 +141,7 @@ def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
     """
     rows = start.copy()
     for joint in np.flatnonzero(rows.any(axis=0)).tolist():
-        heir = joint
-        while heir not in there and heir in work.heirs:
-            heir = work.heirs[heir]
+        heir = _heir(work, joint, there)
         if heir != joint:
             rows[:, heir] += rows[:, joint]
             rows[:, joint] = 0

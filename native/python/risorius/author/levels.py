@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import Dna
 from ..base.errors import ArgumentError
+from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
 
 # Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. It falls more slowly
@@ -37,7 +38,8 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    vertices: tuple[int, ...] = ()  # vertices of each level; empty: 0.6 times the level before
+    # Vertices of each LOD; empty: 0.6 times the LOD before, and at most 60,000.
+    vertices: tuple[int, ...] = ()
 
     def check(self) -> None:
         """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has not `count`
@@ -188,7 +190,7 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each LOD.
+    """The number of vertices of each LOD. A LOD that is made has at most LARGE vertices.
 
     Args:
         options: budgets, if given.
@@ -198,7 +200,7 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
     out = list(existing)
     while len(out) < levels:
         given = options.vertices[len(out)] if len(out) < len(options.vertices) else None
-        out.append(given if given is not None else round(_FALL * out[-1]))
+        out.append(given if given is not None else min(round(_FALL * out[-1]), LARGE))
     return out[:levels]
 
 

@@ -96,7 +96,8 @@ def _limit(meshes: Sequence[Mesh], budget: int) -> float | None:
     if count_deltas(meshes) <= budget:
         return None
     lengths = np.concatenate([part for mesh in meshes for part in _lengths(mesh)])
-    return float(np.sort(lengths)[::-1][budget])
+    at = len(lengths) - 1 - budget
+    return float(np.partition(lengths, at)[at])
 
 
 def _without(mesh: Mesh, limit: float) -> tuple[Mesh, dict[int, float]]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,13 @@ import numpy as np
 from .. import BlendShapeTarget, Dna, Mesh
 from .between import Between, Ways
 from .geometry import skeleton as sk
+from .geometry.blocks import LARGE, SparseWeights, joined_targets, split_mesh
+from .geometry.fewer import Fewer
 from .geometry.simplify import simplified
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted
 from .level_meshes import LevelMeshes
-from .level_weights import level_weights
+from .level_weights import inherited, level_weights
 from .levels import level_name
 from .lighter import count_deltas
 from .reference import Reference
@@ -28,6 +32,7 @@ from .work import (
 )
 
 _LEAST_WEIGHT = 1e-3
+Rows = Doubles | SparseWeights  # weights on all joints, of a large mesh as SparseWeights
 
 
 class Made:
@@ -42,19 +47,24 @@ class Made:
         like: Reference | None = None,
         *,
         whole: bool = True,
+        fewer: Fewer[Work] | None = None,
+        go_on: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare an empty list of meshes.
 
         Args:
             work: the face; it must already have the new joints.
             options: options of the rig.
-            weights: mesh -> float64[V, joints] of the finest meshes.
+            weights: mesh -> float64[V, joints] of the finest meshes, or of their simplified meshes.
             coarse: triangles of the coarser LODs.
             like: reference to reuse, or None.
             whole: whether to make blend shapes and measure errors.
+            fewer: the simplified meshes to which the joints were fitted, or None.
+            go_on: called before each mesh and each block; raises an error to stop.
         """
-        self.whole = whole
-        self.work, self.options, self.weights, self.like = work, options, weights, like
+        self.whole, self.fewer, self.go_on = whole, fewer, go_on
+        self.work, self.options, self.like = work, options, like
+        self.weights: dict[int, Rows] = dict(weights)
         self.coarse = coarse
         self.triangles: dict[str, Ints] = {}  # coarse mesh -> layout indices of the fine mesh
         self.ways = Ways(work)
@@ -65,12 +75,12 @@ class Made:
         self.own = max(1, work.source.lod_count)
         self._numbers: dict[int, int] = {}  # mesh of the source -> mesh here; levels share meshes
 
-    def add_level(self, lod: int, wanted: dict[int, Doubles], needs: set[int]) -> None:
+    def add_level(self, lod: int, wanted: dict[int, Wanted], needs: set[int]) -> None:
         """Make the meshes of a LOD: meshes of the source, or simplified meshes of LOD 0.
 
         Args:
             lod: index of the LOD; LODs are added in order.
-            wanted: mesh of the source -> displacements float64[E, V, 3].
+            wanted: mesh of the source -> its displacements.
             needs: meshes that get weights on new joints.
         """
         self.listed.append([])
@@ -82,10 +92,12 @@ class Made:
                     continue
                 self._numbers[m] = len(self.meshes)
                 mesh = source.meshes[m]
-                start = self._start(mesh) if m in needs and m not in self.weights else None
-                start = self.weights.get(m, start)
-                finest = m if m in self.weights else None
-                self._add(lod, mesh, source.mesh_names[m], wanted[m], start, finest)
+                name = source.mesh_names[m]
+                if m in self.weights:
+                    self._add_finest(lod, m, name, wanted[m])
+                else:
+                    start = self._start(mesh) if m in needs else None
+                    self._add(lod, mesh, name, wanted[m], start)
             return
         for m in listed_meshes(source, 0):
             mesh, name = source.meshes[m], source.mesh_names[m]
@@ -96,8 +108,10 @@ class Made:
             _set_skin(coarse, sk.dense_weights(mesh, len(source.joint_names))[kept])
             name = level_name(name, lod)
             self.triangles[name] = triangles
-            start = self.weights[m][kept] if m in needs else None
-            self._add(lod, coarse, name, wanted[m][:, kept], start)
+            if m in needs:
+                self._add_coarse(lod, coarse, name, wanted[m], m, kept)
+            else:
+                self._add(lod, coarse, name, wanted[m], None)
 
     def _triangles(self, lod: int, m: int, name: str) -> Ints:
         """int64[n, 3]: triangles of a coarse mesh as layouts of the fine mesh; empty: no mesh."""
@@ -110,7 +124,7 @@ class Made:
         """Weights float64[V, joints] of the nearest vertices of the meshes of LOD 0."""
         source = self.work.source
         fine = np.concatenate([np.asarray(source.meshes[m].positions) for m in self.weights])
-        rows = np.concatenate(list(self.weights.values()))
+        rows = np.concatenate([w[np.arange(len(w))] for w in self.weights.values()])
         positions = np.asarray(mesh.positions)
         lengths = (fine**2).sum(axis=1)
         nearest = [
@@ -119,45 +133,116 @@ class Made:
         ]
         return rows[np.concatenate(nearest)]
 
-    def _add(
-        self,
-        lod: int,
-        mesh: Mesh,
-        name: str,
-        wanted: Doubles,
-        rows: Doubles | None,
-        finest: int | None = None,
-    ) -> None:
-        """Add a mesh with its own weights, or fit new weights that start with `rows`.
+    def _add(self, lod: int, mesh: Mesh, name: str, wanted: Wanted, start: Doubles | None) -> None:
+        """Add a mesh whose weights are fitted.
 
         Args:
             lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
-            wanted: its displacements float64[E, V, 3].
-            rows: dense weights to start with; None keeps the mesh unchanged.
-            finest: index of the mesh of the source if coarser LODs start with its new weights.
+            wanted: its displacements.
+            start: float64[V, joints], weights to start with; None keeps the mesh unchanged.
         """
-        self.listed[lod].append(len(self.meshes))
-        self.names.append(name)
-        if rows is None:
+        self._listed(lod, name)
+        if start is None:
             self.meshes.append(mesh)
             return
+        every = wanted.at(np.arange(len(wanted)))
+        self._finished(lod, mesh, name, wanted, self._fitted(lod, mesh, name, every, start))
+
+    def _listed(self, lod: int, name: str) -> None:
+        self.go_on()
+        self.listed[lod].append(len(self.meshes))
+        self.names.append(name)
+
+    def _fitted(self, lod: int, mesh: Mesh, name: str, wanted: Doubles, start: Doubles) -> Doubles:
+        """float64[V, joints]: the weights of the reference, or weights fitted from a start."""
         if self.like is not None:
-            rows = self.like.weights[name]
-        else:
-            rows = level_weights(self.ways, self.options.fit, lod, mesh, wanted, rows)
-        if finest is not None:
-            self.weights[finest] = rows
+            return self.like.weights[name]
+        return level_weights(self.ways, self.options.fit, lod, mesh, wanted, start)
+
+    def _add_finest(self, lod: int, m: int, name: str, wanted: Wanted) -> None:
+        """Add a mesh of the finest level. Coarser levels start with its weights."""
+        self._listed(lod, name)
+        mesh, start = wanted.mesh, self.weights[m]
+        small = self.fewer.meshes.get(m) if self.fewer is not None else None
+        if small is not None and self.fewer is not None:
+            assert not isinstance(start, SparseWeights)
+            if not wanted.small:
+                self._add_large(lod, m, name, wanted, start)
+                return
+            start = small.carried(start)
+        every = np.arange(len(wanted))
+        self.weights[m] = self._fitted(lod, mesh, name, wanted.at(every), start[every])
+        self._finished(lod, mesh, name, wanted, self.weights[m])
+
+    def _add_large(self, lod: int, m: int, name: str, wanted: Wanted, start: Doubles) -> None:
+        """Add a large mesh of the finest level with the weights of its simplified mesh."""
+        assert self.fewer is not None
+        small = self.fewer.meshes[m]
+        own = self.fewer.wanted[m].at(np.arange(len(small.kept)))
+        rows = self._fitted(lod, small.mesh, name, own, start)
+        made, left = _finish_mesh(self.ways, small.mesh, rows, own, self.options)
+        _set_skin(made, rows)
+        self.fewer.made[m] = made
+        self.weights[m] = small.carried(rows)
+        self._finished(lod, wanted.mesh, name, wanted, self.weights[m])
+        if self.whole:  # between 0 and 1, only the errors of the simplified mesh are measured
+            self.errors[-1].between_largest = left.between_largest
+
+    def _add_coarse(
+        self, lod: int, mesh: Mesh, name: str, wanted: Wanted, m: int, kept: Ints
+    ) -> None:
+        """Add a simplified mesh of the finest level.
+
+        Args:
+            lod: index of the LOD.
+            mesh: the simplified mesh with its weights in the source.
+            name: name of the mesh.
+            wanted: displacements of the finest mesh.
+            m: index of the finest mesh.
+            kept: index in the finest mesh of each vertex.
+        """
+        self._listed(lod, name)
+        finest = self.weights[m]
+        if len(kept) <= LARGE or not isinstance(finest, SparseWeights):
+            own = wanted.at(kept)
+            rows: Rows = self._fitted(lod, mesh, name, own, finest[kept])
+            at = np.arange(len(kept))
+        else:  # the errors of a large mesh are measured at some of its vertices
+            rows = inherited(self.work, finest.some(kept), lod)
+            at = np.arange(0, len(kept), -(-len(kept) // LARGE))
+            own = wanted.at(kept[at])
+        made = copy.copy(mesh)
+        _set_skin(made, rows)
+        self.meshes.append(made)
+        if self.whole:
+            between = self.options.between and wanted.small
+            options = replace(self.options, shapes=False, between=between)
+            (part,) = split_mesh(mesh, [at])
+            _, left = _finish_mesh(self.ways, part, rows[at], own, options)
+            left.name, left.lod, left.vertices = name, lod, len(kept)
+            left.worst_vertex = at[left.worst_vertex]
+            self.errors.append(left)
+
+    def _finished(self, lod: int, mesh: Mesh, name: str, wanted: Wanted, rows: Rows) -> None:
+        """Add a mesh with its weights, with blend shapes for the joints' errors, and the errors."""
+        made = copy.copy(mesh)
+        _set_skin(made, rows)
+        self.meshes.append(made)
         if not self.whole:
-            made = copy.copy(mesh)
-            _set_skin(made, rows)
-            self.meshes.append(made)
             return
         shaped = self.options if lod < self.own else replace(self.options, shapes=False)
-        made, left = _finish_mesh(self.ways, mesh, rows, wanted, shaped)
+        shaped = replace(shaped, between=shaped.between and wanted.small)
+        parts, left = [], _no_errors(len(wanted), self.work.names)
+        for block in wanted.blocks():
+            self.go_on()
+            own = rows[block.vertices]
+            part, errors = _finish_mesh(self.ways, block.mesh, own, block.wanted, shaped)
+            parts.append((block.vertices, part.blend_shape_targets))
+            _take_errors(left, errors, block.vertices)
+        made.blend_shape_targets = joined_targets(parts)
         left.name, left.lod = name, lod
-        self.meshes.append(made)
         self.errors.append(left)
 
     def finish(self) -> None:
@@ -204,8 +289,7 @@ def _finish_mesh(
     """The mesh with new weights and with blend shapes for the joints' errors; and the errors."""
     work = ways.work
     out = copy.copy(mesh)
-    _set_skin(out, rows)
-    weights = sk.dense_weights(out, rows.shape[1])
+    weights = _kept_weights(rows)
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
     channel = channels_of(work.dna)
@@ -255,13 +339,35 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
     return MeshErrors("", vertices, expressions, none(), none(), none(), none(), worst, none())
 
 
-def _set_skin(mesh: Mesh, rows: Doubles) -> None:
+def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
+    """Add the errors of a block of vertices to the errors of a mesh."""
+    worse = part.joints_largest > whole.joints_largest
+    whole.worst_vertex[worse] = vertices[part.worst_vertex[worse]]
+    share = part.vertices / whole.vertices
+    whole.motion = np.sqrt(whole.motion**2 + share * part.motion**2)
+    whole.joints_rms = np.sqrt(whole.joints_rms**2 + share * part.joints_rms**2)
+    for key in ("joints_largest", "largest", "between_largest"):
+        setattr(whole, key, np.maximum(getattr(whole, key), getattr(part, key)))
+
+
+def _kept_weights(rows: Doubles) -> Doubles:
+    """float64[V, joints]: weights without very small ones; the rows have the sum 1."""
     kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
     kept[~kept.any(axis=1), 0] = 1  # vertices without weights follow the root
     kept /= kept.sum(axis=1, keepdims=True)
-    vertex, joint = np.nonzero(kept)
-    counts = (kept > 0).sum(axis=1)
-    mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
-    mesh.skin_weights = kept[vertex, joint]
-    mesh.skin_joint_indices = joint
-    mesh.maximum_influence_per_vertex = int(counts.max())
+    return np.asarray(kept)
+
+
+def _set_skin(mesh: Mesh, rows: Rows) -> None:
+    counts, joints, weights = [], [], []
+    for begin in range(0, len(rows), LARGE):
+        kept = _kept_weights(rows[np.arange(begin, min(begin + LARGE, len(rows)))])
+        vertex, joint = np.nonzero(kept)
+        counts.append((kept > 0).sum(axis=1))
+        joints.append(joint)
+        weights.append(kept[vertex, joint].astype(np.float32))
+    number = np.concatenate([np.zeros(1, np.int64), *counts])
+    mesh.skin_offsets = np.cumsum(number)
+    mesh.skin_weights = np.concatenate(weights)
+    mesh.skin_joint_indices = np.concatenate(joints)
+    mesh.maximum_influence_per_vertex = int(number.max())

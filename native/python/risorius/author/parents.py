@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .geometry.skeleton import Doubles, Ints, matrices_of_vectors
+from .geometry.wanted import Wanted
 from .work import (
     Joints,
     Work,
@@ -69,7 +70,7 @@ def choose_parents(
 
 
 def room_for_second(
-    work: Work, meshes: Sequence[int], wanted: dict[int, Doubles], joints: int
+    work: Work, meshes: Sequence[int], wanted: dict[int, Wanted], joints: int
 ) -> int:
     """The number of new joints reserved for second_joints().
 
@@ -78,12 +79,12 @@ def room_for_second(
     Args:
         work: the face.
         meshes: indices of the meshes to fit.
-        wanted: mesh -> displacements float64[E, V, 3].
+        wanted: mesh -> its displacements.
         joints: number of all new joints.
     """
     for m in meshes:
         shares = carried_shares(work, work.source.meshes[m])
-        moved = wanted[m].any(axis=(0, 2))
+        moved = wanted[m].farthest > 0
         if np.any(shares[moved][:, resting(work) != work.head] > _MINOR):
             return int(_ROOM * joints)
     return 0

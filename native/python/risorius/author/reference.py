@@ -22,7 +22,9 @@ from ..base.errors import ArgumentError
 from ..base.npz import DAMAGED
 from .fitting import fit_motions
 from .geometry import skeleton as sk
+from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted, joined_displacements
 from .work import Joints, RigOptions, Work, given, joined_positions
 
 _FORMAT = 2
@@ -71,7 +73,7 @@ class Reference:
             if found != self.face[name]:
                 raise ArgumentError(
                     f"{name}: {self.face[name][0]} vertices and {self.face[name][1]} corners were "
-                    f"expected, as the face has whose joints it is to have, found {found[0]} and "
+                    f"expected, as in the face given with like, found {found[0]} and "
                     f"{found[1]}"
                 )
 
@@ -159,7 +161,8 @@ class _Meshes(Protocol):
 
 
 def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
-    """The reference of a finished joint rig.
+    """The reference of a finished joint rig; it has no weights if the rig has a mesh of more than
+    LARGE vertices.
 
     Args:
         work: the face; the joints of its LODs are already chosen.
@@ -184,6 +187,8 @@ def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
         [[int(j) for j in level] for level in work.new],
         triangles=made.triangles,
     )
+    if any(len(mesh.positions) > LARGE for mesh in made.meshes):
+        return out
     for name, mesh in zip(made.names, made.meshes, strict=True):
         rows = sk.dense_weights(mesh, len(dna.joint_names))
         if rows[:, before:].any():
@@ -195,7 +200,7 @@ def refit(
     work: Work,
     reference: Reference,
     shaped: list[int],
-    wanted: dict[int, Doubles],
+    wanted: dict[int, Wanted],
     options: RigOptions,
 ) -> tuple[Joints, dict[int, Doubles]]:
     """Fit the motions of a reference's joints to another face.
@@ -204,7 +209,7 @@ def refit(
         work: the other face; gets the LODs and the joint parents of the reference.
         reference: the reference; check() has accepted the face.
         shaped: indices of the meshes to fit.
-        wanted: mesh -> displacements float64[E, V, 3] of the expressions.
+        wanted: mesh -> its displacements.
         options: options of the fit.
 
     Returns: the joints, and mesh -> weights float64[V, joints] of the finest meshes.
@@ -222,7 +227,7 @@ def refit(
     }
     if sorted(weights) != sorted(shaped):
         raise ArgumentError(
-            "meshes move that do not move in the face (like) whose joints it is to have"
+            "an expression moves meshes that do not move in the face given with like"
         )
     used = given(work)
     own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])
@@ -237,7 +242,7 @@ def refit(
     rows[:, work.head] += rows[:, others].sum(axis=1)
     found = fit_motions(
         joined_positions(work, shaped),
-        np.concatenate([wanted[m] for m in shaped], axis=1).astype(np.float32),
+        joined_displacements(wanted, shaped).astype(np.float32),
         np.concatenate(edges),
         given=work.positions[used],
         motions=work.motions[:, used],

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,9 @@ from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from .fitting import FitOptions, JointFit
 from .geometry import skeleton as sk
+from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
+from .geometry.wanted import Wanted
 from .levels import LodOptions
 from .pivots import Pivot
 
@@ -54,6 +56,10 @@ class RigOptions:
     # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
     # total time.
     between: bool = True
+    # Joints are fitted to meshes of about this number of vertices together: larger meshes are
+    # simplified for the fit. Then weights are carried to all vertices, and blend shapes are made
+    # for the errors there.
+    fit_vertices: int = LARGE
 
 
 @dataclass
@@ -107,7 +113,7 @@ class Work:
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
     head: int  # the joint that no expression moves with the largest weights on moved vertices
-    wanted: dict[int, Doubles] = field(default_factory=dict)  # mesh -> [C, V, 3], released early
+    wanted: dict[int, Wanted] = field(default_factory=dict)  # by mesh, released early
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
     pivots: list[Pivot] = field(default_factory=list)
@@ -120,7 +126,17 @@ class Work:
     )  # joint -> joint that takes its vertices at coarser levels
 
 
-def begin(dna: Dna) -> Work:
+def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
+    """The face, and the displacements of its meshes.
+
+    Args:
+        dna: a face with blend shapes; it is not changed.
+        go_on: called before each mesh and each block of a large mesh; raises an error to stop.
+
+    Raises:
+        ArgumentError: the face has no meshes or joints, nothing moves, or it cannot be used.
+        BudgetError: the tables would be too large for the size of the face.
+    """
     if not dna.meshes or not dna.joint_names:
         raise ArgumentError("a face with meshes and at least one joint was expected")
     require_sizes(dna)
@@ -135,7 +151,7 @@ def begin(dna: Dna) -> Work:
         )
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
-    shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
+    shaped = {c for mesh in dna.meshes for c in sk.shaped_columns(dna, mesh, count)}
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     if not columns:
         raise ArgumentError("a face with controls that move it was expected, found none")
@@ -143,7 +159,7 @@ def begin(dna: Dna) -> Work:
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
     work.combined = together
-    work.wanted = {m: displacements(work, mesh) for m, mesh in enumerate(dna.meshes)}
+    work.wanted = {m: Wanted(work, mesh, go_on) for m, mesh in enumerate(dna.meshes)}
     work.head = _head(work)
     return work
 
@@ -190,6 +206,8 @@ def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
     joints, vertices = len(dna.joint_names), [len(mesh.positions) for mesh in dna.meshes]
     numbers = 9 + 3 * 16  # attributes of a joint, and three matrices for its world transform
     budget.hold(8 * numbers * count * joints, f"{joints:,} joints that {count:,} inputs move")
+    # Large meshes are worked on in blocks.
+    vertices = [min(count, LARGE) for count in vertices]
     budget.hold(8 * joints * max(vertices), f"weights of {joints:,} joints")
     alone = sum(column not in together for column in range(count))
     place = f"{sum(vertices):,} vertices that {alone:,} inputs move"
@@ -208,54 +226,24 @@ def _head(work: Work) -> int:
     dna = work.source
     share = np.zeros(len(dna.joint_names))
     for m, mesh in enumerate(dna.meshes):
-        moved = np.linalg.norm(work.wanted[m], axis=2).max(axis=0)
-        share += moved @ sk.dense_weights(mesh, len(share))
+        vertex, joint, weight = sk.skin_entries(mesh)
+        share += np.bincount(joint, work.wanted[m].farthest[vertex] * weight, len(share))
     still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(0, 2, 3))
     if not still.any():
         raise ArgumentError("a joint that no control moves was expected, such as the head")
     return int(np.argmax(np.where(still, share + 1e-30, -1)))
 
 
-def displacements(work: Work, mesh: Mesh) -> Doubles:
-    """float64[C, V, 3]: displacement of the vertices with each input at 1.
-
-    Args:
-        work: the face of shapes.
-        mesh: one of its meshes.
-    """
-    positions = np.asarray(mesh.positions, np.float64)
-    weights = sk.dense_weights(mesh, len(work.source.joint_names))
-    shapes = sk.column_shapes(work.source, mesh, sk.column_count(work.source))
-    out = np.zeros((len(work.columns), len(positions), 3))
-    rests = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(1, 2, 3))
-    for row, column in enumerate(work.columns):
-        delta = shapes.get(column)
-        if not rests[row]:
-            shaped = positions if delta is None else positions + delta
-            out[row] = sk.skinned(shaped, weights, work.motions[row]) - positions
-        elif delta is not None:
-            out[row] = delta
-    return out
-
-
-def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
+def needs_joints(work: Work, wanted: Wanted) -> bool:
     """Whether blend shapes contribute to a mesh's motion; existing joints alone move an eyeball.
 
     Args:
         work: the face.
-        mesh: one of its meshes.
-        wanted: its displacements float64[E, V, 3].
+        wanted: the displacements of one of its meshes.
     """
-    if not mesh.blend_shape_targets:
+    if not wanted.mesh.blend_shape_targets:
         return False
-    positions = np.asarray(mesh.positions, np.float64)
-    weights = sk.dense_weights(mesh, len(work.source.joint_names))
-    far = 0.0
-    for row in range(len(work.columns)):
-        if wanted[row].any():
-            by_joints = sk.skinned(positions, weights, work.motions[row]) - positions
-            far = max(far, float(np.abs(by_joints - wanted[row]).max()))
-    return far * MM.get(work.source.translation_unit, 10.0) > _RIGID_MM
+    return wanted.by_joints * MM.get(work.source.translation_unit, 10.0) > _RIGID_MM
 
 
 def resting(work: Work) -> Ints:

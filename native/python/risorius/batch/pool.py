@@ -195,7 +195,7 @@ class Pool:
         self._workers.remove(worker)
         self._false_starts = 0 if worker.ready else self._false_starts + 1
         if self._false_starts > 2 * self._count:
-            raise PoolError(f"workers end before they have begun ({how})")
+            raise PoolError(f"worker processes end before they have begun ({how})")
         if job := worker.job:
             self._deaths[job.name] += 1
             if self._deaths[job.name] >= self._attempts:

@@ -130,7 +130,7 @@ def _within(
     if len(written.data) > most:
         more = "" if wishes.meshopt else ", or --meshopt"
         raise GameFaceError(
-            f"{face}: at most {wishes.mb:g} MB were expected, with everything lowered it has "
+            f"{face}: at most {wishes.mb:g} MB were expected, with all reductions the file has "
             f"{_megabytes(written)}: ask for fewer shapes{more}"
         )
     size = wishes.textures

@@ -161,9 +161,11 @@ class Parser:
     def _record(self, name: str, at: int, count: int, end: int, stop: int, depth: int) -> Node:
         node = Node(name, [])
         if depth >= _DEEPEST:
-            raise self.fail(at, f"records {_DEEPEST} deep at most were expected")
+            raise self.fail(at, f"at most {_DEEPEST} levels of nested records were expected")
         if count > end - at:
-            raise self.fail(at, f"{count} values were expected in {end - at} bytes")
+            raise self.fail(
+                at, f"a record of {count} values was expected, its {end - at} bytes are too few"
+            )
         self.budget.hold(_NODE_BYTES + count * _VALUE_BYTES, f"byte {at}: a record {name[:40]}")
         for _ in range(count):
             value, at = self._value(at, end)

@@ -117,7 +117,7 @@ class Document:
         at = f"accessors[{index}]"
         kind = accessor.get("componentType")
         if not _is_key(kind, _TYPES) or accessor.get("type") != "SCALAR":
-            raise self.fail(at, "numbers one by one were expected")
+            raise self.fail(at, "numbers one by one were expected (an accessor of the type SCALAR)")
         if "sparse" in accessor:
             raise self.fail(at, "an accessor that is not sparse was expected")
         dtype = np.dtype(_TYPES[kind])
@@ -125,7 +125,10 @@ class Document:
         view = self.item("bufferViews", accessor.get("bufferView"), at)
         view_at = f"bufferViews[{accessor['bufferView']}]"
         if self.whole(view, "byteStride", view_at, dtype.itemsize) != dtype.itemsize:
-            raise self.fail(view_at, "numbers close together were expected")
+            raise self.fail(
+                view_at,
+                f"numbers close together were expected, found the byteStride {view['byteStride']}",
+            )
         found = self._viewed(accessor, at, dtype, (count, 1))[:, 0]
         self.budget.hold(count * 3 * 8, at)
         out = found.astype(np.float64)
@@ -189,7 +192,7 @@ class Document:
         count = self.whole(sparse, "count", at)
         parts = [sparse.get("indices"), sparse.get("values")]
         if not all(isinstance(part, dict) for part in parts):
-            raise self.fail(at, "indices and values were expected")
+            raise self.fail(at, "tables of indices and values were expected")
         indices, values = (part for part in parts if isinstance(part, dict))
         if indices.get("componentType") not in (5121, 5123, 5125):
             raise self.fail(
@@ -302,7 +305,7 @@ class Document:
         place = f"buffers[{index}]"
         if uri is None:
             if index or self._binary is None:
-                raise self.fail(place, "a uri was expected")
+                raise self.fail(place, "a uri was expected, found none")
             return self._binary
         return self.linked(uri, place)
 
@@ -329,7 +332,11 @@ class Document:
         file = unquote(uri)
         # Only files in the glTF's folder are read, because a uri could name any file on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
-            raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
+            raise self.fail(
+                place,
+                "a file beside this one was expected, in the folder of the glTF, "
+                f"found {uri[:80]!r}",
+            )
         data = read_bytes(self.path.parent / file, found=True)
         # Each reference takes its bytes from the budget, because a short JSON may refer to one
         # large file many times.
@@ -433,7 +440,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         text = chunks[b"JSON"].decode()
     except UnicodeDecodeError as error:
         raise AnimationFileError(
-            name, f"JSON in UTF-8 was expected (byte {error.start})"
+            name, f"JSON in UTF-8 was expected, found a wrong byte (byte {error.start})"
         ) from error
     document = named_json.parse(text, name)
     return open_gltf(path, document, chunks.get(b"BIN\0"), budget)
@@ -536,7 +543,7 @@ def _curves(
         at = f"{place}.channels[{i}]"
         target = channel.get("target") if isinstance(channel, dict) else None
         if not isinstance(target, dict):
-            raise document.fail(at, "a target was expected")
+            raise document.fail(at, f"a target was expected, found {shown(target)}")
         names = _names(document, target, at)
         if not names:
             bones += 1

@@ -470,7 +470,9 @@ def _moved(
         return wanted
     own = _meshes("neutral", surface, neutral, 2)
     if missing := sorted(set(wanted) - set(own)):
-        raise ArgumentError(f"neutral: mesh {missing[0]} was expected as well")
+        raise ArgumentError(
+            f"neutral: positions of mesh {missing[0]} were expected, because frames contains them"
+        )
     rest = surface.rig.initial_raw_controls
     return {m: frames - own[m] + surface.positions(rest, m) for m, frames in wanted.items()}
 

@@ -68,8 +68,8 @@ def empty_page() -> str:
     place = resources.files(__package__).joinpath(_EMPTY)
     if not place.is_file():
         raise WebError(
-            "this build of Risorius has no web page in it: packaging/ship/web.sh makes it, and the "
-            "next wheel that is built has it"
+            "this build of Risorius has no web page: packaging/ship/web.sh makes it, "
+            "then the wheel must be built again"
         )
     return place.read_text(encoding="utf-8")
 

@@ -211,7 +211,9 @@ def with_eyeballs(base: BaseMesh) -> BaseMesh:
 
 
 def gaze(side: str) -> Floats:
-    """float64[3, 3]: rest rotation of an eye; both gazes meet in front of the face.
+    """float64[3, 3]: rotation from the ball's axes (gaze +z) to an eye's rest pose in the face.
+
+    The gazes of both eyes meet in front of the face. The matrix is for column vectors.
 
     Args:
         side: "l" or "r".

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Moves lids so that they touch the eyeball: at rest, in expressions, closed and half closed."""
+"""Moves lids so that they touch the eyeball: neutral, in expressions, closed and half closed."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from . import eyeball
 from .eyeball import IRIS, MM
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
-# Heights above the eye in mm of the four rings of a lid's rim, from the lashes' roots inwards: the
-# skin's edge, the middle of the rim, the contact with the eye, and a ring hidden in the ball.
+# Distances in mm from the eye's surface, positive outside, of the four rings of a lid's rim. From
+# the lashes' roots inwards they are the skin's edge, the middle of the rim, the contact with the
+# eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 # Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
-# round the ball, so without this height they would be inside the ball at half of the look.
+# round the ball, so without this distance they would be inside the ball at half of the look.
 _LIFT = 0.38
 # Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
 # eyes turn by a third of this, and their lower lids stay still.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm by which the lower lid rises in a look
-_SKIN = 0.9  # mm: smallest height above the eye of the skin around the rim
+_SKIN = 0.9  # mm: smallest distance of the skin around the rim from the eye
 # Pairs of controls that together would push the lids into the eye.
 _TOGETHER = (
     ("eyeCheekRaise", "eyeSquintInner"),
@@ -50,7 +51,7 @@ _MOVES = 0.03 * MM  # decimetres: smaller displacements do not move the lids
 
 
 def rotation(degrees: float, axis: int) -> Floats:
-    """float64[3, 3]: a rotation about an axis.
+    """float64[3, 3]: a right-handed rotation about an axis, for column vectors.
 
     Args:
         degrees: angle of the rotation.
@@ -105,8 +106,8 @@ class Lids:
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
-            turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
-            lift: mm by which the rim is above its rest height.
+            turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
+            lift: mm that are added to the rim's distances from the eye's surface, _HEIGHTS.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -121,7 +122,7 @@ class Lids:
             out[_EDGE] += lack[:, :, None] * ray[_EDGE]
             drawn = _FADE[::-1, None] * lack[0]
             out[:ROOT] += drawn[:, :, None] * ray[:ROOT]
-        # Skin around the rim must stay above the eye, too.
+        # Skin around the rim must stay outside of the eye, too.
         arm = out[:ROOT] - self.middle
         length = np.linalg.norm(arm, axis=2)
         angle = np.arccos(np.clip(arm @ gaze / length, -1, 1))
@@ -130,11 +131,11 @@ class Lids:
         return out
 
     def heights(self, grid: Floats, turn: Floats | None = None) -> Floats:
-        """float64[4, COLUMNS]: heights of the rim's rings above the eye, in decimetres.
+        """float64[4, COLUMNS]: distances of the rim's rings from the eye's surface in decimetres.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
-            turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
+            turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -215,7 +216,7 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
     rotates further.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         way: "Up", "Down", "Left" or "Right".
         look: float64[V, 3], the data's displacement of the look.
     """
@@ -226,13 +227,13 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 
 
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
-    """Two displacements from rest that close the lids, float64[V, 3] each.
+    """Two displacements from the rest pose that close the lids, float64[V, 3] each.
 
     The first lays both lids on one line. The second is the data's displacement, shortened because
     it would move the upper lid past the lower lid.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         blink: float64[V, 3], the data's displacement of the blink.
     """
     closed = _lower_closed(lids)
@@ -297,12 +298,12 @@ def _even(share: Floats, known: Floats) -> Floats:
 
 
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
-    """float64[V, 3]: the shortened blink from rest, for the skin outside the grid.
+    """float64[V, 3]: the shortened blink from the rest pose, for skin outside the grid.
 
     It also undoes the displacement that opened the lids to their rest pose.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         blink: float64[V, 3], the data's displacement.
         share: float64[COLUMNS], the fraction of `blink` that is used.
     """
@@ -319,7 +320,7 @@ def between(lids: Lids, way: Floats) -> Floats:
     """float64[V, 3]: correction of half-closed lids, which would move straight through the ball.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         way: float64[V, 3], displacement that closes the lids.
     """
     half = lids.grid(lids.rest + way / 2)
@@ -332,9 +333,9 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
     """float64[V, 3]: a displacement of the skin, corrected so that the lids touch the eye.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         way: float64[V, 3], the displacement.
-        turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
+        turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
     """
     grid = lids.grid(way)
     if turn is None and np.linalg.norm(grid[_EDGE], axis=2).max() < _MOVES:
@@ -349,10 +350,10 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
     """float64[V, 3]: displacement to add so that closed lids stay closed in a second expression.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         blink: float64[V, 3], displacement that closes the lids.
         other: float64[V, 3], displacement of the second expression.
-        turn: float64[3, 3], rotation of the eye by the second expression; None: the eye is at rest.
+        turn: float64[3, 3], rotation of the eye by the second expression; None: no rotation.
     """
     rows = np.ones(len(lids.rings))
     rows[:ROOT] = np.linspace(0, 1, ROOT)
@@ -366,9 +367,9 @@ def stays_on_the_ball(lids: Lids, one: Floats, other: Floats, turn: Floats | Non
     """float64[V, 3]: displacement to add if two controls together push the lids into the eye.
 
     Args:
-        lids: the lids at rest.
+        lids: the lids in their rest pose.
         one, other: float64[V, 3], displacement of each control.
-        turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
+        turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
     """
     both = one + other
     return on_the_ball(lids, both, turn) - both

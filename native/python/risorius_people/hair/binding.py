@@ -53,10 +53,10 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
 
 
 def whereabouts(dna: Dna, head: Mesh) -> Floats:
-    """float64[V, 12]: positions at rest, with an open jaw, and with either eye closed.
+    """float64[V, 12]: positions when neutral, with an open jaw, and with either eye closed.
 
     The poses move upper and lower lips and lids differently. Therefore the point of another head
-    with the nearest 12 numbers is on the same lip or lid, although lips touch at rest.
+    with the nearest 12 numbers is on the same lip or lid, although neutral lips touch.
 
     Args:
         dna: face with the controls.
@@ -226,7 +226,7 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: whether no control moves a place further than `least`, and no neck joint does."""
+    """bool[n]: whether all controls and neck joints move a place by less than `least`."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

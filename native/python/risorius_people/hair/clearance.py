@@ -26,8 +26,8 @@ from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
 _NEAR = 0.3  # decimetres: skin further than this from every hair is ignored
 _SOME = 256  # number of hair points that determine which skin is near
-_LOW = 0.002  # decimetres: height above the skin that an end must keep, unless it is lower at rest
-_DEEPER = 0.002  # decimetres by which a root, which is in the skin, may sink deeper than at rest
+_LOW = 0.002  # decimetres: smallest height of an end above the skin, or its neutral height
+_DEEPER = 0.002  # decimetres by which a root in the skin may be deeper than in the neutral pose
 # decimetres: a control that moves no skin farther than this cannot bring a hair into the skin
 _STILL = 0.002
 # decimetres: a control that moves the skin under a hair by less than this does not affect the hair
@@ -257,7 +257,7 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """bool[n]: whether a hair comes too near to the skin, and nearer than at rest."""
+    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose."""
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))

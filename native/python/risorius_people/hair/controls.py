@@ -16,7 +16,8 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# Control -> (-1: half of the lid at the nose, 1: at the temple; shift of the tip in hair lengths).
+# Control -> (half of the lid: -1 at the nose, 1 at the temple; shift (x, y, z) of a hair's tip in
+# hair lengths).
 _WAYS = {
     "eyelashesUpIN": (-1, (0.0, 1.0, -0.3)),
     "eyelashesUpOUT": (1, (0.0, 1.0, -0.3)),
@@ -111,7 +112,7 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _channels(dna: Dna, lod: int) -> dict[str, int]:
-    """Name -> number of the blend shape channels of a LOD."""
+    """Name -> index, for each blend shape channel of a LOD."""
     listed = {int(c) for c in dna.lod_blend_shape_mapping[lod]}
     names = enumerate(dna.blend_shape_channel_names)
     return {name: channel for channel, name in names if channel in listed}

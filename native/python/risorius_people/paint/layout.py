@@ -75,7 +75,7 @@ def _unit(places: Floats) -> Floats:
 
 
 def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
-    """Maps [0, 1] onto itself, with `more` times the density in the middle as at the ends."""
+    """Maps [0, 1] onto itself so that the middle is stretched `more` times as much as the ends."""
     steps = np.linspace(0, 1, 513)
     density = 1 + (more - 1) * np.exp(-(((steps - middle) / reach) ** 4))
     total = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])

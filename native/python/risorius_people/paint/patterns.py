@@ -40,7 +40,7 @@ class Dots:
     Attributes:
         near: float32[side, side], distance to the nearest point, in sides of a cell.
         gap: float32[side, side], distance to the second nearest point minus `near`.
-        rank: float32[side, side], random number of the nearest point, 0 to 1.
+        rank: float32[side, side], random number from 0 to 1 that belongs to the nearest point.
     """
 
     near: Floats

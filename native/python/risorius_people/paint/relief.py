@@ -50,7 +50,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
 
 
 def normals(skin: Skin, height: Floats) -> Floats:
-    """float32[size, size, 3] in [0, 1]: normals of a relief in texture space.
+    """float32[size, size, 3]: unit normals n of a relief in texture space, stored as 0.5 + 0.5 n.
 
     Args:
         skin: skin of the face.

@@ -24,7 +24,7 @@ from .skin import HEAD_SIZE, Skin, Texels
 
 MASK_SIZE = 512
 WRINKLE_SHARE = 2  # width of a texel of the wrinkle sets, in texels of the colour
-# (ages in years), (fraction of each fold's depth that is left in the face at rest).
+# (ages in years), (fraction of each fold's depth that is left in the neutral face).
 STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))
 # Decimetres above the eyes over which the frown's lines fade out, because further up they would
 # cross the lines of the forehead.
@@ -85,7 +85,7 @@ class Wrinkles:
         pictures: file name -> image: a mask for each expression, and a normal map for each texture
             set, which several expressions share.
         sets: number of a texture set -> file name of its normal map.
-        still: float32[h, w], 0 to 1, depth of each texel in a fold of the face at rest.
+        still: float32[h, w], 0 to 1, depth of each texel in a fold of the neutral face.
     """
 
     pictures: dict[str, Floats]

@@ -239,7 +239,7 @@ def two_handles():
 
 
 def kept(key):
-    """A list property of the control armature; empty if the property is missing."""
+    """The list in the control armature's custom property `key`; empty if it is missing."""
     return list(rig()["risorius_controls"].get(key, ()))
 
 
@@ -287,7 +287,7 @@ def board_in_view(names):
 
 
 def least_travel(names):
-    """The smallest travel of these handles from rest to the end of an axis, pixels."""
+    """The smallest travel of these handles from neutral to the end of an axis, pixels."""
     controls, found = rig()["risorius_controls"], []
     for bone in (controls.pose.bones[n] for n in names):
         limit = next((c for c in bone.constraints if c.type == "LIMIT_LOCATION"), None)

@@ -96,7 +96,7 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Key rest, a blink, surprise and rest. Check the keyframes in all editors, and move a few."""
+    """Insert keyframes (neutral, blink, surprise, neutral), check them in editors, move a few."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -203,7 +203,7 @@ def gaze(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _turn(hand: Hand) -> Iterator[Check]:
-    """Select the head bone by a click on its outline, turn and key it, and add a blink."""
+    """Click on the head bone's outline, turn the bone, insert a keyframe, and add a blink."""
     hand.ask("center", zoom=0.6)
     hand.still()
     hand.click(*hand.ask("outline_at", bone="head"))

@@ -65,7 +65,7 @@ def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def handles(hand: Hand) -> Iterator[Check]:
-    """Test handles: select by clicks, drag together, key by I, hide by H, show by Alt-H."""
+    """Test handles: select by clicks, drag together, keyframe by I, hide by H, show by Alt-H."""
     hand.ask("run", code=HANDLES.format(True))
     selected = "risorius_handles_selected"
     low, high = hand.ask("two_handles")

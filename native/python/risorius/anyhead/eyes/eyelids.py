@@ -345,17 +345,16 @@ class Eyelids:
         columns = self.opening.across
         out, far = np.full((2, len(columns)), np.nan)
         clear = away - self.ball.reach(self.opening.frame.rays(across, up), turn)
-        for k, column in enumerate(columns):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                share = (column - across[a]) / (across[b] - across[a])
-            on = (share >= 0) & (share <= 1)
-            s = share[on]
-            over = (1 - s) * clear[a[on]] + s * clear[b[on]] > -0.02 * self.mm
-            places = ((1 - s) * up[a[on]] + s * up[b[on]])[over]
-            if len(places):
-                at = int(places.argmin() if upper else places.argmax())
-                out[k] = places[at]
-                far[k] = ((1 - s) * away[a[on]] + s * away[b[on]])[over][at]
+        edge, column = _crossings(columns, across[a], across[b])
+        a, b = a[edge], b[edge]
+        s = (columns[column] - across[a]) / (across[b] - across[a])
+        over = (1 - s) * clear[a] + s * clear[b] > -0.02 * self.mm
+        a, b, s, column = a[over], b[over], s[over], column[over]
+        places = (1 - s) * up[a] + s * up[b]
+        order = np.lexsort((places if upper else -places, column))
+        best = order[np.diff(column[order], prepend=-1) > 0]  # the first of each column
+        out[column[best]] = places[best]
+        far[column[best]] = ((1 - s) * away[a] + s * away[b])[best]
         return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
@@ -407,6 +406,22 @@ class Eyelids:
             total = np.bincount(a, lift[b], len(lift)) + np.bincount(b, lift[a], len(lift))
             lift = np.maximum(need, total / np.maximum(count, 1))
         return lift
+
+
+def _crossings(columns: Doubles, begins: Doubles, ends: Doubles) -> tuple[Ints, Ints]:
+    """int64[n] each: edges and columns that cross.
+
+    Args:
+        columns: float64[k], ascending.
+        begins, ends: float64[E], values of both ends of each edge.
+    """
+    low, high = np.minimum(begins, ends), np.maximum(begins, ends)
+    first = np.searchsorted(columns, low, "left")
+    number = np.searchsorted(columns, high, "right") - first
+    number[high == low] = 0
+    edge = np.repeat(np.arange(len(number)), number)
+    step = np.arange(len(edge)) - np.repeat(np.cumsum(number) - number, number)
+    return edge, first[edge] + step
 
 
 def _even(values: Doubles) -> Doubles:

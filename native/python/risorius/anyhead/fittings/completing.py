@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ... import Dna
 from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles
+from ...author.geometry.sparse import subset
 from ...author.heads.islands import islands_of
 from ...author.heads.parts import HeadPart
 from ...author.input.obj import ObjMesh
@@ -20,6 +21,7 @@ from ..eyes.eyeballs import Eyeball
 from ..eyes.eyelids import Eyelids, find_eyelids
 from ..eyes.opening import Opening, find_opening, near_eye
 from ..surface import Surface
+from ..telling import Progress, telling
 from .fitted import BROWS, EYE, GUMS, LASHES, SKIN, TEETH, TONGUE, Fitted, Fittings
 from .following import Followers
 from .similarity import Similarity, similarity
@@ -37,16 +39,21 @@ _THROUGH = 0.02  # cm that teeth may come through the skin
 _SIDES = {"L": "left", "R": "right"}
 
 
-def complete(found: Fittings, template: Dna, laid: Doubles) -> Fittings:
+def complete(
+    found: Fittings, template: Dna, laid: Doubles, progress: Progress | None = None
+) -> Fittings:
     """The meshes of a head, completed with meshes of a template.
 
     Args:
         found: the meshes of the head.
         template: a face of a DNA file.
         laid: float64[V, 3], positions of the vertices of the template's skin on the head.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
 
     Raises:
         ArgumentError: the length of `laid` is not the vertex count of the template's skin.
+        Stopped: `progress` returned False.
     """
     number, parts = template_parts(template)
     skin = parts[number].mesh
@@ -55,7 +62,7 @@ def complete(found: Fittings, template: Dna, laid: Doubles) -> Fittings:
             f"{len(skin.positions):,} vertices of the template's skin were expected, found "
             f"{len(laid):,}"
         )
-    return _Completing(found, sort_parts(parts), skin, laid).made()
+    return _Completing(found, sort_parts(parts), skin, laid).made(telling(progress))
 
 
 class _Completing:
@@ -67,13 +74,22 @@ class _Completing:
             found, rows=list(found.rows), eyes=dict(found.eyes), notes=list(found.notes)
         )
 
-    def made(self) -> Fittings:
-        fitted = [side for side in "LR" if side not in self.found.eyes and self._eye(side)]
+    def made(self, tell: Callable[[float], object]) -> Fittings:
+        """The completed meshes. tell: gets the finished share of the work."""
+        fitted = []
+        for share, side in ((0.1, "L"), (0.3, "R")):
+            tell(share)
+            if side not in self.found.eyes and self._eye(side):
+                fitted.append(side)
+        tell(0.5)
         if not self.found.of(LASHES):
             self._laid_on(LASHES)
+        tell(0.7)
         if len(fitted) == 2:
             self._laid_on(SKIN)
+        tell(0.8)
         self._mouth()
+        tell(1.0)
         return self.out
 
     def _eye(self, side: str) -> bool:
@@ -191,23 +207,31 @@ def _size(opening: Opening) -> float:
     return float(heights.mean() * (opening.across[-1] - opening.across[0]))
 
 
-def head_parts(fittings: Fittings, expressions: Mapping[str, Doubles]) -> list[HeadPart]:
+def head_parts(
+    fittings: Fittings, expressions: Mapping[str, Doubles], progress: Progress | None = None
+) -> list[HeadPart]:
     """All meshes of a head with their expressions. Lashes, brows and meshes that lie on the skin
     follow it; other meshes keep their own shapes or are rigid.
 
     Args:
         fittings: the meshes of the head.
         expressions: float64[V, 3] by raw control, displacements of the skin.
+        progress: receives the finished share of the work, 0 to 1; stops the work if it returns
+            False.
+
+    Raises:
+        Stopped: `progress` returned False.
     """
-    face = fittings.face
+    face, tell = fittings.face, telling(progress)
     skin = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
-    out = [replace(face, shapes=dict(expressions))]
-    for row in fittings.rows:
+    out = [replace(face, shapes=subset(expressions, expressions))]
+    for number, row in enumerate(fittings.rows):
+        tell(number / len(fittings.rows))
         if row.kind not in (LASHES, BROWS, SKIN):
             out.append(row.part)
             continue
         islands = islands_of(row.part.mesh) if row.kind == LASHES else None
         follow = Followers(skin, row.part.mesh.positions, islands)
-        shapes = follow.ways(dict(expressions))
-        out.append(replace(row.part, shapes=row.part.shapes | shapes))
+        shapes = follow.ways(expressions)
+        out.append(replace(row.part, shapes={**row.part.shapes, **shapes}))
     return out

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,7 +13,8 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 
 _PATCH = 16  # skin vertices whose rotation a point follows
-_BLOCK = 256  # patches that are computed together, to limit memory
+_BLOCK = 64  # patches that are computed together, to limit memory
+_REACHES = (0.5, 2.0)  # cm around the points in which their patches are searched first
 _MOVED = 1e-5  # cm: smaller motions are ignored
 
 
@@ -66,7 +69,7 @@ class Followers:
         out[on] = there[own[on]] + np.einsum("nij,nj->ni", turn[own[on]], arm)
         return out
 
-    def ways(self, expressions: dict[str, Doubles]) -> dict[str, Doubles]:
+    def ways(self, expressions: Mapping[str, Doubles]) -> dict[str, Doubles]:
         """float64[n, 3] by name: displacements of the points; expressions without motion are left
         out.
 
@@ -99,14 +102,33 @@ def _patches(skin: Surface, anchors: Ints, size: int) -> Ints:
     normal counts as 1 cm farther."""
     normals = skin.normals()
     out = np.zeros((len(anchors), size), np.int64)
+    order = np.argsort(skin.points[anchors, 0], kind="stable")
     for begin in range(0, len(anchors), _BLOCK):
-        own = anchors[begin : begin + _BLOCK]
-        away = np.linalg.norm(skin.points[own][:, None] - skin.points[None], axis=2)
-        # Vertices with an opposite normal may be on the other lid or on the inside of a lip.
-        against: npt.NDArray[np.bool_] = normals[own] @ normals.T < 0.0
-        away = np.where(against, away + 1.0, away)
-        out[begin : begin + _BLOCK] = np.argpartition(away, size - 1, axis=1)[:, :size]
+        rows = order[begin : begin + _BLOCK]
+        places = skin.points[anchors[rows]]
+        for reach in (*_REACHES, np.inf):  # most patches lie within the first reach
+            low, high = places.min(axis=0) - reach, places.max(axis=0) + reach
+            near = np.flatnonzero(((skin.points >= low) & (skin.points <= high)).all(axis=1))
+            if len(near) < size:
+                continue
+            found, farthest = _closest(skin.points, normals, anchors[rows], near, size)
+            if farthest < reach:
+                break
+        out[rows] = found
     return out
+
+
+def _closest(
+    points: Doubles, normals: Doubles, own: Ints, near: Ints, size: int
+) -> tuple[Ints, float]:
+    """int64[n, size]: for the vertices `own` the nearest vertices among `near`; the largest of
+    their distances, in which 1 cm is added for an opposite normal."""
+    away = np.sqrt(sum((points[own, k][:, None] - points[near, k][None]) ** 2 for k in range(3)))
+    # Vertices with an opposite normal may be on the other lid or on the inside of a lip.
+    against: npt.NDArray[np.bool_] = normals[own] @ normals[near].T < 0.0
+    away[against] += 1.0
+    found = np.argpartition(away, size - 1, axis=1)[:, :size]
+    return near[found], float(np.take_along_axis(away, found, axis=1).max())
 
 
 def _turns(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:

@@ -63,9 +63,11 @@ def start_of(
 
 
 def _like(seen: Target, pose: Pose) -> HeadForm:
-    """The model with a mean that is changed so that it lies on a surface with the weights of a
-    pose. Thus a fit to another head compares the two surfaces, and what the model does not know of
-    the one does not count as a difference."""
+    """The model with another mean: with the weights of the pose, it lies exactly on the surface.
+
+    So a later fit to another head compares the two surfaces. Details of the first surface that the
+    model cannot represent are then in the mean, and do not count as a difference.
+    """
     form = head_form()
     shaped = form.shaped(pose.parts, pose.expressions)
     normals = pose_normals(form, pose, shaped)

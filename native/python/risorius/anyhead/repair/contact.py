@@ -47,14 +47,16 @@ class Contacts:
             bodies: teeth and gums.
         """
         self.skin, self.bodies = skin, bodies
-        sizes = np.array([len(face) for face in faces], np.int64)
+        sizes = np.fromiter(map(len, faces), np.int64, len(faces))
         self._offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.uint32)
-        self._corners = np.concatenate([np.asarray(face, np.int64) for face in faces])
+        corners = itertools.chain.from_iterable(faces)
+        self._corners = np.fromiter(corners, np.int64, int(sizes.sum()))
         of_triangle = np.repeat(np.arange(len(faces)), np.maximum(sizes - 2, 0))
         self._face_of = of_triangle if len(of_triangle) == len(skin.triangles) else None
         self._area = self._areas(skin.points, np.arange(len(skin.triangles)))
         self._checker: SkinChecker | None = None
         self._rest: SkinFaults | None = None
+        self._edges: Ints | None = None
         self._near = self._near_teeth()
         self._rest_depth = self._depth(skin.points[self._near], bodies.rest)
         area = np.zeros(len(skin.points))
@@ -125,23 +127,26 @@ class Contacts:
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
         """float64[V, 3]: displacements with skin pushed out of teeth along the teeth's normals,
         and a smooth fall-off around the pushed skin."""
-        points = self.skin.points + displacement
-        edges = self._edges()
+        if self._edges is None:
+            self._edges = self._edges_near_teeth()
+        out = displacement.copy()
+        points = self.skin.points[self._near] + displacement[self._near]
         for _ in range(_ROUNDS):
-            push = np.zeros_like(points)
-            depth, normal = self._depths(points[self._near], posed)
+            depth, normal = self._depths(points, posed)
             lack = np.maximum(depth - self._rest_depth, 0.0)
             if lack.max(initial=0.0) < _DEEP:
                 break
-            push[self._near] = lack[:, None] * normal
-            points = points + _spread(push, edges)
-        return np.asarray(points - self.skin.points)
+            moved = _spread(lack[:, None] * normal, self._edges)
+            points = points + moved
+            out[self._near] += moved
+        return out
 
-    def _edges(self) -> Ints:
-        near = np.zeros(len(self.skin.points), bool)
-        near[self._near] = True
-        edges = self.skin.edges()
-        return np.asarray(edges[near[edges].all(axis=1)])
+    def _edges_near_teeth(self) -> Ints:
+        """int64[E, 2]: edges between vertices near teeth and gums, as indices in `_near`."""
+        place = np.full(len(self.skin.points), -1)
+        place[self._near] = np.arange(len(self._near))
+        edges = place[self.skin.edges()]
+        return np.asarray(edges[(edges >= 0).all(axis=1)])
 
     def _made(self) -> SkinChecker:
         if self._checker is None:
@@ -220,17 +225,19 @@ class Contacts:
             return deepest, out
         for solid, triangles in zip(posed, self.bodies.triangles, strict=True):
             tree = ClosestPoints(solid, np.ascontiguousarray(triangles, np.int32))
-            triangle, shares, distance = tree.nearest(points)
+            found, shares, distance = tree.nearest(points, farthest=_INSIDE)
+            near = np.flatnonzero(found >= 0)
+            triangle, shares, distance = found[near].astype(np.int64), shares[near], distance[near]
             surface = Surface(solid, triangles)
             normals = surface.normals()[triangles[triangle]]
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-            arm = points - surface.at(triangle.astype(np.int64), shares)
+            arm = points[near] - surface.at(triangle, shares)
             # Excludes points next to the open border of gums, because these points are not inside.
             inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
             inside &= distance < _INSIDE
-            deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
-            deepest[deeper], out[deeper] = distance[deeper], normal[deeper]
+            deeper: Mask = inside & (distance > deepest[near])
+            deepest[near[deeper]], out[near[deeper]] = distance[deeper], normal[deeper]
         return deepest, out
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
+from ...author.geometry.sparse import SparseShapes
+from ...base.patience import patiently
 from ..errors import Stopped
 from ..eyes.eyelids import Eyelids, find_eyelids
 from ..fittings.fitted import Bodies, Fittings, eye_turn_of
@@ -46,8 +49,8 @@ class Repaired:
         report: faults before and after the repair.
     """
 
-    expressions: dict[str, Doubles]
-    combinations: dict[Pose, Doubles]
+    expressions: SparseShapes[str]
+    combinations: SparseShapes[Pose]
     report: Report
 
 
@@ -80,26 +83,32 @@ def repair(
     del registered
     closing = closing_pose(expressions, combinations)
     work = Repairing(target, faces, parts, landmarks, expressions, closing)
-    singles: dict[str, Doubles] = {}
+    singles = SparseShapes[str](len(target.points))
     jobs = len(expressions) + len(combinations) + 1
     for number, (name, way) in enumerate(expressions.items()):
-        singles[name] = work.repaired((name,), np.asarray(way, np.float64))
-        if progress is not None and progress(number / jobs) is False:
-            raise Stopped
-    together = dict(combinations)
+        one = partial(work.repaired, (name,), np.asarray(way, np.float64))
+        singles[name] = patiently(one, partial(_ask, progress, number / jobs))
+        _ask(progress, number / jobs)
+    together = SparseShapes[Pose](len(target.points), combinations)
     if closing and not any(set(pose) == set(closing) for pose in together):
         together[closing] = _together(closing, expressions, combinations)
-    out: dict[Pose, Doubles] = {}
+    out = SparseShapes[Pose](len(target.points))
     for number, (pose, way) in enumerate(together.items(), len(expressions)):
         changes = [singles[c] - expressions[c] for c in pose if c in singles]
-        out[pose] = work.repaired(pose, np.asarray(way, np.float64) + sum(changes, np.zeros(1)))
-        if progress is not None and progress(number / jobs) is False:
-            raise Stopped
+        whole = np.asarray(way, np.float64) + sum(changes, np.zeros(1))
+        one = partial(work.repaired, pose, whole)
+        out[pose] = patiently(one, partial(_ask, progress, number / jobs))
+        _ask(progress, number / jobs)
     for name in dict.fromkeys(name for pose in out for name in pose):
         if name not in singles and not name.startswith(_ELSEWHERE):
             singles[name] = np.zeros_like(target.points)
     parts.notes.extend(work.report.notes)
     return Repaired(singles, out, work.report)
+
+
+def _ask(progress: Progress | None, share: float) -> None:
+    if progress is not None and progress(share) is False:
+        raise Stopped
 
 
 def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:

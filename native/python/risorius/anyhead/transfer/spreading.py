@@ -8,11 +8,14 @@ continuation of their neighbours' values over the head's triangles.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
+from ..telling import Progress, telling
 from .smoothing import Smoothing, areas
 
 _FACING = 0.4  # least cosine between the normals of a vertex and its point on the template
@@ -40,6 +43,7 @@ class Spreading:
         trust: Doubles,
         parting: Doubles | None = None,
         threads: int = 0,
+        progress: Progress | None = None,
     ) -> None:
         """Find the template's point of each vertex, and factorise the smoothing system.
 
@@ -50,7 +54,13 @@ class Spreading:
             parting: float64[template vertices, n, 3], displacements of n poses that part lips and
                 lids; they reveal head vertices that are matched to the wrong side of a slit.
             threads: number of threads; 0: one for each core.
+            progress: receives the finished share of the work, 0 to 1; stops the work if it
+                returns False.
+
+        Raises:
+            Stopped: `progress` returned False.
         """
+        tell = telling(progress)
         self._of, first = _merged(target)
         merged = Surface(target.points[first], self._of[target.triangles])
         self._threads = threads
@@ -64,22 +74,32 @@ class Spreading:
         sure = np.einsum("nk,nk->n", self._shares, np.maximum(trust, _UNSURE)[self._corners])
         near = np.exp(-np.square(np.where(found, distance, _FARTHEST) / _NEAR))
         self._held = np.where(found, sure * near, 0.0)
+        tell(0.2)
         area, smoothing = areas(merged), Smoothing(merged)
         if parting is not None and parting.size:
-            self._held *= self._fitting(smoothing, area, parting)
+            rounds = telling(progress, 0.2, 0.8)
+            self._held *= self._fitting(smoothing, area, parting, rounds)
+        tell(0.8)
         self.known = self._held[self._of]
         self._held *= area
         self._solver = smoothing.solver(self._held + _AT_REST * area, _EVENED)
 
-    def _fitting(self, smoothing: Smoothing, area: Doubles, parting: Doubles) -> Doubles:
+    def _fitting(
+        self, smoothing: Smoothing, area: Doubles, parting: Doubles, tell: Callable[[float], bool]
+    ) -> Doubles:
         """float64[n], 0 to 1: how close the motion of each vertex in the poses is to its
-        neighbours' motion."""
+        neighbours' motion.
+
+        tell: gets the finished share of the work.
+        """
         longest = np.linalg.norm(parting, axis=2).max(axis=0)
         values = self._values(parting.reshape(len(parting), -1))
         fits = np.ones(len(values))
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
+            tell(number / _ROUNDS)
             held = self._held * fits * area
             solver = smoothing.solver(held + _AT_REST * area, _ASIDE)
+            tell((number + 0.5) / _ROUNDS)
             even = solver.solve(values * held[:, None], self._threads)
             off = np.linalg.norm((values - even).reshape(len(values), -1, 3), axis=2) / longest
             fits = np.square(1.0 / (1.0 + np.square(off.max(axis=1) / _OUTLIER)))

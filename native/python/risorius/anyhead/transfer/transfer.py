@@ -8,14 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
+from ...author.geometry.sparse import SparseShapes
 from ..errors import AnyHeadError, Stopped
 from ..form.teeth import JawChange
 from ..surface import Surface
 from .carrying import Carrying
 from .spreading import Spreading
-from .template import Floats, Pose, Progress, TemplateFace
+from .template import Pose, Progress, TemplateFace
 
-_AT_ONCE = 24  # poses that are solved together
+_AT_ONCE = 24  # most poses that are solved together
+_AT_ONCE_NUMBERS = 10_000_000  # coordinates that are solved together
 _LEAST = 1e-3  # cm: smaller motions are set to 0
 _PARTING = ("jawOpen", "eyeBlinkL", "eyeBlinkR", "mouthUpperLipRaiseL", "mouthUpperLipRaiseR",
             "mouthLowerLipDepressL", "mouthLowerLipDepressR")  # fmt: skip
@@ -40,12 +42,12 @@ class Transferred:
     """The expressions of another head.
 
     Attributes:
-        ways: float32[V, 3] by pose, displacements of the head's vertices in cm. A corrective has
-            only its addition to the displacements of its controls.
+        ways: displacements [V, 3] of the head's vertices in cm, by pose. A corrective has only
+            its addition to the displacements of its controls.
         known: float64[V], 0 to 1: confidence in the template's point of each vertex.
     """
 
-    ways: dict[Pose, Floats]
+    ways: SparseShapes[Pose]
     known: Doubles
 
 
@@ -81,18 +83,20 @@ def transfer(
     ways = Carrying(face, points, trust, teeth).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
-    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
+    begun = None if progress is None else lambda share: progress(0.1 + 0.1 * share)
+    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads, begun)
     if not (spreading.known > 0.1).any():
         raise AnyHeadError("the fitted template touches no part of the head: check the landmarks")
     _tell(progress, 0.2)
-    out: dict[Pose, Floats] = {}
+    out = SparseShapes[Pose](len(target.points))
     poses = list(ways)
-    for start in range(0, len(poses), _AT_ONCE):
-        some = poses[start : start + _AT_ONCE]
+    count = int(np.clip(_AT_ONCE_NUMBERS // max(3 * len(target.points), 1), 2, _AT_ONCE))
+    for start in range(0, len(poses), count):
+        some = poses[start : start + count]
         found = spreading.spread(np.concatenate([ways[pose] for pose in some], axis=1))
         for pose, way in zip(some, np.split(found, len(some), axis=1), strict=True):
             length = np.linalg.norm(way, axis=1, keepdims=True)
-            out[pose] = (way * (length > _LEAST)).astype(np.float32)
+            out[pose] = way * (length > _LEAST)
         _tell(progress, 0.2 + 0.8 * (start + len(some)) / len(poses))
     return Transferred(out, spreading.known)
 

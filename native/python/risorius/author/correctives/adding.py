@@ -9,9 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import BlendShapeTarget, Dna, Mesh, Psds
+from ..._native import ClosestPoints, SkinChecker
 from ...base.errors import ArgumentError
 from ..geometry import skeleton as sk
 from ..geometry.polygon_mesh import vertex_normals
+from ..geometry.simplify import fan_triangles
 from ..geometry.skeleton import Doubles, Ints
 from ..work import MM, listed_meshes
 from .poser import Controls, make_checker, skin_and_solids
@@ -113,7 +115,7 @@ def _add_targets(
 ) -> None:
     solids = set(skin_and_solids(dna)[1])
     skins = {skin_and_solids(dna, (), lod)[0] for lod in _whole_levels(dna)}
-    checker = make_checker(dna, skin, [])
+    nearest = _Nearest(dna, skin)
     mm = MM.get(dna.translation_unit, 10.0)
     made = list(dna.meshes)
     mapping = [tuple(map(int, row)) for row in dna.mesh_blend_shape_channel_mapping]
@@ -131,8 +133,7 @@ def _add_targets(
             # lashes point to both sides, so normals are not compared there.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
-            found, shares, distance = checker.nearest(points, normals)
-            corners = found.astype(np.int64)
+            corners, shares, distance = nearest.of(points, normals)
             fade = np.clip((_FAR_MM - distance) / (_FAR_MM - _NEAR_MM), 0, 1)
             shares = shares * fade[:, None]
         targets = list(mesh.blend_shape_targets)
@@ -157,6 +158,35 @@ def _add_targets(
         made[m] = mesh
     dna.meshes = made
     dna.mesh_blend_shape_channel_mapping = np.array(mapping).reshape(-1, 2)
+
+
+class _Nearest:
+    """The nearest points of a skin at rest."""
+
+    def __init__(self, dna: Dna, skin: int) -> None:
+        self._dna, self._skin = dna, skin
+        self._checker: SkinChecker | None = None
+        mesh = dna.meshes[skin]
+        self._triangles = np.asarray(mesh.layout_positions, np.int64)[fan_triangles(mesh)]
+        self._tree = ClosestPoints(
+            np.asarray(mesh.positions, np.float64), self._triangles.astype(np.int32)
+        )
+
+    def of(self, points: Doubles, normals: Doubles) -> tuple[Ints, Doubles, Doubles]:
+        """int64[n, 3], corners of the nearest triangle; float64[n, 3], their shares; float64[n],
+        distances in mm.
+
+        Args:
+            points: float64[n, 3].
+            normals: float64[n, 3], normals of the points that the skin must have too, or empty.
+        """
+        if len(normals):  # topology makes the checker expensive for a large skin
+            self._checker = self._checker or make_checker(self._dna, self._skin, [])
+            corners, shares, distance = self._checker.nearest(points, normals)
+            return corners.astype(np.int64), shares, distance
+        triangle, shares, distance = self._tree.nearest(points)
+        mm = MM.get(self._dna.translation_unit, 10.0)
+        return self._triangles[triangle], np.asarray(shares), mm * np.asarray(distance)
 
 
 def _more(target: BlendShapeTarget, shape: Doubles, mm: float) -> BlendShapeTarget:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,12 +31,14 @@ def polygon_mesh(
         uvs: float64[T, 2], texture coordinates.
         uv_faces: indices into `uvs` of each polygon's corners.
     """
-    corners = [
-        pair
-        for face, uv_face in zip(faces, uv_faces, strict=True)
-        for pair in zip(face, uv_face, strict=True)
-    ]
-    layouts, index = np.unique(np.array(corners), axis=0, return_inverse=True)
+    sizes = np.fromiter(map(len, faces), np.int64, len(faces))
+    vertices, places = (
+        np.fromiter(itertools.chain.from_iterable(of), np.int64, int(sizes.sum()))
+        for of in (faces, uv_faces)
+    )
+    count = max(int(places.max(initial=0)) + 1, 1)
+    key, index = np.unique(vertices * count + places, return_inverse=True)
+    layouts = np.stack(np.divmod(key, count), axis=1)
     return Mesh(
         positions=positions,
         texture_coordinates=uvs,
@@ -43,7 +46,7 @@ def polygon_mesh(
         layout_positions=layouts[:, 0],
         layout_texture_coordinates=layouts[:, 1],
         layout_normals=layouts[:, 0],
-        face_offsets=np.concatenate([[0], np.cumsum([len(face) for face in faces])]),
+        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
         face_layouts=index.ravel(),
     )
 
@@ -63,6 +66,7 @@ def vertex_normals(positions: Floats, faces: Sequence[Sequence[int]]) -> Floats:
         for k in range(1, size - 1):
             area += np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
         for k in range(size):
-            np.add.at(normals, table[:, k], area)
+            for axis in range(3):
+                normals[:, axis] += np.bincount(table[:, k], area[:, axis], len(normals))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 0, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])

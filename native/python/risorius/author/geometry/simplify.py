@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ... import Mesh, _native
+from .blocks import LARGE
 from .skeleton import Doubles, Ints
 
 _UV = 0.5  # weight of texture coordinates relative to positions in units of the mesh' size
@@ -39,27 +40,40 @@ def fan_triangles(mesh: Mesh) -> Ints:
     return layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
-def attributes_of(mesh: Mesh, displacements: Doubles) -> Floats:
+def attributes_of(
+    mesh: Mesh, some: Doubles, blocks: Iterable[tuple[Ints, Mesh, Doubles]] | None = None
+) -> Floats:
     """float32[layouts, n]: texture coordinates and principal components of the displacements.
 
     Args:
         mesh: the mesh.
-        displacements: float64[E, V, 3], displacements of its vertices by the expressions.
+        some: float64[E, n, 3], displacements of all or many vertices by the expressions, which
+            determine the components.
+        blocks: indices of the vertices, part of the mesh and displacements float64[E, n, 3] of
+            each block; each vertex is in one. None: `some` has all vertices.
     """
     size = _size(mesh)
     places = np.asarray(mesh.layout_positions, np.int64)
     uvs = np.asarray(mesh.texture_coordinates, np.float64)
     own = uvs[np.asarray(mesh.layout_texture_coordinates, np.int64)]
-    moving = np.abs(displacements).max(axis=(1, 2), initial=0.0) > 0
-    displacements = displacements[moving]
-    if not len(displacements):
+    moving = np.flatnonzero(some.any(axis=(1, 2)))
+    if not len(moving):
         return (_UV * own).astype(np.float32)
-    moved = displacements.transpose(1, 0, 2).reshape(len(mesh.positions), -1) / size
+    moved = _by_vertex(some, moving) / size
     spread, axes = np.linalg.eigh(moved.T @ moved)
     main = axes[:, np.argsort(-spread, kind="stable")[:_COMPONENTS]]
     # The sign of an eigenvector is arbitrary. Its largest entry is made positive on every machine.
     main = main * np.where(main[np.abs(main).argmax(axis=0), range(main.shape[1])] < 0, -1, 1)
-    return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]]).astype(np.float32)
+    along = np.zeros((len(mesh.positions), main.shape[1]))
+    for vertices, _, displacements in blocks or [(np.arange(len(along)), mesh, some)]:
+        along[vertices] = _by_vertex(displacements, moving) / size @ main
+    return np.column_stack([_UV * own, _MOTION * along[places]]).astype(np.float32)
+
+
+def _by_vertex(displacements: Doubles, expressions: Ints) -> Doubles:
+    """float64[V, 3 n]: the displacements [E, V, 3] by n of the expressions."""
+    own = displacements[expressions]
+    return own.transpose(1, 0, 2).reshape(own.shape[1], -1)
 
 
 def _size(mesh: Mesh) -> float:
@@ -90,17 +104,21 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
     label = np.arange(count)
     begins = np.cumsum(sizes) - sizes
     while len(sizes):
-        least = np.minimum.reduceat(label[corners], begins)
-        new = label.copy()
-        np.minimum.at(new, corners, np.repeat(least, sizes))
-        new = new[new]
-        if np.array_equal(new, label):
+        own = label[corners]
+        least = np.repeat(np.minimum.reduceat(own, begins), sizes)
+        larger = own > least
+        if not larger.any():
             break
-        label = new
+        np.minimum.at(label, own[larger], least[larger])
+        above = label[label]
+        while not np.array_equal(above, label):
+            label, above = above, above[above]
     return label
 
 
-def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
+def fewer_triangles(
+    mesh: Mesh, attributes: Floats, vertices: int, begin: Ints | None = None
+) -> Ints:
     """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
 
     The simplification preserves the shape of the surface, its texture coordinates and its
@@ -112,8 +130,10 @@ def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
         mesh: the mesh; it is not changed.
         attributes: float32[layouts, n], see attributes_of().
         vertices: wanted largest number of vertices; seams and borders may require more.
+        begin: int64[n, 3], triangles of a finer level as layouts, which are simplified further;
+            None: all triangles of the mesh.
     """
-    triangles = fan_triangles(mesh).astype(np.uint32)
+    triangles = (fan_triangles(mesh) if begin is None else begin).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)
     if not len(triangles):
         return np.asarray(triangles, np.int64)
@@ -189,7 +209,8 @@ def _fewer(
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
-        found, _ = _native.simplify(points, attributes, triangles, count)
+        begin = found if len(triangles) > 4 * LARGE else triangles  # to save time
+        found, _ = _native.simplify(points, attributes, begin, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):
             break

@@ -210,17 +210,39 @@ def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
         mesh: the mesh with the targets.
         columns: number of inputs.
     """
-    drives: dict[int, list[int]] = {}
-    channels = dna.blend_shape_channels
-    for source, channel in zip(channels.input_indices, channels.output_indices, strict=True):
-        drives.setdefault(int(channel), []).append(int(source))
-    out: dict[int, Doubles] = {}
+    drives, out = _drives(dna), dict[int, Doubles]()
     for target in mesh.blend_shape_targets:
         for column in drives.get(int(target.blend_shape_channel_index), ()):
             if column < columns:
                 delta = out.setdefault(column, np.zeros((len(mesh.positions), 3)))
-                np.add.at(delta, np.asarray(target.vertex_indices, np.int64), target.deltas)
+                vertices = np.asarray(target.vertex_indices, np.int64)
+                if (np.diff(vertices) > 0).all():  # each vertex once
+                    delta[vertices] += target.deltas
+                else:
+                    np.add.at(delta, vertices, target.deltas)
     return out
+
+
+def shaped_columns(dna: Dna, mesh: Mesh, columns: int) -> set[int]:
+    """The inputs that drive a blend shape of a mesh.
+
+    Args:
+        dna: the face with the blend shape channels.
+        mesh: the mesh with the targets.
+        columns: number of inputs.
+    """
+    drives = _drives(dna)
+    channels = {int(target.blend_shape_channel_index) for target in mesh.blend_shape_targets}
+    return {c for channel in channels for c in drives.get(channel, ()) if c < columns}
+
+
+def _drives(dna: Dna) -> dict[int, list[int]]:
+    """Blend shape channel -> the inputs that drive it."""
+    drives: dict[int, list[int]] = {}
+    channels = dna.blend_shape_channels
+    for source, channel in zip(channels.input_indices, channels.output_indices, strict=True):
+        drives.setdefault(int(channel), []).append(int(source))
+    return drives
 
 
 def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
@@ -313,4 +335,6 @@ def mesh_edges(mesh: Mesh) -> npt.NDArray[np.uint32]:
     following[offsets[1:][full] - 1] = offsets[:-1][full]
     pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    return np.unique(pairs, axis=0).astype(np.uint32)
+    count = max(len(mesh.positions), 1)
+    key = np.unique(pairs[:, 0] * count + pairs[:, 1])
+    return np.stack(np.divmod(key, count), axis=1).astype(np.uint32)

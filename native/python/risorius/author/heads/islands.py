@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,9 +31,8 @@ class Ball:
 
 def islands_of(mesh: ObjMesh) -> Ints:
     """int64[V]: number of the island of each vertex, from 0."""
-    sizes = np.array([len(face) for face in mesh.faces], np.int64)
-    none = np.zeros(0, np.int64)
-    corners = np.concatenate([none, *(np.asarray(face, np.int64) for face in mesh.faces)])
+    sizes = np.fromiter(map(len, mesh.faces), np.int64, len(mesh.faces))
+    corners = np.fromiter(itertools.chain.from_iterable(mesh.faces), np.int64, int(sizes.sum()))
     label = connected(len(mesh.positions), corners, sizes)
     return np.unique(label, return_inverse=True)[1].ravel()
 

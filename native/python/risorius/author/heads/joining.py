@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...base.words import counted
 from ..geometry.skeleton import Doubles, Ints
+from ..geometry.sparse import SparseShapes
 from ..input.matching import Assignment, assign
 from ..input.obj import ObjMesh, ShapeFileError
 from .directions import Direction, check_axes, find_direction, word_of
@@ -63,7 +64,7 @@ class Joined:
     """
 
     mesh: ObjMesh
-    shapes: dict[str, Doubles]
+    shapes: MutableMapping[str, Doubles]
     parts: list[FacePart]
     turns: list[Turn]
     left: int
@@ -331,20 +332,33 @@ class _Joining:
         )
         names = dict.fromkeys(n for part, _ in ordered for n in part.shapes)
         vertices = np.cumsum([0, *(len(part.mesh.positions) for part, _ in ordered)])
-        shapes = {name: np.zeros((int(vertices[-1]), 3)) for name in self._in_order(names)}
+        shapes = self._empty(names, int(vertices[-1]))
         whole = ObjMesh(np.concatenate([p.mesh.positions for p, _ in ordered]), np.zeros((0, 2)))
         uvs, out, taken = list[Doubles](), list[FacePart](), set[str]()
         for (part, joint), start, stop in zip(ordered, vertices[:-1], vertices[1:], strict=True):
             first = len(whole.faces)
             _add(whole, uvs, part.mesh, int(start))
             for name, delta in part.shapes.items():
-                shapes[name][start:stop] = delta
+                if isinstance(shapes, SparseShapes):
+                    shapes.add(name, delta, int(start))
+                else:
+                    shapes[name][start:stop] = delta
             label = _label(part.name, taken) if out else ""
             faces = (first, len(whole.faces))
             out.append(FacePart(label, int(start), int(stop), faces, joint or "head",
                                 part.material, part.source, part.polygons))  # fmt: skip
         whole.uvs = np.concatenate(uvs)
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
+
+    def _empty(self, names: Mapping[str, None], count: int) -> MutableMapping[str, Doubles]:
+        """Shapes of `count` vertices that do not move, in the form of the face's shapes."""
+        ordered = self._in_order(names)
+        if not isinstance(self.face.shapes, SparseShapes):
+            return {name: np.zeros((count, 3)) for name in ordered}
+        out = SparseShapes[str](count)
+        for name in ordered:
+            out.add(name, np.zeros((0, 3)), 0)
+        return out
 
     def _in_order(self, names: Mapping[str, None]) -> list[str]:
         """The names of all shapes: first the face's shapes, then others, both in the file's

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,7 +60,7 @@ class HeadPart:
 
     name: str
     mesh: ObjMesh
-    shapes: dict[str, Doubles] = field(default_factory=dict)
+    shapes: MutableMapping[str, Doubles] = field(default_factory=dict)
     material: Material | None = None
     source: str = ""
     polygons: Ints | None = None
@@ -113,7 +113,7 @@ def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
         face: the mesh of the face.
         part: the other mesh.
     """
-    own = {meaning(name): name for name in reversed(face.shapes)}
+    own = {meaning(name): name for name in reversed(list(face.shapes))}
     out: dict[str, Doubles] = {}
     for name, delta in part.shapes.items():
         known = name if name in face.shapes else own.get(meaning(name), name)

@@ -285,11 +285,12 @@ def jaw_turn(
     arm, *_ = np.linalg.lstsq(np.eye(3) - rotation, turned, rcond=1e-3)
     turn = Turn("FACIAL_C_Jaw", np.asarray(middle + arm))
     least = _FOLLOWS * float(length[chin].mean())
-    for name, delta in shapes.items():
+    for name in shapes:
         own = controls.get(name, ())
         if len(own) != 1 or not (own[0].startswith("jaw") or name in whole):
             continue
-        rows = held if delta is opening else chin
+        delta = shapes[name]
+        rows = held if np.array_equal(delta, opening) else chin
         if np.linalg.norm(delta[rows], axis=1).mean() > least:
             fitted = rigid_fit(points[rows], points[rows] + delta[rows])
             turn.motions[own[0]] = about(turn.position, *fitted)

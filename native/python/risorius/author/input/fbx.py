@@ -217,7 +217,11 @@ def _delta(scene: Scene, shape: Node, points: Doubles) -> Doubles:
     if len(moved) != len(index):
         raise _fail(scene, shape, f"{len(index)} vertices were expected, found {len(moved)}")
     if index.size and not 0 <= index.min() <= index.max() < len(points):
-        raise _fail(scene, shape, f"Indexes below {len(points)} were expected")
+        raise _fail(
+            scene,
+            shape,
+            f"Indexes below {len(points)} were expected, found {index.min()} to {index.max()}",
+        )
     scene.budget.hold(points.nbytes, object_name(shape))
     out = np.zeros_like(points)
     out[index] = moved

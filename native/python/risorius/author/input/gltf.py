@@ -155,7 +155,9 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
         triangles.append(part.triangles(document, primitive, at) + begins[key])
     counts = {len(part.deltas) for part in parts}
     if len(counts) != 1:
-        raise document.fail(place, "as many morph targets in all primitives were expected")
+        raise document.fail(
+            place, f"as many morph targets in all primitives were expected, found {sorted(counts)}"
+        )
     names = _names(row, counts.pop())
     corners = np.concatenate(triangles)
     # Leave out triangles with a repeated vertex.
@@ -216,7 +218,7 @@ class _Part:
     @staticmethod
     def _delta(document: Document, target: object, place: str, count: int) -> Doubles:
         if not isinstance(target, dict):
-            raise document.fail(place, "a table was expected")
+            raise document.fail(place, f"a table was expected, found {shown(target)}")
         if "POSITION" not in target:
             return np.zeros((count, 3))
         delta = document.rows(target["POSITION"], place, "VEC3")
@@ -290,7 +292,9 @@ def _uvs(
         return np.zeros((count, 2))
     found = packed.rows(given, name, "VEC2")
     if len(found) != count:
-        raise document.fail(f"primitives.attributes.{name}", f"{count} rows were expected")
+        raise document.fail(
+            f"primitives.attributes.{name}", f"{count} rows were expected, found {len(found)}"
+        )
     place = "KHR_texture_transform"
     found = found * document.finite(change, "scale", [1.0, 1.0], place)
     angle = document.finite({"rotation": [change.get("rotation", 0)]}, "rotation", [0], place)
@@ -369,7 +373,9 @@ class _World:
         self._parents: dict[int, int] = {}
         for number, node in enumerate(self.rows):
             if not isinstance(node, dict):
-                raise document.fail(f"nodes[{number}]", "a table was expected")
+                raise document.fail(
+                    f"nodes[{number}]", f"a table was expected, found {shown(node)}"
+                )
             children = node.get("children")
             for child in children if isinstance(children, list) else []:
                 if isinstance(child, int):

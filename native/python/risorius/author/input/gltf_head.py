@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ...base.errors import RisoriusError
+from ...base.given import shown
 from ...importing.errors import AnimationFileError
 from ...importing.gltf import Document
 from ...importing.source import read_bytes
@@ -44,7 +45,7 @@ def read_gltf_head(path: Path) -> list[HeadPart]:
     materials: dict[int, Material] = {}
     for number, row in enumerate(rows if isinstance(rows, list) else []):
         if not isinstance(row, dict):
-            raise document.fail(f"meshes[{number}]", "a table was expected")
+            raise document.fail(f"meshes[{number}]", f"a table was expected, found {shown(row)}")
         for name, turn in _places(document, number, row):
             source = _free(name, {part.source for part in out})
             for part in _parts(document, number, source, materials):
@@ -179,7 +180,7 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
     if uri is None:
         return document.view_bytes(image.get("bufferView"), place)
     if not isinstance(uri, str):
-        raise document.fail(place, "a uri was expected")
+        raise document.fail(place, f"a uri was expected, found {shown(uri)}")
     if uri.startswith("data:"):
         try:
             return base64.b64decode(uri.partition(",")[2], validate=True)
@@ -188,7 +189,10 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
     file = unquote(uri)
     # Only files in the glTF's folder or below are read, because a URI could name any file.
     if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
-        raise document.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
+        raise document.fail(
+            place,
+            f"a file beside this one was expected, in the folder of the glTF, found {uri[:80]!r}",
+        )
     try:
         return read_bytes(document.path.parent / file, found=True)
     except AnimationFileError as error:

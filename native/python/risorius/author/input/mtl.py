@@ -61,7 +61,7 @@ def _read(path: Path, file: str, out: dict[str, Material]) -> None:
     material = Material(file)
     try:
         if not _is_near(file):
-            raise OSError("a file beside the OBJ was expected")
+            raise OSError("a material file in the folder of the OBJ file was expected")
         lines = _lines(path.parent / file)
     except (OSError, ReadingError) as error:
         material.notes.append(f"{file}: the materials are left out: {error}")

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,12 +17,14 @@ from ...rigs.rotation import Convention
 from ..geometry import skeleton as sk
 from ..geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..geometry.skeleton import FARTHEST, Doubles
+from ..geometry.sparse import subset
 from ..heads.joining import FacePart, Joined
 from ..heads.turning import Turn
 from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
 _LIP = re.compile(r"([UD])[LR]$")
+_Delta = tuple[str, str, Doubles | float]  # control, expression, share of the expression
 _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as resting
 
 
@@ -31,7 +34,8 @@ class ShapeSet:
 
     name: str
     mesh: ObjMesh
-    expressions: dict[str, Doubles] = field(default_factory=dict)  # name -> displacement [V, 3]
+    # name -> displacement [V, 3]
+    expressions: MutableMapping[str, Doubles] = field(default_factory=dict)
     left: int = 1  # the character's left is +x (1) or -x (-1)
     unit: str = "cm"
     parts: list[FacePart] = field(default_factory=list)  # meshes of the face, as ranges of `mesh`
@@ -54,7 +58,7 @@ def shape_set(name: str, head: Joined) -> ShapeSet:
     return ShapeSet(
         name,
         head.mesh,
-        dict(head.shapes),
+        head.shapes,
         head.left,
         head.unit,
         head.parts,
@@ -63,29 +67,29 @@ def shape_set(name: str, head: Joined) -> ShapeSet:
     )
 
 
-def check_shapes(shapes: ShapeSet) -> list[str]:
+def check_shapes(shapes: ShapeSet, go_on: Callable[[], object] = lambda: None) -> list[str]:
     """Check expressions. Returns sentences on unusual ones, which are no errors.
 
     Args:
         shapes: the mesh and its expressions.
+        go_on: called before each expression; an exception that it raises stops the work.
 
     Raises:
         ArgumentError: coordinates are too large, all vertices are in one point, an expression has
             another number of vertices, or no expression moves a vertex.
     """
     size = float(np.ptp(shapes.mesh.positions, axis=0).max())
-    for name, points in (("the neutral mesh", shapes.mesh.positions), *shapes.expressions.items()):
-        if not np.abs(points).max(initial=0.0) <= FARTHEST:
-            raise ArgumentError(
-                f"{name}: coordinates up to {FARTHEST:g} were expected, found "
-                f"{np.abs(points).max():g}"
-            )
+    if not np.abs(shapes.mesh.positions).max(initial=0.0) <= FARTHEST:
+        raise ArgumentError(_too_large("the neutral mesh", shapes.mesh.positions))
     if not size:
         raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
     notes: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0
     for name, delta in shapes.expressions.items():
+        go_on()
+        if not np.abs(delta).max(initial=0.0) <= FARTHEST:
+            raise ArgumentError(_too_large(name, delta))
         if delta.shape != shapes.mesh.positions.shape:
             raise ArgumentError(
                 f"expression {name}: {len(shapes.mesh.positions):,} vertices were expected, "
@@ -101,7 +105,7 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
             notes.append(f"{name} moves the whole mesh: is another neutral baked into it?")
         elif length.mean() > 0.25 * size:
             notes.append(f"{name} is far from the neutral mesh: another unit or other axes?")
-        key = np.round(delta / size, 6).tobytes()
+        key = _key(delta, length, size)
         if key in seen:
             notes.append(f"{name} is the same as {seen[key]}")
         seen.setdefault(key, name)
@@ -110,13 +114,31 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
     return notes
 
 
-def take_combined(shapes: ShapeSet) -> dict[str, Doubles]:
+def _too_large(name: str, points: Doubles) -> str:
+    return f"{name}: coordinates up to {FARTHEST:g} were expected, found {np.abs(points).max():g}"
+
+
+def _key(delta: Doubles, length: Doubles, size: float) -> bytes:
+    """Bytes that are equal for shapes that are equal to six decimals of the mesh' size.
+
+    Args:
+        delta: float64[V, 3].
+        length: float64[V], lengths of the displacements.
+        size: size of the mesh.
+    """
+    rows = np.flatnonzero(length > 0.4e-6 * size)
+    even = np.round(delta[rows] / size, 6) + 0.0  # without the sign of -0.0
+    moved = even.any(axis=1)
+    return hashlib.sha256(rows[moved].tobytes() + even[moved].tobytes()).digest()
+
+
+def take_combined(shapes: ShapeSet) -> MutableMapping[str, Doubles]:
     """Remove and return the sculpts of combined expressions, which are named like smile+jawOpen.
 
     Args:
         shapes: the mesh and its expressions; it is changed.
     """
-    out = {name: delta for name, delta in shapes.expressions.items() if "+" in name}
+    out = subset(shapes.expressions, [name for name in shapes.expressions if "+" in name])
     for name in out:
         del shapes.expressions[name]
     return out
@@ -167,7 +189,11 @@ def combined_rows(
     return out
 
 
-def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
+def make_shape_face(
+    shapes: ShapeSet,
+    controls: Mapping[str, Sequence[str]],
+    go_on: Callable[[], object] = lambda: None,
+) -> Dna:
     """Make a Dna with a mesh for each part and a blend shape for each control.
 
     The joints are root and head, and eyes and jaw if `shapes` has joints for them.
@@ -178,6 +204,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
             several, the expression is divided among them, so that their sum is the expression:
             controls of a side or a lip get that side or lip with a soft edge, other controls equal
             parts. An expression without controls is left out.
+        go_on: called before each control; an exception that it raises stops the work.
 
     Raises:
         ArgumentError: all expressions are left out.
@@ -187,6 +214,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
     ]
     positions = shapes.mesh.positions[: parts[0].stop]
     deltas = _by_control(shapes, controls)
+    names = [name for name, _, _ in deltas]
     if not deltas:
         raise ArgumentError("an expression that is a control was expected: all are left out")
     dna = Dna()
@@ -203,8 +231,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
         [np.zeros(3), head, *(turn.position - head for turn in shapes.turns)]
     )
     dna.neutral_joint_rotations = np.zeros((len(dna.joint_names), 3))
-    names = list(deltas)
-    by_joints = dict.fromkeys(c for turn in shapes.turns for c in turn.motions if c not in deltas)
+    by_joints = dict.fromkeys(c for turn in shapes.turns for c in turn.motions if c not in names)
     dna.raw_control_names = [PREFIX + name for name in (*names, *by_joints)]
     dna.blend_shape_channel_names = names
     count, columns = len(names), len(names) + len(by_joints)
@@ -214,7 +241,7 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
     dna.joint_row_count, dna.joint_column_count = 9 * len(dna.joint_names), columns
     if shapes.turns:
         dna.joint_groups = _turning(dna, shapes.turns)
-    _add_meshes(dna, shapes, parts, list(deltas.values()))
+    _add_meshes(dna, shapes, parts, deltas, go_on)
     dna.lod_joint_mapping = [list(range(len(dna.joint_names)))]
     dna.lod_blend_shape_mapping = [range(count)]
     return dna
@@ -244,26 +271,37 @@ def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
 
 
 def _add_meshes(
-    dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[Doubles]
+    dna: Dna,
+    shapes: ShapeSet,
+    parts: Sequence[FacePart],
+    deltas: Sequence[_Delta],
+    go_on: Callable[[], object],
 ) -> None:
     """Add a mesh with blend shape targets for each entry of `parts`."""
     size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
-    joints, meshes, mapping = list(dna.joint_names), [], []
-    for number, part in enumerate(parts):
-        mesh = _mesh(_part_mesh(shapes.mesh, part), joints.index(part.joint))
-        targets = []
-        for channel, delta in enumerate(deltas):
+    joints, meshes = list(dna.joint_names), []
+    targets: list[list[BlendShapeTarget]] = [[] for _ in parts]
+    for channel, (_, expression, share) in enumerate(deltas):
+        go_on()
+        delta = shapes.expressions[expression] * share
+        for part, own_targets in zip(parts, targets, strict=True):
             own = delta[part.start : part.stop]
             moved = np.flatnonzero(np.linalg.norm(own, axis=1) > _LEAST * size)
             if len(moved):
-                targets.append(
+                own_targets.append(
                     BlendShapeTarget(
                         deltas=own[moved], vertex_indices=moved, blend_shape_channel_index=channel
                     )
                 )
-                mapping.append((number, channel))
-        mesh.blend_shape_targets = targets
+    for part, own_targets in zip(parts, targets, strict=True):
+        mesh = _mesh(_part_mesh(shapes.mesh, part), joints.index(part.joint))
+        mesh.blend_shape_targets = own_targets
         meshes.append(mesh)
+    mapping = [
+        (number, int(target.blend_shape_channel_index))
+        for number, own_targets in enumerate(targets)
+        for target in own_targets
+    ]
     dna.meshes = meshes
     dna.mesh_names = [f"{part.name or shapes.name}_lod0_mesh" for part in parts]
     dna.mesh_blend_shape_channel_mapping = np.array(mapping).reshape(-1, 2)
@@ -285,26 +323,26 @@ def _part_mesh(mesh: ObjMesh, part: FacePart) -> ObjMesh:
     )
 
 
-def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict[str, Doubles]:
-    out: dict[str, Doubles] = {}
-    for expression, delta in shapes.expressions.items():
+def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> list[_Delta]:
+    """The controls; of controls with the same name the last expression counts."""
+    out: dict[str, _Delta] = {}
+    for expression in shapes.expressions:
         named = controls.get(expression, [expression])
-        if not named:
-            continue
-        parts = _shares(shapes, delta, named)
-        out |= {name: delta * part for name, part in zip(named, parts, strict=True)}
-    return out
+        for name, part in zip(named, _shares(shapes, expression, named), strict=True):
+            out[name] = name, expression, part
+    return list(out.values())
 
 
-def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doubles | float]:
+def _shares(shapes: ShapeSet, expression: str, named: Sequence[str]) -> list[Doubles | float]:
     """float64[V, 1] for each control: its fraction of an expression. The fractions sum to 1.
 
     Controls that end in L and R get the left and right half. Controls of lips such as ...UL and
     ...DL get the upper and lower part, divided at the mean height of the vertices, weighted by
     their motion. The edges are soft.
     """
-    if len(named) == 1:
-        return [1.0]
+    if len(named) < 2:
+        return [1.0] * len(named)
+    delta = shapes.expressions[expression]
     x, y = shapes.mesh.positions[:, 0] * shapes.left, shapes.mesh.positions[:, 1]
     width = 0.06 * np.ptp(x)
     left = smooth_step(x / width + 0.5)

@@ -197,7 +197,9 @@ def _options(path: Path, table: dict[str, Any]) -> RigOptions:
     least = named.pop("least_effect_mm", RigOptions.least_effect_mm)
     shapes = table.get("shapes", {})
     if "tolerance_mm" in shapes and "tolerance_percent" in shapes:
-        raise ShapeFileError(f"{path}: shapes: tolerance_mm or tolerance_percent was expected")
+        raise ShapeFileError(
+            f"{path}: shapes: either tolerance_mm or tolerance_percent was expected, found both"
+        )
     share = shapes["tolerance_percent"] / 100 if "tolerance_percent" in shapes else TOLERANCE
     levels = dict(table.get("lods", {}))
     longest = max(len(levels.get(name, ())) for name in ("joints", "vertices"))

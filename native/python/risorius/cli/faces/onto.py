@@ -13,7 +13,7 @@ from ... import load
 from ...anyhead.borrowing import lend_materials
 from ...anyhead.default import default_template
 from ...anyhead.landmarks.marks import landmarks_path, landmarks_text, read_landmarks
-from ...anyhead.onto import OntoOptions, onto, shape_face
+from ...anyhead.onto import FIT_VERTICES, OntoOptions, onto, shape_face
 from ...anyhead.reading import read_head
 from ...anyhead.transfer.transfer import STRENGTHS
 from ...author.heads.parts import Wishes
@@ -130,6 +130,7 @@ def spec_of(args: argparse.Namespace) -> Spec:
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
+    spec.options = replace(spec.options, fit_vertices=FIT_VERTICES)
     if spec.options.tolerance_mm is None:  # a fraction of the head, not of the whole body
         spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
@@ -170,7 +171,9 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     if args.write_landmarks is not None:
         files[args.write_landmarks] = landmarks_text(made.landmarks).encode()
     lend_materials(made.shapes.parts, template, path, {part.source for part in parts})
-    read = shape_face(made, template, str(args.onto))
+    clock.line("making a face of blend shapes")
+    read = shape_face(made, template, str(args.onto), clock)
+    clock.line("making joints, skin weights and shapes")
     return replace(read, odd=made.notes + read.odd), files
 
 

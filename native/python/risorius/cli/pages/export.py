@@ -160,9 +160,9 @@ def _check_body(args: argparse.Namespace, out: Path) -> None:
         raise CommandLineError("--no-skeleton: a VRM, a humanoid, and a body have a skeleton")
     if args.body is None:
         if args.without or args.body_scale is not None:
-            raise CommandLineError("--without and --body-scale are of a body: add --body BODY.glb")
+            raise CommandLineError("--without and --body-scale need a body: add --body BODY.glb")
         return
     if args.humanoid:
-        raise CommandLineError("--humanoid makes up a body: leave it or --body out")
+        raise CommandLineError("--humanoid adds bones of a body: leave it or --body out")
     require_suffix(args.body, SUFFIXES, "--body")
     refuse_same_file(str(args.body), str(out))

@@ -87,8 +87,8 @@ def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any
             )
     if missing := [field for field in asked if field not in table]:
         raise GameFaceError(
-            f"{where}: VRM {version} asks for {joined(missing)}: say them, "
-            "a licence is never assumed"
+            f"{where}: VRM {version} asks for {joined(missing)}: give each "
+            "of these fields, because Risorius assumes no licence"
         )
     return dict(table)
 

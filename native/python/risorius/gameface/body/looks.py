@@ -82,7 +82,9 @@ class Looks:
     def _renumber(self, table: dict[str, Any], at: str, depth: int) -> None:
         """Replace the numbers of textures in a material's table and all tables nested in it."""
         if depth > _DEEPEST:
-            raise self._document.fail(at, "a material was expected, it is nested too deeply")
+            raise self._document.fail(
+                at, f"a material of at most {_DEEPEST} nested tables was expected, found more"
+            )
         for key, value in table.items():
             if not isinstance(value, dict):
                 continue

@@ -169,11 +169,13 @@ class Meshes:
         values = {name: lists.rows(name, f"{at}.attributes.{name}") for name in given
                   if not name.startswith("_")}  # fmt: skip
         if "POSITION" not in values:
-            raise document.fail(at, "positions were expected, found none")
+            raise document.fail(at, "vertex positions (POSITION) were expected, found none")
         count = len(values["POSITION"])
         for name, rows in values.items():
             if len(rows) != count:
-                raise document.fail(f"{at}.attributes.{name}", f"{count} rows were expected")
+                raise document.fail(
+                    f"{at}.attributes.{name}", f"{count} rows were expected, found {len(rows)}"
+                )
         document.budget.hold(count * 12 * 8, at)
         blended = _blended(document, values, moves, at)
         linear = blended[:, :3, :3]
@@ -209,7 +211,9 @@ class Meshes:
                     place = f"{at}.targets[{i}].{name}"
                     delta = self._document.rows(row[name], place, "VEC3")
                     if len(delta) != len(linear):
-                        raise self._document.fail(place, f"{len(linear)} rows were expected")
+                        raise self._document.fail(
+                            place, f"{len(linear)} rows were expected, found {len(delta)}"
+                        )
                     made[name] = np.einsum("vij,vj->vi", moved, delta).astype("<f4")
             out.append(made or {"POSITION": np.zeros((len(linear), 3), "<f4")})
         return out
@@ -256,7 +260,8 @@ class _Lists:
             return None
         if len(found) and not 0 <= found.min() <= found.max() < count:
             raise self._document.fail(
-                f"{self._at}.indices", f"vertices below {count} were expected, found {found.max()}"
+                f"{self._at}.indices",
+                f"vertex numbers below {count} were expected, found {found.max()}",
             )
         return found
 
@@ -270,7 +275,10 @@ def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at:
     sets = [number for number in sets if f"JOINTS_{number}" in values]
     for name in [n for n in values if n.startswith(("WEIGHTS_", "JOINTS_"))]:
         if name.partition("_")[2] not in sets or values[name].shape[1] != 4:
-            raise document.fail(f"{at}.attributes.{name}", "joints with weights were expected")
+            raise document.fail(
+                f"{at}.attributes.{name}",
+                "four joints and four weights for each vertex were expected",
+            )
     if not sets:
         values["JOINTS_0"] = np.zeros((count, 4))
         values["WEIGHTS_0"] = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))

@@ -152,7 +152,9 @@ class _Reader:
     def _node(self, node: object, place: str) -> int:
         self._body.document.item("nodes", node, place)
         if node not in self._body.of_node:
-            raise self._body.document.fail(place, f"a node of the skeleton was expected: {node}")
+            raise self._body.document.fail(
+                place, f"a node of the skeleton was expected, found node {node}"
+            )
         return self._body.of_node[node]
 
     def _named(
@@ -165,11 +167,12 @@ class _Reader:
             if not isinstance(group, int) or not 0 <= group < len(groups):
                 raise self._body.document.fail(
                     f"{place}.colliderGroups",
-                    f"groups below {len(groups)} were expected, found {shown(group)}",
+                    f"collider group numbers below {len(groups)} were expected, "
+                    f"found {shown(group)}",
                 )
             out += groups[group]
         if any(not isinstance(c, int) or not 0 <= c < count for c in out):
-            raise self._body.document.fail(place, f"colliders below {count} were expected")
+            raise self._body.document.fail(place, f"collider numbers below {count} were expected")
         return list(dict.fromkeys(out))
 
     def _number(self, row: Mapping[str, Any], key: str, default: float, place: str) -> float:

@@ -54,7 +54,8 @@ def find_tree(document: Document) -> Tree:
         number, parent = waiting.pop(0)
         if number in tree.above:
             raise document.fail(
-                f"nodes[{number}]", "a node with one parent was expected, it hangs on two or itself"
+                f"nodes[{number}]",
+                "a node with one parent was expected, found two parents or a circle",
             )
         node = document.item("nodes", number, f"nodes[{number}]")
         own = document.transform(node, f"nodes[{number}]")
