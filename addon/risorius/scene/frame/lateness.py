@@ -57,7 +57,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that the inputs of a face depend on this or another face.
+    """Record that the inputs of a face depend on this or another face, and the cause.
 
     Args:
         rig, controls: deforming and control armature of the face.

@@ -157,7 +157,7 @@ def parse_threshold(text: str) -> float | list[float]:
     rotation in degrees and scale in per cent.
 
     Raises:
-        CommandLineError: not one or three numbers from 0.
+        CommandLineError: not one or three finite numbers of 0 or more.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
