@@ -62,7 +62,7 @@ def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
     Args:
         rig, controls: deforming and control armature of the face.
     """
-    cause = next(_causes(controls), told("Another input of the controls"))
+    cause = next(_causes(controls), told("An unknown input of the controls"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
 
