@@ -103,7 +103,7 @@ _idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
 def _window_properties() -> dict[str, object]:
-    """Properties of the window manager, which are not stored in the file."""
+    """Properties of the window manager, which are not stored in the .blend."""
     return {
         "risorius_search": bpy.props.StringProperty(
             name="Search",

@@ -95,7 +95,11 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def in_text(data: bytes, draw: random.Random) -> bytes:
-    """Text with a word replaced, a line removed, duplicated or swapped, or bytes changed."""
+    """Text with one, two or four random faults.
+
+    A fault replaces a word, removes, duplicates or swaps a line, cuts the text off at a line, or
+    changes bytes.
+    """
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
         what = draw.random()
         if what < 0.6:

@@ -232,8 +232,8 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   EXPECT_EQ(evaluate_by(rig, work, Traversal::kAdded, raw, 0).joints, clean.joints);
 }
 
-// The last block of attributes is incomplete, because the joints end within it. It may need several
-// pieces.
+// 1 to 3 joints have 9, 18 or 27 attributes, so the last block of 16 attributes is incomplete. It
+// must be filled from several pieces, without a write to the memory after the last attribute.
 TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
   for (std::uint16_t joints = 1; joints < 4; ++joints) {
     const auto places = static_cast<std::uint16_t>(joints * 9);

@@ -95,7 +95,15 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """(vertex, true point) of each of MARKS. noise: random error of a point, in units of `true`."""
+    """(vertex index, its position in `true`) for each landmark in MARKS.
+
+    Args:
+        template: head by formula.
+        true: float64[V, 3], positions of the template's vertices on another head.
+        noise: standard deviation of the normal error that is added to each coordinate, in the unit
+            of `true`.
+        seed: seed of the error.
+    """
     random = np.random.default_rng(seed)
     looks = template.points / np.linalg.norm(template.points, axis=1, keepdims=True)
     vertices = [int(np.argmax(looks @ direction(*mark))) for mark in MARKS]

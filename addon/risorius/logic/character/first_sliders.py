@@ -114,7 +114,7 @@ def part(rows: Sequence[Row], region: str) -> Parted:
     """Split the rows of a region into most used and other rows.
 
     Args:
-        rows: all rows of the region, in the order of the file.
+        rows: all rows of the region, in the order of the DNA file.
         region: name of the region.
 
     Returns:

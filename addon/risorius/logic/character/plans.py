@@ -64,7 +64,7 @@ class ArmaturePlan:
 
 @dataclass(frozen=True)
 class MeshPlan:
-    """One mesh of the file, in Blender units.
+    """One mesh of the DNA file, in Blender units.
 
     Attributes:
         index: index of the mesh in the DNA file.

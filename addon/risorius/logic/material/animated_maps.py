@@ -45,7 +45,7 @@ class MapUse:
     """One animated map.
 
     Attributes:
-        index: index of the map in the file.
+        index: index of the map in the DNA file.
         label: name of the map.
         color, normal: whether the map changes the colour and the normals.
         number: 1 to 3 for a wrinkle set, 0 for none.

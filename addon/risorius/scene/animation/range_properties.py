@@ -73,7 +73,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
 
 
 def touch() -> None:
-    """Note that ranges may have changed by an edit, undo, or another file."""
+    """Record that ranges may have changed by an edit, by undo, or because a file was opened."""
     _changes.now += 1
 
 

@@ -143,7 +143,7 @@ def _whole_scene(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
 
 
 def _is_there(scene: bpy.types.Scene) -> bool:
-    """Whether a scene is still in the file; the user may have opened another file."""
+    """Whether a scene is still in the open .blend; the user may have opened another .blend."""
     try:
         return scene in bpy.data.scenes[:]
     except ReferenceError:

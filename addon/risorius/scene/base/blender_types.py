@@ -30,10 +30,10 @@ if TYPE_CHECKING:
         """The deforming or the control armature of a character."""
 
         data: bpy.types.Armature  # pyright: ignore[reportIncompatibleVariableOverride]
-        risorius_layer_rules: bool  # this and the next two: see layer_properties
+        risorius_layer_rules: bool  # this and the next two properties: see layer_properties
         risorius_layers_index: int
         risorius_reactions_index: int
-        risorius_converge: float  # this and the next three: see gaze_settings
+        risorius_converge: float  # this and the next three properties: see gaze_settings
         risorius_lids: float
         risorius_neck_poses: bool
         risorius_body_turn: float

@@ -33,7 +33,7 @@ class BuildOptions:
         texture_folder: folder to search first; "": none.
         simple_materials: whether to make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None: the scene's unit.
-        nearest_lods: whether to build the finest level of the file if it has no level of `lods`.
+        nearest_lods: whether to build the finest level of the DNA file if it has none of `lods`.
     """
 
     lods: tuple[int, ...] = (0,)

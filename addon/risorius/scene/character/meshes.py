@@ -46,7 +46,7 @@ def fresh_weights(item: MeshObject) -> bool:
 
 
 def note_edit(uid: int) -> None:
-    """Note that a mesh was edited. Args: uid  session uid of the mesh object."""
+    """Record that a mesh was edited. Args: uid  session uid of the mesh object."""
     _fresh.discard(uid)
 
 

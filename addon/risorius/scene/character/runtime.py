@@ -76,7 +76,7 @@ class Runtime:
         return len(self.dna.meshes)
 
     def vertex_count(self, mesh_index: int) -> int:
-        """Number of vertices of a mesh of the file."""
+        """Number of vertices of a mesh of the DNA file."""
         return self.morph(mesh_index).vertex_count
 
     def chain(self, joint: int) -> Chain:

@@ -73,11 +73,11 @@ def write(item: MeshObject, groups: Weights) -> None:
 
 
 def edited_vertices(present: Weights, wanted: Weights) -> set[int]:
-    """The vertices whose weights differ from the file.
+    """The vertices whose weights differ from the DNA file.
 
     Args:
         present: {group: {vertex: weight}} of the object.
-        wanted: {group: {vertex: weight}} of the file; other groups of the object are ignored.
+        wanted: {group: {vertex: weight}} of the DNA file; other groups of the object are ignored.
     """
     edited = set()
     for name, values in wanted.items():

@@ -91,7 +91,7 @@ def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
     """The data for drawing pictures of a file that is not in the scene, without materials.
 
     Args:
-        live: Runtime of the file.
+        live: Runtime of the DNA file.
     """
     return [_piece(live, index, (), {}) for index in _meshes(live)]
 

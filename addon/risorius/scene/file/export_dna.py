@@ -131,7 +131,7 @@ class _Job:
         self.edited = False
 
     def content(self) -> bytes:
-        """The bytes of the edited file, in the file version of the import."""
+        """The bytes of the edited DNA file, in the file version of the import."""
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             content = self._dna.to_bytes(version=f"2.{self._live.dna.version}")

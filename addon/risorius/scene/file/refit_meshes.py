@@ -283,7 +283,7 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     change.report.append(
         told(
             (
-                "The mesh {label} is gone from the file; in the scene this mesh stays, "
+                "The mesh {label} is not in the DNA file; in the scene this mesh stays, "
                 "hidden, for {things}."
             ),
             label=label,
@@ -343,7 +343,10 @@ def _refit_corners(
             layer.uv.foreach_set("vector", new.uvs.ravel())
         else:
             change.report.append(
-                told("{name} keeps your UV map; the file has another now.", name=item.name)
+                told(
+                    "{name} keeps your UV map; the UV map in the DNA file is different.",
+                    name=item.name,
+                )
             )
     if not _equal(old.positions, new.positions):
         _copy_attributes(mesh, fresh.data)
@@ -501,7 +504,10 @@ def _drop_gone_keys(
             shape.edits.pop(name, None)
             change.report.append(
                 told(
-                    "The shape {shape} of {name} is gone from the file; your edited key stays.",
+                    (
+                        "The DNA file has no shape for the shape key {shape} of {name}; "
+                        "your edited key stays."
+                    ),
                     shape=name,
                     name=item.name,
                 )

@@ -243,7 +243,7 @@ def _share_materials(change: Change, item: MeshObject) -> None:
 
 
 def _number_meshes(rig: ArmatureObject) -> None:
-    """Rewrite the rig's pointers to its meshes in the order of the file."""
+    """Rewrite the rig's pointers to its meshes in the order of the DNA file."""
     there = sorted(parts.meshes_of(rig), key=lambda m: (m[parts.MESH], m.name))
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
         del rig[key]

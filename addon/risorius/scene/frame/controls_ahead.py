@@ -61,7 +61,7 @@ def is_needed() -> bool:
 
 
 def note_evaluated(scene: bpy.types.Scene) -> None:
-    """Note that Blender evaluated a scene. Args: scene  the original scene."""
+    """Record that Blender has evaluated a scene. Args: scene  the original scene."""
     _evaluated_scenes.add(scene.session_uid)
 
 
@@ -138,7 +138,7 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
 
 
 def note_edit() -> None:
-    """Note an edit, after which Blender may rebuild graphs."""
+    """Record that the file was edited, because Blender may rebuild graphs after an edit."""
     _edited.now = True
 
 

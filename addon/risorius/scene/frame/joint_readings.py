@@ -96,7 +96,7 @@ def reads(rig: ArmatureObject) -> bool:
 
 
 def note_edit() -> None:
-    """Note an edit, so that Readings of faces are updated when needed."""
+    """Mark all Readings of faces as outdated after an edit."""
     for kept in last_written.readings.values():
         if isinstance(kept, Reading):
             kept.is_fresh = False

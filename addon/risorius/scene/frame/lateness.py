@@ -57,12 +57,12 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that the inputs of a face depend on this or another face.
+    """Record that the inputs of a face depend on this or another face, and the cause.
 
     Args:
         rig, controls: deforming and control armature of the face.
     """
-    cause = next(_causes(controls), told("Another input of the controls"))
+    cause = next(_causes(controls), told("An unknown input of the controls"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
 

@@ -37,17 +37,17 @@ _drawing = session.value("timing.drawing", 0.0, ("unregister",))
 
 
 def begin() -> None:
-    """Note that a frame change, or the update after an edit, begins."""
+    """Begin to measure a frame change, or the update after an edit."""
     frames.append(Frame())
 
 
 def animated() -> None:
-    """Note that Blender has evaluated the F-curves, NLA strips and drivers of the controls."""
+    """Record the time that Blender took for F-curves, NLA strips and drivers of the controls."""
     frames[-1].animation = _since(frames[-1].begin)
 
 
 def evaluated() -> None:
-    """Note that Blender has evaluated the frame.
+    """Record the time that Blender took to deform the meshes after the faces were evaluated.
 
     If no face was evaluated before the frame, the whole time counts as Blender's animation.
     """
@@ -58,7 +58,7 @@ def evaluated() -> None:
 
 
 def looked(begin: float) -> None:
-    """Note that the controls of a character were read and are unchanged.
+    """Add the time for reading the controls of a character whose controls are unchanged.
 
     Args:
         begin: perf_counter before the reading.
@@ -67,7 +67,7 @@ def looked(begin: float) -> None:
 
 
 def add(times: Sequence[float]) -> None:
-    """Note that a character was evaluated.
+    """Add the time of each stage in which a character was evaluated.
 
     Args:
         times: five values of perf_counter: before the first stage, and after each of the STAGES.
@@ -79,7 +79,7 @@ def add(times: Sequence[float]) -> None:
 
 
 def skinned(begin: float) -> None:
-    """Note that the final vertex positions of faces were written.
+    """Add the time for writing the final vertex positions of faces.
 
     Args:
         begin: perf_counter before the writing.
@@ -89,14 +89,14 @@ def skinned(begin: float) -> None:
 
 
 def drawing_begins() -> None:
-    """Note that Blender has evaluated the written values and begins to draw a view."""
+    """Record that Blender has evaluated the written values and begins to draw a view."""
     _drawing.now = perf_counter()
     if not frames[-1].deform:
         frames[-1].deform = _since(frames[-1].ended)
 
 
 def drawing_ends() -> None:
-    """Note that Blender has finished its drawing calls."""
+    """Record the time of Blender's drawing calls for a view, which have ended."""
     frames[-1].drawing = _since(_drawing.now)
 
 

@@ -54,7 +54,7 @@ def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
     """The kind of strands of a mesh, or None if its name begins with no known kind.
 
     Args:
-        name: name of the mesh in the file.
+        name: name of the mesh in the DNA file.
         told: the file's metadata; "coil:<mesh>" has the radius and pitch of coils in mm.
     """
     kind = next((k for begin, k in _KINDS.items() if name.startswith(begin)), None)

@@ -25,7 +25,7 @@ _LEVEL = re.compile(r"_lod\d+_")
 
 
 def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
-    """Yields (mesh object, name of the mesh in the file, number of vertex rows in each card).
+    """Yields (mesh object, name of the mesh in the DNA file, number of vertex rows in each card).
 
     Only the meshes of a character that are hair cards are yielded.
 
@@ -82,7 +82,7 @@ def _cards_at_finest(live: runtime.Runtime, name: str) -> int:
 
     Args:
         live: Runtime of the character.
-        name: name of the mesh in the file; the mesh may belong to any LOD.
+        name: name of the mesh in the DNA file; the mesh may belong to any LOD.
     """
     finest = _LEVEL.sub("_lod0_", name)
     found = _ROWS.fullmatch(live.dna.metadata.get(f"hair:{finest}", ""))

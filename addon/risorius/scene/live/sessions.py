@@ -68,7 +68,7 @@ class Session:
         recording: the running Recording, or None.
         recent: the last 3600 captured frames, also of earlier subjects: one minute at 60 frames per
             second.
-        ranges_seen: value of range_properties.changes() when the shaper got the ranges.
+        ranges_seen: value of range_properties.changes() when the shaper got the capture ranges.
         names: control names of the last frame.
         sliders: (slider, index in `names`) for each name that this character has.
     """

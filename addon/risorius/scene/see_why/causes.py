@@ -58,7 +58,7 @@ class Found:
     """The causes of a vertex's motion.
 
     Attributes:
-        mesh, vertex: index of the mesh in the file, and of the vertex.
+        mesh, vertex: index of the mesh in the DNA file, and of the vertex.
         moved: distance of the vertex from its neutral position in millimetres.
         causes: causes, the strongest first.
     """
@@ -92,7 +92,7 @@ def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
 
     Args:
         rig: deforming armature.
-        mesh: index of the mesh in the file.
+        mesh: index of the mesh in the DNA file.
         vertex: vertex index.
     """
     now = present.of(rig)
@@ -147,7 +147,7 @@ def firing(now: present.Present) -> list[int]:
     """Indices of firing (not 0) correctives, network outputs and poses, largest values first.
 
     Args:
-        now: the current face.
+        now: the face in its current pose.
     """
     values = np.asarray(now.live.rig.evaluate(now.raw, now.lod).controls)
     count = len(now.raw)
@@ -159,7 +159,7 @@ def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
     """Index of a control -> the current pose without the effect of this control.
 
     Args:
-        now: the current face.
+        now: the face in its current pose.
         controls: indices in raw | corrective | network | pose of active controls.
     """
     live = now.live
@@ -195,7 +195,7 @@ def without(now: present.Present, control: int) -> Poses:
     """Joint deltas and blend shape weights of the current pose without the effect of a corrective.
 
     Args:
-        now: the current face.
+        now: the face in its current pose.
         control: index of the corrective.
     """
     return _without(now, [control])[control]
@@ -314,7 +314,7 @@ def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
 
     Args:
         rig: deforming armature.
-        item: index of the mesh in the file.
+        item: index of the mesh in the DNA file.
         place: float64[3] in the space of the rig, Blender units.
     """
     now = present.of(rig)
@@ -326,6 +326,6 @@ def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
 
 
 def mesh_of(item: object) -> int:
-    """The index in the file of a mesh object of a character, -1 for any other object."""
+    """The index in the DNA file of a mesh object of a character, -1 for any other object."""
     get = getattr(item, "get", None)
     return int(get(parts.MESH, -1)) if get is not None else -1

@@ -47,7 +47,7 @@ def skin_of(live: runtime.Runtime, mesh: int) -> Skin:
 
     Args:
         live: Runtime of the character.
-        mesh: index of the mesh in the file.
+        mesh: index of the mesh in the DNA file.
     """
     kept = _skins.get((id(live), mesh))
     if kept is None or kept[0] is not live:
@@ -99,7 +99,7 @@ def vertices(
 
     Args:
         live: Runtime of the character.
-        mesh: index of the mesh in the file.
+        mesh: index of the mesh in the DNA file.
         joints: float32[J, 9] deltas.
         shapes: float32[B] weights of the blend shape channels.
     """
@@ -193,7 +193,7 @@ def distances(
 
     Args:
         live: Runtime of the character.
-        mesh: index of the mesh in the file.
+        mesh: index of the mesh in the DNA file.
         one, other: (joints, shapes) of each pose, see `vertices`.
     """
     apart = vertices(live, mesh, *one) - vertices(live, mesh, *other)
@@ -201,7 +201,7 @@ def distances(
 
 
 def meshes_at(rig: ArmatureObject, lod: int) -> list[int]:
-    """Indices in the file of the meshes that a level of detail shows.
+    """Indices in the DNA file of the meshes that a level of detail shows.
 
     Args:
         rig: deforming armature.

@@ -126,7 +126,7 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 
 def note_written(item: MeshObject) -> None:
-    """Note a write of the add-on, so that it does not count as an edit. Args: item  the mesh."""
+    """Record that the add-on wrote a mesh, which is not an edit. Args: item  the mesh object."""
     _writes.now += 1
     _written[item.session_uid] = _writes.now
 
@@ -137,11 +137,13 @@ def forget_written() -> None:
 
 
 def end_updates(depsgraph: Depsgraph) -> None:
-    """Note that the handlers of an update are done. Blender reports no further update for their
-    writes, so the next update of these objects is an edit.
+    """Record that the add-on's handlers have finished for an update of a graph.
+
+    Blender reports the meshes that the handlers wrote only once to each graph. So the graph's next
+    update that reports one of these meshes is an edit.
 
     Args:
-        depsgraph: graph of the update; graphs of other view layers report the writes later.
+        depsgraph: the graph; graphs of other view layers report the same writes later.
     """
     _told[_key_of(depsgraph)] = _writes.now
 

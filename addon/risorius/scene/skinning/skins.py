@@ -91,7 +91,7 @@ def forget_bones(uid: int) -> None:
 
 
 def bones_of(rig: ArmatureObject) -> Bones:
-    """The current bones of an armature. Args: rig  deforming armature."""
+    """Read the bones of an armature, or return the cached Bones. Args: rig  deforming armature."""
     kept = _bones.get(rig.session_uid)
     if kept is None or len(kept.names) != len(rig.pose.bones):
         kept = _bones[rig.session_uid] = _read_bones(rig)
@@ -99,7 +99,7 @@ def bones_of(rig: ArmatureObject) -> Bones:
 
 
 def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
-    """The current skin of a mesh.
+    """The compiled skin weights of a mesh, cached; compiled again if the mesh has changed.
 
     Args:
         item: the mesh object.

@@ -144,7 +144,7 @@ def _rig_of_ruin(item: bpy.types.Object | None) -> ArmatureObject | None:
 
 
 def outside(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """Parts of a character that are in no collection: Blender's Delete leaves them in the file,
+    """Parts of a character that are in no collection: Blender's Delete leaves them in the .blend,
     because the other parts point to them.
     """
     return [o for o in parts.members_of(rig) if not o.users_collection]

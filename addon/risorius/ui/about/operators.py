@@ -27,7 +27,7 @@ def describe(rig: ArmatureObject) -> list[str]:
     names = live.dna.blend_shape_channel_names
     lines = [
         words.say(
-            "{controls} controls, {joints} joints, {moved} of them moved by the file, "
+            "{controls} controls, {joints} joints, {moved} of them moved by the DNA file, "
             "{channels} channels, {maps} maps.",
             controls=len(live.labels),
             joints=live.rig.joint_count,

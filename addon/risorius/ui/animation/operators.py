@@ -41,7 +41,7 @@ CAPTURE_RANGES = (
         "Of the Face",
         "Use the range of this face from the panel Capture Range",
     ),
-    ("TAKE", "Of This File", "Learn the range from this file"),
+    ("TAKE", "Of This File", "Learn the person's range from the captured values in this file"),
     ("NONE", "None", "Keep the captured values unchanged"),
 )
 TIME_UNITS = (

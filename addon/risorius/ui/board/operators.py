@@ -36,7 +36,7 @@ KINDS = (
             "mouth, jaw, tongue. Other controls keep their sliders"
         ),
     ),
-    ("COMPLETE", "Complete", "A handle for each GUI control of the file"),
+    ("COMPLETE", "Complete", "A handle for each GUI control of the DNA file"),
 )
 
 

@@ -102,7 +102,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         name="Shapes", description="Mode of the blend shapes", items=MODES, default="AUTO"
     )
     use_normals: bpy.props.BoolProperty(
-        name="Custom Normals", description="Keep the file's own normals", default=True
+        name="Custom Normals", description="Use the normals of the DNA file", default=True
     )
     use_materials: bpy.props.BoolProperty(
         name="Materials",
@@ -111,7 +111,9 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
     )
     use_textures: bpy.props.BoolProperty(
         name="Textures",
-        description="Load textures from the folder of the file, and pack them into the .blend file",
+        description=(
+            "Load textures from the folder of the DNA file, and pack them into the .blend file"
+        ),
         default=True,
     )
     texture_folder: bpy.props.StringProperty(

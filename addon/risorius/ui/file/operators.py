@@ -127,7 +127,10 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_shapes: bpy.props.BoolProperty(
         name="Shape Keys",
-        description="Write edited shapes of the file; shape keys that you added are never written",
+        description=(
+            "Write edited shape keys that come from the DNA file; "
+            "shape keys that you added are never written"
+        ),
         default=True,
     )
     use_neutral: bpy.props.BoolProperty(

@@ -29,7 +29,7 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
 
     mesh: bpy.props.IntProperty(
         name="Mesh",
-        description="Number of the mesh in the file; -1: the active mesh",
+        description="Number of the mesh in the DNA file; -1: the active mesh",
         default=-1,
         min=-1,
     )

@@ -81,7 +81,7 @@ class RISORIUS_OT_make_override(Operator):
 
 
 class RISORIUS_OT_bring_back(Operator):
-    """Restore deleted parts of the active face that are still in the file"""
+    """Restore deleted parts of the active face that are still in this .blend file"""
 
     bl_idname = "risorius.bring_back"
     bl_label = "Bring Back Deleted Parts"

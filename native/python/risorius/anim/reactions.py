@@ -158,7 +158,7 @@ def _reaction(name: str, row: Any, prefix: str, where: str) -> Reaction:
         place = f"{where}: {name}.parts[{number}]"
         times = {key: part[key] for key in ("delay", "attack", "hold", "release") if key in part}
         for key, seconds in times.items():
-            lowest = "above 0" if key in ("attack", "release") else "from 0"
+            lowest = "above 0" if key in ("attack", "release") else "of 0 or more"
             number_given = isinstance(seconds, int | float) and not isinstance(seconds, bool)
             if not number_given or seconds < 0 or (lowest == "above 0" and seconds == 0):
                 raise ArgumentError(

@@ -157,7 +157,7 @@ def parse_threshold(text: str) -> float | list[float]:
     rotation in degrees and scale in per cent.
 
     Raises:
-        CommandLineError: not one or three numbers from 0.
+        CommandLineError: not one or three finite numbers of 0 or more.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -165,7 +165,8 @@ def parse_threshold(text: str) -> float | list[float]:
         numbers = []
     if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n >= 0 for n in numbers):
         raise CommandLineError(
-            f"--threshold: a number from 0 or MM,DEGREES,SCALE was expected, found {text!r}"
+            f"--threshold: one number of 0 or more, or three as MM,DEGREES,SCALE, was expected, "
+            f"found {text!r}"
         )
     return numbers[0] if len(numbers) == 1 else numbers
 

@@ -236,8 +236,8 @@ def _expression(
     unknown = set(row) - {"label", "group", "description", "weights", "regions"}
     if unknown:
         raise ArgumentError(
-            f"{place}: label, group, description, regions and weights were expected, "
-            f"found {sorted(unknown)[0]}"
+            f"{place}: one of the keys label, group, description, regions and weights was "
+            f"expected, found {sorted(unknown)[0]}"
         )
     regions = row.get("regions", [])
     strange = regions if not isinstance(regions, list) else [r for r in regions if r not in REGIONS]

@@ -54,7 +54,7 @@ def regroup(
 
     Raises:
         DnaError: an inconsistent Dna; a joint that does not exist or is in two regions; a region
-            without joints; a threshold that is not a number from 0.
+            without joints; a threshold that is not a number of at least 0.
         ValueError: an unknown joint name; a threshold that is not one or three numbers.
     """
     mm, degrees, scale = _three(threshold)

@@ -49,7 +49,9 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
     if not named:
         if able:
             names = joined(dict.fromkeys(part.source for part in able))
-            raise ShapeFileError(f"{where}: source.mesh: {names} was expected, found {wanted}")
+            raise ShapeFileError(
+                f"{where}: source.mesh: one of {names} was expected, found {wanted}"
+            )
         if any(part.shapes for part in parts):
             raise ShapeFileError(f"{where}: no expression moves a vertex of a mesh")
         raise ShapeFileError(f"{where}: a mesh with shapes was expected, found none")

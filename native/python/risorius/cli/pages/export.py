@@ -133,7 +133,9 @@ def run(args: argparse.Namespace) -> int:
     shapes = tuple(dict.fromkeys((args.shapes or default).split(",")))
     for group in shapes:
         if group not in GROUPS:
-            raise CommandLineError(f"--shapes: {', '.join(GROUPS)} were expected, found {group!r}")
+            raise CommandLineError(
+                f"--shapes: one or more of {', '.join(GROUPS)} were expected, found {group!r}"
+            )
     frames = [frame for take in args.takes for frame in frames_of(take)]
     dna = risorius.load(args.file)
     rig = risorius.compile_cached(args.file)
