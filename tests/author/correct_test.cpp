@@ -183,8 +183,9 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
   }
 }
 
-/// The repair of a pose with one part, whose removal changes nothing, so that only the least
-/// squares solve can help. The faults of the undeformed sheet are allowed.
+/// Repairs a pose of the sheet of skin. The pose has a single part (such as an expression), and the
+/// skin without this part has the same positions. So taking the part back removes no fault, and
+/// only the least squares solve can help. The faults of the undeformed sheet are allowed.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));

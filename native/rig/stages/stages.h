@@ -73,7 +73,7 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
 /// The following stages run after the joint groups; a batch runs them frame by frame. rotations()
-/// calls the next four functions in their order.
+/// calls euler_joints() and the three functions after it, in this order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,

@@ -95,7 +95,10 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """(vertex, true point) of each of MARKS. noise: random error of a point, in units of `true`."""
+    """(vertex, true point) of each of MARKS.
+
+    noise: standard deviation of the error that is added to a coordinate, in units of `true`.
+    """
     random = np.random.default_rng(seed)
     looks = template.points / np.linalg.norm(template.points, axis=1, keepdims=True)
     vertices = [int(np.argmax(looks @ direction(*mark))) for mark in MARKS]
