@@ -61,7 +61,7 @@ struct Scene {
     skin.solids.push_back(sphere(ball));
   }
   SkinPose pose(const std::vector<Vector3>& positions) const { return {positions, {ball}}; }
-  /// The sheet, smoothly pushed down around its middle by `depth` mm.
+  /// The sheet, smoothly pushed down by `depth` mm in its middle and by 0 mm at `reach` mm from it.
   std::vector<Vector3> pushed(double depth, double reach = 9.0) const {
     auto out = skin.neutral;
     for (std::uint32_t v = 0; v < out.size(); ++v) {

@@ -91,7 +91,8 @@ void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> 
 
 // Computes the animated maps of all frames. A run whose input is 0 in all frames is skipped by one
 // test.
-// In: values  [controls, kFrames]
+// In:  values  [controls, kFrames] the values of all controls, frame after frame for each control
+// Out: out     [count, maps]
 void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::size_t count,
                 float* out) noexcept {
   const std::size_t maps = rig.animated_map_count;
