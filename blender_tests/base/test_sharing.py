@@ -128,7 +128,7 @@ def _other_space(image, _folder):
 
 
 def _other_bytes(image, folder):
-    """Replace an image by noise of the same size, with a file of the same length."""
+    """Pack another noise picture of the same size into an image."""
     _picture(folder / "other.png", 99)
     content = (folder / "other.png").read_bytes()
     image.pack(data=content, data_len=len(content))

@@ -31,7 +31,7 @@ def _axes(dna):
 
 
 def _rest(dna, joint):
-    """The axes of a joint at rest in the file's space, float64[3, 3]."""
+    """The axes of a joint at rest in the DNA file's space, float64[3, 3]."""
     return oracle._world(dna, np.zeros((len(dna.joint_names), 9)))[joint][:3, :3]
 
 

@@ -108,7 +108,7 @@ def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
 
 
 def _everywhere(rig):
-    """The state of the file that an export must not change."""
+    """The state of the .blend that an export must not change."""
     layer = bpy.context.view_layer
     return (
         scene.counts(),

@@ -120,7 +120,7 @@ def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
 
 @pytest.fixture
 def work(dna_file, monkeypatch):
-    """Counts how often the bytes of the file are read, hashed, unpacked, parsed and compiled."""
+    """Counts how often the DNA file is read, hashed, unpacked, parsed and compiled."""
     whole, counts = dna_file.read_bytes(), Counter()
     storage = scene.submodule("scene.base.storage")
 

@@ -538,7 +538,7 @@ def test_where_no_name_is_known_the_configuration_itself_says_what_numbers_are(d
 
 
 def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
-    """A sphere cut in two; without the file's normals each half is shaded to its own rim."""
+    """A sphere is cut in two. Without the DNA file's normals, each half shows a seam at its rim."""
     face = small_face()
     center = np.array([0.0, 158.0, 2.0])
     whole = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())

@@ -16,7 +16,7 @@ def _pair(dna, tmp_path):
 
 
 def test_weights_that_do_not_sum_to_one(tmp_path):
-    """Weights from the file or painted by the user; Blender divides them by their sum."""
+    """The DNA file or the user may set such weights; Blender divides them by their sum."""
     dna = small_face()
     mesh = dna.meshes[0]
     weights = np.array(mesh.skin_weights)
@@ -76,7 +76,7 @@ def test_a_bone_of_no_size(tmp_path, scale):
 
 
 def test_a_joint_that_the_file_gives_no_size(tmp_path):
-    """With an open mouth, the file scales the jaw to 0."""
+    """With an open mouth, the DNA file scales the jaw to 0."""
     dna = small_face()
     group = dna.joint_groups[0]
     values = np.array(group.values)

@@ -25,7 +25,7 @@ UNOWNED = 5
 
 
 def _grid(columns, rows, radius, center):
-    """Positions, normals, UVs and quads of a patch of a sphere that faces the file's front (+z)."""
+    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z)."""
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)

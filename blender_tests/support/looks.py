@@ -23,7 +23,7 @@ KINDS = {
 
 
 def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
-    """A mesh's shifted and scaled copy without shapes. offset: in the file's axes and units."""
+    """A mesh's shifted and scaled copy without shapes. offset: in the DNA's axes and units."""
     middle = mesh.positions.mean(axis=0)
     moved = (mesh.positions - middle) * scale + middle + np.array(offset, np.float32)
     names = ("normals", "texture_coordinates", "layout_positions", "layout_normals")

@@ -31,7 +31,7 @@ def _rotation(dna, angles):
 
 
 def _world(dna, deltas, turns=None):
-    """World matrices of joints in the file's axes and units. turns: as in `vertices`."""
+    """World matrices of joints in the DNA's axes and units. turns: as in `vertices`."""
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -48,7 +48,7 @@ def _world(dna, deltas, turns=None):
 
 
 def to_blender(dna, points, unit_scale=1.0):
-    """Convert points from the file's axes and unit to Blender's axes and units."""
+    """Convert points from the DNA's axes and unit to Blender's axes and units."""
     axes = np.array([_AXES[w] for w in dna.coordinate_system], np.float64).T
     metres = 0.01 if dna.translation_unit == "cm" else 1.0
     return points @ axes.T * metres / unit_scale

@@ -121,7 +121,7 @@ def snapshot(rig):
 
 
 def counts():
-    """Type of datablock -> number of its datablocks in the file."""
+    """Type of datablock -> number of its datablocks in the .blend."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
@@ -130,7 +130,7 @@ def counts():
 
 
 def invalid_drivers():
-    """(object name, data path) of invalid drivers in the file, and the number of all drivers."""
+    """(object name, data path) of invalid drivers in the .blend, and the number of all drivers."""
     owners = [
         *bpy.data.objects,
         *bpy.data.shape_keys,

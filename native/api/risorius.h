@@ -140,7 +140,7 @@ typedef struct risorius_mesh {
   const uint32_t* corner_normals;   /* uint32[corners] */
   const uint32_t* polygon_begins;   /* uint32[polygons + 1] into polygon_corners; NULL: none */
   const uint32_t* polygon_corners;  /* the corners of all polygons, back to back */
-  const uint32_t* skin_begins;      /* uint32[vertices + 1] into the next two; NULL: no skin */
+  const uint32_t* skin_begins;      /* uint32[vertices + 1] into weights, joints; NULL: no skin */
   const float* skin_weights;
   const uint16_t* skin_joints;
 } risorius_mesh;

@@ -30,7 +30,8 @@ bool side_by_side(const KeptColumn* four) {
 
 // Copies columns of a matrix that is stored by rows, each column to one run of memory. The values
 // are copied in tiles, four columns at a time, so that whole cache lines are read and written.
-// In: from  [rows, stride]
+// In: from     [rows, stride] the matrix
+//     columns  the copied columns, with their offsets in `to`
 void transpose(const float* from, std::size_t rows, std::size_t stride,
                std::span<const KeptColumn> columns, float* to) {
   constexpr std::size_t kTile = 16, kTogether = 4;

@@ -168,8 +168,8 @@ void report_worst(const dna::Dna& dna, const std::vector<Worsts>& of_lods, Chang
 
 core::Status measure_changes(const dna::Dna& before, const dna::Dna& after,
                              const RegroupOptions& options, RegroupReport& report) {
-  // On the scalar path, sums have the ascending order of controls, in whatever groups the controls
-  // are.
+  // The scalar kernels add terms in the ascending order of their controls, so the grouping of the
+  // controls changes no sum.
   compile::CompileOptions scalar;
   scalar.kernels = simd::find_kernels("scalar");
   const Result<rig::Rig> a = compile::compile(before, scalar), b = compile::compile(after, scalar);

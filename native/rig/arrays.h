@@ -225,18 +225,18 @@ constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFF
 /// their dependencies. A *latent* one runs them in the fixed order of the reference evaluator's
 /// stages.
 enum StepList : std::uint32_t {
-  // For settled evaluation: networks and solvers that need no corrective. They run before all
+  // Networks and solvers that need no corrective. A settled evaluation runs them before all
   // correctives.
   kEarly,
-  // For settled evaluation: the other networks and solvers, and the correctives that are not
-  // watched (see psds), each after the steps that it reads. A latent evaluation runs only its
+  // The other networks and solvers, and the correctives that are not watched (see psds), each after
+  // the steps that it reads. A settled evaluation runs all of these steps, a latent one only the
   // correctives.
   kChained,
   // Steps that depend on themselves, directly or through others, and steps that depend on them. A
   // settled evaluation does not run them, so that their outputs keep their initial values. A latent
   // one runs their correctives.
   kCyclic,
-  // For latent evaluation: networks and then solvers, in the order of the file.
+  // All networks, then all solvers, in the order of the file. Only a latent evaluation runs them.
   kReference,
   kStepLists  // the number of lists
 };

@@ -20,7 +20,7 @@ struct NonFinite {
 
 /// The raw controls that are NaN or infinite, sorted by frame. The comment of evaluate() lists the
 /// outputs that become invalid.
-/// In:   raw   float32[count, R]
+/// In:   raw   float32[count, R], the raw controls of each frame
 ///       most  the largest number of results
 /// Cost: one pass over raw; allocates only if something is found.
 std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::size_t count,

@@ -74,8 +74,8 @@ struct alignas(128) Workspace {
   // A sum of values that were read only to bring their memory into the cache. Nothing reads the
   // sum; it keeps the compiler from removing the reads.
   std::uint32_t touched = 0;
-  // In evaluate_frames: earlier frames have already brought most of the needed memory into the
-  // cache.
+  // Whether earlier frames of evaluate_frames() have already brought most of the needed memory into
+  // the cache.
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds

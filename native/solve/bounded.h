@@ -17,7 +17,7 @@ namespace risorius::solve {
 /// x(y) - b, the gradient of a convex function. The zero is found by Newton's method with step
 /// halving.
 /// In:  a [rows, columns], b [rows], low <= high [columns]; all finite; ridge above 0
-/// Out: x [columns]
+/// Out: x [columns], the solution
 void least_change(std::size_t rows, std::size_t columns, const double* a, const double* b,
                   const double* low, const double* high, double ridge, double* x);
 

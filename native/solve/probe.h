@@ -44,7 +44,7 @@ class Probe {
 
   std::size_t size() const { return points_.size(); }
   /// Computes the positions of the points in a pose.
-  /// In:  raw  float32[R]
+  /// In:  raw  float32[R], the raw controls of the pose
   /// Out: out  float64[points, 3], file units
   void positions(const float* raw, double* out);
   /// Computes the derivatives of the positions.

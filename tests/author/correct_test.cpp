@@ -61,7 +61,7 @@ struct Scene {
     skin.solids.push_back(sphere(ball));
   }
   SkinPose pose(const std::vector<Vector3>& positions) const { return {positions, {ball}}; }
-  /// The sheet, smoothly pushed down around its middle by `depth` mm.
+  /// The sheet, smoothly pushed down by `depth` mm in its middle and by 0 mm at `reach` mm from it.
   std::vector<Vector3> pushed(double depth, double reach = 9.0) const {
     auto out = skin.neutral;
     for (std::uint32_t v = 0; v < out.size(); ++v) {
@@ -183,8 +183,9 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
   }
 }
 
-/// The repair of a pose with one part, whose removal changes nothing, so that only the least
-/// squares solve can help. The faults of the undeformed sheet are allowed.
+/// Repairs a pose of the sheet of skin. The pose has a single part (such as an expression), and the
+/// skin without this part has the same positions. So taking the part back removes no fault, and
+/// only the least squares solve can help. The faults of the undeformed sheet are allowed.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));

@@ -403,7 +403,8 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   ASSERT_TRUE(fit) << fit.error().describe();
   const StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
   const std::vector<std::uint32_t> middles(8, kInTheMiddle);
-  // On the same sheet the fit finds motions as good, and does not change the weights.
+  // On the sheet of the first fit, fit_motions() finds motions with nearly the same error, and does
+  // not change the weights.
   auto same = fit_motions(shapes, options, weights, middles);
   ASSERT_TRUE(same) << same.error().describe();
   EXPECT_LT(largest_error(shapes, *same), 1.2 * largest_error(shapes, *fit));

@@ -154,7 +154,7 @@ class Identities:
 
 
 def places(source: Source, laid: Laid, true: np.ndarray) -> list[float]:
-    """The errors of a registration: the first three of COLUMNS."""
+    """The errors of a registration: the columns surface, along and corner."""
     on = laid.registered.trusted
     along = MM * any_heads.errors(source.face.surface, laid.points, true)
     corner = MM * np.linalg.norm(laid.points - true, axis=1)[source.corners].max()
@@ -162,7 +162,7 @@ def places(source: Source, laid: Laid, true: np.ndarray) -> list[float]:
 
 
 def expressions(source: Source, true: TemplateFace, target: Surface, laid: Laid) -> list[float]:
-    """The errors of the expressions before repair: the next three of COLUMNS."""
+    """The errors of the expressions before repair: the columns rows, worst mean, worst 95 %."""
     options = TransferOptions()
     carried = transfer(source.face, target, laid.points, laid.trust, options, None, laid.jaw)
     on, ways = truth.truth_on(true, target)
@@ -172,7 +172,7 @@ def expressions(source: Source, true: TemplateFace, target: Surface, laid: Laid)
 
 
 def contacts(template, source: Source, target: Surface) -> list[float]:
-    """The contacts after repair, as `risorius author --onto` makes them: the last of COLUMNS."""
+    """The contacts after repair, as `risorius author --onto` makes them: columns gap, cut, lips."""
     faces = target.triangles.tolist()
     mesh = ObjMesh(target.points, np.zeros((0, 2)), faces, [[] for _ in faces])
     part = HeadPart("head", mesh, source="head")

@@ -12,7 +12,7 @@ namespace risorius::bench {
 
 /// The matrix of all joint groups, one row per joint attribute.
 struct Csr {
-  std::vector<std::uint32_t> begins;  // [rows + 1]
+  std::vector<std::uint32_t> begins;  // [rows + 1] index of each row's first value
   std::vector<std::uint16_t> columns;
   std::vector<float> values;
 

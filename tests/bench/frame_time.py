@@ -211,7 +211,7 @@ def row(way, times, note, base=None):
 
 
 def measure_full(path, package, frames, clip, active):
-    """Measure all rows of the full-scale face, first the plain way, as base of the others."""
+    """Measure all rows of the full-scale face. The other rows are compared with the plain way."""
     print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
     base = None
     for loops in (False, True):

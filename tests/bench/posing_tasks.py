@@ -292,7 +292,7 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(raw controls, key events) of each drag of a vertex: many sliders, or one of three alone."""
+    """(raw controls, key events) of drags of a vertex: with all sliders, or with one of three."""
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(
         face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))

@@ -378,7 +378,7 @@ class Sweep {
     pair("active controls", n, one_face(rig_, 0), csr(dna_, 0), *made_.back());
     add_read("read active controls/" + std::to_string(n), rig_, *made_.back(), 0);
   }
-  // Adds points for the face with only n of its joint groups.
+  // Adds benchmarks of the face with only its first n joint groups.
   void add_groups(std::size_t n) {
     smaller_.push_back(std::make_unique<dna::Dna>(dna_));
     auto& groups = smaller_.back()->behavior.joint_groups;

@@ -304,7 +304,7 @@ TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {
 
 // Both LODs have joint 0, only LOD 0 has joint 1. Column 1 rotates no joint, and column 5 only a
 // joint with Euler angles. LOD 1 finds column 3 empty and swaps it with 4, and then swaps column 0
-// with 4: unlike a stable sort, this changes the order of the others.
+// with 4: unlike a stable sort, this changes the order of the other columns.
 TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   const std::vector<bool> quaternions{true, true, false};
   const dna::JointGroup g = make_group({3, 1}, {0, 1, 2, 3, 4, 5}, {3, 13, 22},

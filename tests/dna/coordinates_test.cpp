@@ -465,8 +465,8 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
   dna.descriptor.lod_count = 3;
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({4, 2, 0}, {3, 9, 1, 17}, {1, 2, 3, 4, 5, 6, 7, 8})};
-  // From x right, y up, z front to x front, y right, z up: the axes rotate, so that the order xyz
-  // becomes yzx.
+  // The source has x right, y up, z front; the result has x front, y right, z up. The axes rotate,
+  // so that the order xyz becomes yzx.
   const Dna out = converted(dna, target_of({4, 1, 2}, 3, {1, 1, 1}));
   const JointGroup& g = out.behavior.joint_groups[0];
   EXPECT_EQ(g.lods, (Array<std::uint16_t>{4, 2, 0}));

@@ -41,7 +41,7 @@ def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object
 
 
 def lods_of(about: dict) -> list[int] | None:
-    """The file's LODs that a filtered load kept; None if it was not filtered."""
+    """The LODs of the DNA file that a filtered load kept; None if the load was not filtered."""
     load, count = about["load"], about["counts"]["lods"]
     if load["lods"]:
         return load["lods"]

@@ -60,7 +60,8 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
 }
 
 // Of four joints the first rotates at both LODs, the second only at LOD 0, the third only moves and
-// the fourth does nothing. Each must get a w, whatever the memory of the pose contained.
+// the fourth does nothing. Each joint must get the w of its quaternion, whatever the memory of the
+// pose contained before.
 TEST(EvaluateJoints, EveryQuaternionHasItsW) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups =

@@ -24,8 +24,8 @@ const Kernels& scalar_kernels_unoptimised();
 
 namespace {
 
-// Columns without padding. After the last one there is a vector of further values, because kernels
-// may read it.
+// A matrix stored as columns without padding. After the last column there is a vector of further
+// values, because kernels may read it.
 template <class T>
 struct Matrix {
   std::size_t rows, columns;

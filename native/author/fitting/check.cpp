@@ -106,7 +106,7 @@ core::Status check_numbers(const FitOptions& options) {
   }
   if (!(options.least_effect >= 0.0 && std::isfinite(options.least_effect))) {
     return core::fail(ErrorCode::kInvalidArgument, "least_effect",
-                      "a finite number from 0 on was expected");
+                      "a finite number of 0 or more was expected");
   }
   for (const double x : {options.smoothness, options.emphasis}) {
     if (!(x >= 0.0 && x <= 100.0)) {

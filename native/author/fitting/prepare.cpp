@@ -266,7 +266,7 @@ core::Status take_start(const StartWeights& start, State& state) {
       const float weight = start.weights[at];
       const std::string place = "start[" + std::to_string(v) + "]";
       if (!(weight >= 0.0f && weight <= 1e6f)) {
-        return core::fail(ErrorCode::kInvalidValue, place, "weights from 0 on were expected");
+        return core::fail(ErrorCode::kInvalidValue, place, "weights from 0 to 1e6 were expected");
       }
       if (weight == 0.0f) continue;
       if (start.joints[at] >= state.joints.size()) {

@@ -266,7 +266,7 @@ simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
 }
 
 // Computes the listed correctives of all frames.
-// In/out: values  [controls, kFrames]
+// In/out: values  [controls, kFrames] all controls, frame after frame for each control
 //         bits    a bit for each corrective that is not 0 in some frame
 void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, float* values,
                        std::uint64_t* bits) noexcept {

@@ -33,9 +33,9 @@ void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Wor
 bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
 /// Computes the controls of up to kFrames frames together, if go_together(). The bits of each frame
 /// equal the result of begin().
-/// In:  raw       [count, raw controls]
+/// In:  raw       [count, raw controls] the raw controls of each frame
 ///      work      of make_batch_workspace
-/// Out: controls  [count, controls]
+/// Out: controls  [count, controls] all controls of each frame
 ///      work      frame_weights; active: the controls that are not 0 in at least one frame
 ///      false, and nothing is done, if a raw control is -0: its channels would get -0 if every
 ///      channel reads its control, but +0 if only the channels of active controls are written
@@ -73,7 +73,7 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
 /// The following stages run after the joint groups; a batch runs them frame by frame. rotations()
-/// calls the next four functions in their order.
+/// calls euler_joints() and the three functions after it, in this order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,

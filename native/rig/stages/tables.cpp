@@ -91,7 +91,8 @@ void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> 
 
 // Computes the animated maps of all frames. A run whose input is 0 in all frames is skipped by one
 // test.
-// In: values  [controls, kFrames]
+// In:  values  [controls, kFrames] the values of all controls, frame after frame for each control
+// Out: out     [count, maps]
 void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::size_t count,
                 float* out) noexcept {
   const std::size_t maps = rig.animated_map_count;
@@ -110,8 +111,10 @@ void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::siz
   clamp(out, count * maps);
 }
 
-// Computes the channels of all frames. In: values  [controls, kFrames]; controls  [count,
-// controls], the same numbers
+// Computes the blend shape channels of `count` frames.
+// In:  values    [controls, kFrames] the values of all controls, frame after frame for each control
+//      controls  [count, controls] the same values, control after control for each frame
+// Out: out       [count, channels]
 void frame_channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                     const float* values, std::size_t count, const float* controls,
                     float* out) noexcept {

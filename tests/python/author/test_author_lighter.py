@@ -43,7 +43,7 @@ def face_of(shapes):
 
 
 def deltas(dna):
-    """The number of nonzero deltas at LOD 0, counted in the file."""
+    """The number of nonzero blend shape deltas at LOD 0."""
     read = dna_bytes.Face(dna.to_bytes())
     meshes = [dna.meshes[m] for m in read.lod_meshes[0]]
     return sum(int(np.asarray(t.deltas).any(axis=1).sum()) for m in meshes

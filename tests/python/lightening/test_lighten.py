@@ -108,7 +108,7 @@ def test_weights_are_fitted_and_both_sides_alike(face):
         squares["fitted"] += float(((vertices(light, raw, 0, 0) - goal) ** 2).sum())
         squares["plain"] += float(((vertices(plain, raw, 0, 0) - goal) ** 2).sum())
     assert squares["fitted"] < 0.35 * squares["plain"]
-    # A rotation of the neck moves the face as before, within 0.15 cm.
+    # If the neck rotates, the light face differs from the original face by less than 0.15 cm.
     moved = np.zeros((2, 62, 9))
     moved[1, 2, 5] = 15.0
     world = sk.world_matrices(face, moved)

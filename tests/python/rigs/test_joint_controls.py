@@ -63,7 +63,7 @@ def about(axis, angle):
 
 
 def resting(dna):
-    """The rotation matrix from the head's axes at rest to the file's axes."""
+    """The rotation matrix from the head joint's axes at rest to the DNA file's axes."""
     unit = np.pi / 180 if dna.rotation_unit == "degrees" else 1.0
     out = np.eye(3)
     for angles in dna.neutral_joint_rotations:

@@ -42,7 +42,7 @@ def begin() -> None:
 
 
 def animated() -> None:
-    """Record the time that Blender took for F-curves, NLA strips and drivers of the controls."""
+    """Record the time in which Blender evaluated F-curves, NLA strips and drivers of controls."""
     frames[-1].animation = _since(frames[-1].begin)
 
 

@@ -395,7 +395,7 @@ class RISORIUS_FH_animation(FileHandler):
 
 
 class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
-    """Copy the shape-key animation of a selected object: action, NLA strips and drivers"""
+    """Copy an object's shape-key animation (action, NLA strips, drivers) to the active face"""
 
     bl_idname = "risorius.import_arkit_rig"
     bl_label = "From ARKit Rig"

@@ -85,8 +85,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     lod_groups: bpy.props.BoolProperty(
         name="LOD Groups",
-        description="Also write the coarser levels that were built, in groups; an "
-        "engine chooses a group by distance",
+        description="Also write the coarser levels that were built: a group of levels for each "
+        "mesh, of which an engine shows one level by distance",
     )
     bake_materials: bpy.props.BoolProperty(
         name="Bake Materials",

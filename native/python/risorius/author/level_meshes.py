@@ -29,7 +29,7 @@ _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 
 
 @dataclass
 class LevelMeshes:
-    """Triangles of each coarser LOD, as layouts of the finest meshes.
+    """Triangles of each coarser LOD, as indices of layouts of the finest meshes.
 
     Attributes:
         count: number of LODs, including LODs of the source.
@@ -124,7 +124,7 @@ class _Skin:
         """The fault of the skin of a LOD as text; "" if there is none.
 
         Args:
-            triangles: int64[n, 3] as layouts; None if the LOD has no skin.
+            triangles: int64[n, 3], layout indices; None if the LOD has no skin.
         """
         if triangles is None:
             return "no skin"

@@ -84,7 +84,7 @@ def fewer_vertices(
     levels: Mapping[tuple[int, int], Ints],
     go_on: Callable[[], None],
 ) -> Fewer[F] | None:
-    """Simplify meshes for the fit of joints. Returns None if they have few vertices.
+    """Simplify meshes for the fit of joints. Returns None if they have at most `most` vertices.
 
     Args:
         work: the face.
@@ -92,7 +92,7 @@ def fewer_vertices(
         wanted: mesh -> its displacements.
         most: wanted number of vertices of all these meshes.
         attributes: attributes for the simplification by mesh; missing ones are added.
-        levels: (level, mesh) -> triangles of the coarser levels of detail, as layouts.
+        levels: (level, mesh) -> int64[n, 3], the layout indices of each triangle of a coarser LOD.
         go_on: called before each mesh; raises an error to stop.
     """
     counts = {m: len(wanted[m]) for m in shaped}

@@ -119,7 +119,7 @@ def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
 def fewer_triangles(
     mesh: Mesh, attributes: Floats, vertices: int, begin: Ints | None = None
 ) -> Ints:
-    """int64[n, 3]: triangles of a simplified mesh, as layouts of the given mesh.
+    """int64[n, 3]: triangles of a simplified mesh, as layout indices of the given mesh.
 
     The simplification preserves the shape of the surface, its texture coordinates and its
     displacements by expressions. Borders and seams stay in place. If seams prevent the reduction,
@@ -130,8 +130,8 @@ def fewer_triangles(
         mesh: the mesh; it is not changed.
         attributes: float32[layouts, n], see attributes_of().
         vertices: wanted largest number of vertices; seams and borders may require more.
-        begin: int64[n, 3], triangles of a finer level as layouts, which are simplified further;
-            None: all triangles of the mesh.
+        begin: int64[n, 3], triangles of a finer level as layout indices, which are simplified
+            further; None: all triangles of the mesh.
     """
     triangles = (fan_triangles(mesh) if begin is None else begin).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)

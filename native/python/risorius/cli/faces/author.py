@@ -84,7 +84,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--height-mm",
         type=number(1.0, 1e6),
         metavar="MM",
-        help="how high the face is, from the chin to the top; else its unit is guessed",
+        help="height from the chin to the top of the head; else the unit is guessed",
     )
     size.add_argument(
         "--scale",
