@@ -27,7 +27,8 @@ def _same_on_every_processor():
 
 
 def folder_of(maker, tmp_path):
-    """A copy of the files of a Blender version; the test is skipped if this Blender is older."""
+    """A copy of the folder of the files that a Blender version saved. The test is skipped if the
+    running Blender is older than this version."""
     made_by = tuple(int(n) for n in maker.split("."))
     if made_by[0] > bpy.app.version[0]:
         pytest.skip(

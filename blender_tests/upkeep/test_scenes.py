@@ -12,7 +12,7 @@ HEAD = "head"
 
 @pytest.fixture
 def rig(dna_file, mode):
-    """A face with keys on the jaw and the head bone at frames 1 and 10."""
+    """A face with keyframes of the jaw control and of the head bone at frames 1 and 10."""
     made = scene.load(dna_file, mode)
     bone, head = scene.face(made), scene.controls(made).pose.bones[HEAD]
     head.rotation_mode = "XYZ"

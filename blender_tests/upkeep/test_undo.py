@@ -31,7 +31,8 @@ def _activate(rig):
 
 
 def _slide(chance, rig):
-    """Move a slider other than jawOpen, which has keys: Blender would reset such a change."""
+    """Move a slider, but not jawOpen: jawOpen has keyframes, so that Blender would reset the
+    change to the value of the F-curve."""
     name = chance.choice(("mouthCornerPullL", "mouthCornerPullR", "browDownL", "eyeLookUpL"))
     scene.set_controls(rig, **{name: chance.random()})
 

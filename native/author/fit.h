@@ -49,7 +49,7 @@ struct FitOptions {
   std::size_t influences = 8;  // joints of a vertex at most
   double smoothness = 1.0;     // 0: only the error counts; 1: as smooth as Dem Bones' default
   bool symmetric = true;       // mirrored joints and weights, if the mesh is symmetric
-  /// How much the largest error counts at the cost of the mean error; 0: least squares.
+  /// A higher value makes the largest error smaller and the mean error larger; 0: least squares.
   double emphasis = 3.0;
   /// A joint takes no part in an expression in which it moves every vertex by less than this, in
   /// the shapes' unit; the other joints take over. 0: all joints take part in all expressions.

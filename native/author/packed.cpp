@@ -17,8 +17,9 @@ using core::ErrorCode;
 constexpr std::size_t kLargestStride = 256;
 constexpr std::uint32_t kMostVertices = 1u << 30;  // differences between two corners have 30 bits
 constexpr std::size_t kMostCount = std::size_t{1} << 31;
-// The largest number of bytes that one packed byte can unpack to. Rows: 4 bytes of each row in a
-// block of 256 rows. Triangles: the three corners of a triangle, 4 bytes each.
+// The largest number of bytes that one packed byte can unpack to. Rows: one byte can stand for 4
+// bytes in each of the 256 rows of a block. Triangles: one byte can stand for the three corners of
+// a triangle, 4 bytes each.
 constexpr std::size_t kMostRowBytesPerByte = 1024;
 constexpr std::size_t kMostTriangleBytesPerByte = 12;
 

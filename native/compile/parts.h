@@ -63,7 +63,8 @@ Status compile_frame(const dna::Dna& dna, Budget& budget, RigData& out);
 /// The joint groups, sorted by the coarsest LOD that uses them, coarsest first.
 Groups list_groups(const dna::Dna& dna);
 Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& out);
-/// Call it after compile_joint_groups.
+/// Compiles the joint group columns that rotate quaternion joints. Call it after
+/// compile_joint_groups.
 /// In: groups  of the file, in the order of out.joint_groups
 void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out);
 /// Compile the radial solvers and the networks.

@@ -182,8 +182,8 @@ struct MlType {
 };
 
 /// Joints that networks move. output_indices: joint * stride + attribute; the stride is 9, or 10
-/// with quaternions. Keys: 0 type of translation, 1 type of rotation (0 Euler, 1 quaternion), 2
-/// type of scale, 3 to 5 axes, 6 to 8 rotation signs, 9 rotation sequence.
+/// with quaternions. parameter_keys: 0 type of translation, 1 type of rotation (0 Euler,
+/// 1 quaternion), 2 type of scale, 3 to 5 axes, 6 to 8 rotation signs, 9 rotation sequence.
 struct MlJoints {
   Array<std::uint16_t> parameter_keys, parameter_values, input_indices, output_indices;
   bool operator==(const MlJoints&) const = default;

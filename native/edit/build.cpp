@@ -26,8 +26,9 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // higher layers come first
-  // levels: number of LODs of the units if their group must not have other numbers of LODs, because
-  // their order of columns would change; else 0. The group of a bundle has no region.
+  // levels: the number of LODs of each unit of the group if units with another number of LODs must
+  // not be in it, because they would change the order of its columns; else 0. The group of a bundle
+  // has no region.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };

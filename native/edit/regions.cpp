@@ -127,7 +127,7 @@ class Clustering {
 using Strengths = std::map<std::uint16_t, double>;
 
 // The strength below which a control does not count for a joint. If most controls of the joint are
-// weak (a faint expression, or too high a threshold), only its stronger half counts.
+// weak (a faint expression, or too high a threshold), only the stronger half of them counts.
 double least_strength(const Strengths& strengths, bool significant_only) {
   if (!significant_only || strengths.empty()) return 0.0;
   std::vector<double> all;
@@ -186,7 +186,8 @@ std::vector<Cluster> list_clusters(const dna::Dna& dna, std::span<const Unit> un
   return out;
 }
 
-// Removes the bits of controls that move no joint, which makes comparisons faster.
+// Removes the controls that move no joint from the bit sets of the clusters' controls. Shorter bit
+// sets are compared faster.
 void pack_controls(std::vector<Cluster>& clusters) {
   if (clusters.empty()) return;
   const std::size_t words = clusters[0].controls.size();

@@ -15,7 +15,7 @@ namespace {
 constexpr double kReach = 6.0;      // mm: a vertex deeper in a solid is inside for another reason
 constexpr double kSkinReach = 4.0;  // mm, of the skin in itself
 constexpr double kOpposed = -0.2;   // cosine: surfaces below it face each other
-// Mm: a vertex this far behind a surface still counts as in front of it.
+// In mm: a vertex less than 0.2 mm behind a surface still counts as in front of the surface.
 constexpr double kInFront = -0.2;
 constexpr std::size_t kWays = 128;  // directions from which light may come
 constexpr std::ptrdiff_t kLit = 6;  // open directions that make a vertex lit
@@ -157,8 +157,8 @@ void touch_skin(const Topology& topology, const Region& region, const std::vecto
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
   const Nearest nearest(region.triangles, skin);
   for (const std::uint32_t v : region.vertices) {
-    // A vertex at its neutral position needs no check: a vertex that moves into it finds the
-    // contact.
+    // A vertex at its neutral position needs no check: if other skin moves into this vertex, the
+    // check of the moved vertices finds the contact.
     if ((skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
     const auto& near = topology.around[v];
     const auto takes = [&](std::uint32_t t) {
@@ -178,8 +178,8 @@ void touch_skin(const Topology& topology, const Region& region, const std::vecto
     const Vec3 normal =
         (skin[other[1]] - skin[other[0]]).cross(skin[other[2]] - skin[other[0]]).normalized();
     const double depth = (hit->point - skin[v]).dot(normal);
-    // If the nearest point is on the rim of the triangle and the vertex lies sideways of it, the
-    // triangle's normal does not show whether the vertex is inside.
+    // If the nearest point is on the rim of the triangle and the vertex lies to the side of the
+    // triangle, the triangle's normal does not show whether the vertex is inside the skin.
     if (depth < 0.7 * hit->distance || depth <= 0.0) continue;
     keep_deeper(best, {v, static_cast<float>(depth), normal, true, other, hit->share});
   }

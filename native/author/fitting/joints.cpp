@@ -9,7 +9,8 @@ namespace risorius::author::detail {
 
 namespace {
 
-/// Error of each vertex over all expressions, averaged with its neighbours.
+/// [V] the length of each vertex's residuals in all expressions together, weighted by importance
+/// and averaged with the neighbours as a root mean square.
 std::vector<double> errors(const Problem& problem, const std::vector<float>& left) {
   std::vector<double> raw(problem.vertices), out(problem.vertices);
   const std::size_t row = 3 * problem.expressions;

@@ -22,9 +22,9 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 /// expression that rotates joints far costs as much as ten others.
 constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms are used
-// Regularisation of rotations and translations, as shares of the joints' mean stiffness. It keeps
-// joints that share vertices from turning against each other. Tried from 1e-4 to 10 on a head with
-// 52 expressions, and on four others.
+// Regularisation of rotations (kTurn) and of translations (kShift), as shares of the joints' mean
+// stiffness. It keeps joints that share vertices from turning against each other. Values from 1e-4
+// to 10 were tried on a head with 52 expressions and on four other heads.
 constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
 // Conjugate gradients stop when their residual energy falls to this share of its first value; at

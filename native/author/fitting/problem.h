@@ -15,7 +15,8 @@ namespace risorius::author::detail {
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
-/// The shapes in the fit's own unit: the mesh has size 1, and its middle is the origin.
+/// The shapes in the fit's own unit: the longest side of the mesh's bounding box is 1, and the
+/// middle of the box is the origin.
 struct Problem {
   std::size_t vertices = 0, expressions = 0, influences = 0, threads = 0;
   Vec3 middle = Vec3::Zero();

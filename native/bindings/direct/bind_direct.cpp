@@ -11,8 +11,8 @@ namespace risorius::bindings {
 
 namespace {
 
-/// A face that only one thread evaluates at a time. A thread waits for the lock without the
-/// interpreter lock.
+/// A face that only one thread evaluates at a time. A thread that waits for `lock` releases the
+/// interpreter lock, so that other Python threads go on.
 struct PyDirectFace {
   std::unique_ptr<rig::DirectFace> face;
   std::mutex lock;

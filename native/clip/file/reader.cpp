@@ -320,8 +320,8 @@ core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uin
   if (count == frames) {
     RISORIUS_TRY(decode(controls, out, stride));
   } else {
-    // The wanted frames are a part of the block. A few controls at a time are decoded completely,
-    // and only the wanted frames are copied.
+    // Only some frames of the block are wanted. kAtOnce controls at a time are decoded with all
+    // frames of the block, and only the wanted frames are copied.
     constexpr std::size_t kAtOnce = 16;
     std::vector<float> curves(kAtOnce * frames);
     for (std::size_t i = 0; i < controls.size(); i += kAtOnce) {

@@ -225,7 +225,8 @@ def make_blinks(
             size = max(abs(a - b) for a, b in zip(saccade.after, saccade.before, strict=True))
             if size > 10.0 and dice.uniform() < 0.4:
                 wanted.append(_blink(dice, saccade.start - 0.01))
-    # A loop begins and ends with open eyes.
+    # In a loop no blink may reach its first or last 0.1 s. Other clips may begin and end within a
+    # blink.
     first, last = (0.1, length - 0.1) if loop else (-1.0, length + 1.0)
     blinks: list[Blink] = []
     for blink in sorted(wanted):
@@ -245,7 +246,7 @@ def _blink(dice: _Dice, start: float) -> Blink:
 
 
 def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
-    """The closing of the left lid by a blink at some times, 0 to 1.
+    """The closing of a lid by a blink at some times: 0 is open, 1 is closed.
 
     The lid closes fast and opens ever more slowly.
     """
@@ -323,7 +324,8 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """The next gaze in degrees. After a gaze far from straight ahead, it is often near 0."""
+    """The next gaze direction in degrees. If `place` is far from straight ahead, the next
+    direction is often near straight ahead (0, 0)."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale
