@@ -248,7 +248,8 @@ def _blink(dice: _Dice, start: float) -> Blink:
 def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
     """The closing of a lid by a blink at some times: 0 is open, 1 is closed.
 
-    The lid closes fast and opens ever more slowly.
+    The lid closes fast and opens ever more slowly. `blink.late`, the delay of the right lid, is not
+    added.
     """
     t = np.asarray(times, np.float64) - blink.start
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)

@@ -206,7 +206,7 @@ def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None 
     """
     shapes = made.shapes
     every = take_combined(shapes)
-    # Without correctives of controls that the head lacks, such as a tongue's.
+    # Correctives of controls that the head lacks are left out, such as correctives of a tongue.
     known = set(shapes.expressions)
     together = subset(every, [name for name in every if set(name.split("+")) <= known])
     notes = check_shapes(shapes, lambda: _at(progress, _READ))

@@ -201,8 +201,9 @@ class Eyelids:
     ) -> Doubles:
         """The points with the edges of both lids turned towards each other.
 
-        apart: the result of _apart. rest_up: float64[n], angles up in the rest pose, in radians:
-        the upper lid's own turn from there is scaled first; None: all of the turn fades out.
+        apart: the result of _apart. rest_up: float64[n], each vertex's angle up in the rest pose,
+        in radians: the upper lid's rotation since the rest pose is scaled first (see _scaled);
+        None: `_fade` distributes the whole rotation.
         """
         frame = self.opening.frame
         across, up, away = frame.angles(points)
@@ -381,8 +382,8 @@ class Eyelids:
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
-        # The rim of a moved lid keeps its distance from the eye's surface in the rest pose, but at
-        # most _SKIN.
+        # The rim of a moved lid is lifted to the distance from the eye's surface that it has in the
+        # rest pose, or to _SKIN mm if that distance is larger.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)

@@ -25,7 +25,7 @@ class Fitted:
 
     Attributes:
         kind: EYE, TEETH and so on; SKIN is a mesh that lies on the skin, such as a tear line.
-        part: its mesh; `shapes` are its displacements by expression, if known.
+        part: the mesh; `part.shapes` has its displacements by expression, if they are known.
         side: "L" or "R" for eyes, else "".
         hangs: HEAD or JAW, the bone of a rigid mesh in the mouth; "" for others.
         own: True for a mesh of the target, False for a mesh of the template.

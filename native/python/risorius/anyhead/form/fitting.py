@@ -114,7 +114,7 @@ class Step:
         prior: strength of the pull of weights towards 0; 1: the model's standard deviations.
         least_cosine: least cosine between the normals of a pair.
         expressions: whether weights of expressions may change.
-        noise: cm of the form: standard deviation of distances that the model cannot explain.
+        noise: standard deviation, in cm of the model, of distances that the model cannot explain.
     """
 
     rounds: int

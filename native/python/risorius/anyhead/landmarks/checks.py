@@ -188,7 +188,8 @@ def check_crossings(where: str, target: Target, pose: Pose) -> None:
         pose: the pose of the model in the surface.
 
     Raises:
-        LandmarkError: more than 6 % of its edges pass through the face. A few do in any nostril.
+        LandmarkError: more than 6 % of its edges pass through the face. A few edges are allowed,
+            because the skin of nostrils often intersects itself.
     """
     share = crossed(target, pose)
     if share > _CROSSED:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Moves the vertices of a head near another head, by the fitted models and landmarks of both."""
+"""Moves the vertices of a head to approximate places on another head.
+
+The places follow from the head models that were fitted to both heads, and from their landmarks.
+"""
 
 from __future__ import annotations
 
@@ -151,7 +154,8 @@ def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
 def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> Doubles:
     """A smooth correction, float64[n, 3], in addition to the displacement by the fitted models.
 
-    With both, the landmarks of the first head meet the landmarks of the second head."""
+    With the displacement and the correction, the landmarks of the first head meet the landmarks of
+    the second head."""
     names = common(one, other)
     if not names:
         return np.zeros_like(inside)

@@ -98,8 +98,8 @@ class Contacts:
         return float(beyond @ self._share) * MM**3
 
     def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """The volume of `volume` in mm3, measured by SkinChecker, which is slower. Contacts of the
-        skin with itself do not count.
+        """The same volume in mm3 as the result of `volume`, measured by SkinChecker, which is
+        slower. Contacts of the skin with itself do not count.
 
         Args:
             displacement: float64[V, 3], displacements of the skin vertices.
@@ -171,7 +171,7 @@ class Contacts:
         return SkinFaults(depth, itself.stretch, itself.fold)
 
     def _areas(self, points: Doubles, own: Ints) -> Doubles:
-        """float64[polygons]: twice the area of each polygon, summed over the triangles `own`."""
+        """float64[polygons]: twice the area of each polygon. Only its triangles in `own` count."""
         a, b, c = (points[self.skin.triangles[own, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         if self._face_of is None:

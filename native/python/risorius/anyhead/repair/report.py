@@ -17,8 +17,8 @@ class Faults:
             in other poses.
         cut: mm, largest depth to which a lid's outer surface enters an eye.
         lip_gap: mm, widest gap between the lips if the pose closes the mouth; 0 in other poses.
-        lip_cut: mm by which one lip is at most deeper in the other than in the rest pose, in the
-            same poses.
+        lip_cut: largest depth in mm of one lip in the other, minus this depth in the rest pose, if
+            the pose closes the mouth; 0 in other poses.
         volume: mm3 of skin deeper in teeth and gums than in the rest pose.
         stretched: number of polygons with more than 2.5 times their area in the rest pose.
     """

@@ -38,7 +38,8 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
         correctives: (raw controls, displacements float64[V, 3] before skinning) of each corrective.
 
     Raises:
-        ArgumentError: the face has networks or solvers, whose inputs follow the correctives.
+        ArgumentError: the face has networks or solvers. Their controls have numbers after the
+            correctives, so that new correctives would change these numbers.
     """
     raw, had = len(dna.raw_control_names), dna.psd_count
     others = len(dna.machine_learned_behavior.neural_networks) + len(dna.rbf_behavior.solvers)
@@ -173,12 +174,13 @@ class _Nearest:
         )
 
     def of(self, points: Doubles, normals: Doubles) -> tuple[Ints, Doubles, Doubles]:
-        """int64[n, 3], corners of the nearest triangle; float64[n, 3], their shares; float64[n],
-        distances in mm.
+        """int64[n, 3], corners of the nearest triangle; float64[n, 3], barycentric coordinates;
+        float64[n], distances in mm.
 
         Args:
-            points: float64[n, 3].
-            normals: float64[n, 3], normals of the points that the skin must have too, or empty.
+            points: float64[n, 3], in the unit of the file.
+            normals: float64[n, 3], normals of the points: only skin with a similar normal is
+                searched. Empty: all skin is searched.
         """
         if len(normals):  # topology makes the checker expensive for a large skin
             self._checker = self._checker or make_checker(self._dna, self._skin, [])

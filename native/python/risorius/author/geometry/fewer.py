@@ -174,8 +174,11 @@ def _normals(mesh: Mesh) -> Doubles:
 
 
 def _take_own(wanted: Wanted, kept: Ints, corners: Ints, shares: Doubles) -> None:
-    """Replace the places of vertices whose motion is closer to the motion of the kept vertex that
-    is nearest along the edges, such as vertices of a lip that lie nearer to the other lip.
+    """Correct `corners` and `shares` of vertices that were matched to the wrong part of the mesh,
+    such as vertices of a lip that lie nearer to the other lip.
+
+    A vertex gets the kept vertex that is nearest along the edges if the motion of this kept vertex
+    is more similar to its motion than the motion of the nearest triangle.
 
     Args:
         wanted: the displacements of the whole mesh.

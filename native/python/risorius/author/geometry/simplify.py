@@ -182,8 +182,8 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
 
 
 def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: int) -> Ints:
-    """int64[n, 3]: triangles of one piece, simplified as a whole. Welds texture seams if they block
-    progress."""
+    """int64[n, 3]: triangles of one piece, simplified as a whole. Texture seams are welded if they
+    prevent the reduction to `vertices`."""
     used, own = np.unique(triangles, return_inverse=True)
     triangles = own.reshape(-1, 3).astype(np.uint32)
     places = np.asarray(mesh.layout_positions, np.int64)[used]

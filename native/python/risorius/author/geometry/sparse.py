@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Displacements of many vertices in many expressions, of which each moves only some vertices."""
+"""Stores displacements by expressions; an expression takes memory only for vertices it moves."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ Numbers = npt.NDArray[Any]
 
 
 class SparseShapes(MutableMapping[K, Doubles]):
-    """Displacements float64[V, 3] by key; only the vertices that move are held.
+    """Displacements float64[V, 3] by key; only the vertices that move are stored.
 
-    Reading a key makes a new array. Numbers of more than LARGE vertices are rounded to float32.
+    Reading a key makes a new array. If there are more than LARGE vertices, the displacements are
+    stored as float32.
 
     Attributes:
         count: number of vertices.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The displacements of a mesh in each expression, computed in blocks if the mesh is large."""
+"""Computes the displacements of a mesh in each expression, in blocks if the mesh is large."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Block(NamedTuple):
 class Wanted:
     """The displacements of a mesh with each input at 1.
 
-    They are held for meshes of at most LARGE vertices and computed again at each use for larger
-    meshes.
+    For a mesh of at most LARGE vertices the displacements are stored. For a larger mesh they are
+    computed again at each use.
 
     Attributes:
         mesh: the mesh.
@@ -95,7 +95,7 @@ class Wanted:
             yield Block(vertices, part, wanted)
 
     def at(self, vertices: Ints) -> Doubles:
-        """float64[C, n, 3]: the displacements of some different vertices."""
+        """float64[C, n, 3]: the displacements of some vertices, each of which is listed once."""
         if self._whole is not None:
             return self._whole[:, vertices]
         (part,) = split_mesh(self.mesh, [vertices])

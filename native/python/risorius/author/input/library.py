@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Makes a file for each expression that one shape of a face makes, in a folder next to its DNA."""
+"""Makes an expression file for each shape of a face that is a viseme or moves the whole face.
+
+The files belong in a folder next to the face's DNA file.
+"""
 
 from __future__ import annotations
 

@@ -324,7 +324,10 @@ def _part_mesh(mesh: ObjMesh, part: FacePart) -> ObjMesh:
 
 
 def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> list[_Delta]:
-    """The controls; of controls with the same name the last expression counts."""
+    """For each control: its name, its expression, and its share of the expression's displacements.
+
+    If several expressions have the same control, the last one counts.
+    """
     out: dict[str, _Delta] = {}
     for expression in shapes.expressions:
         named = controls.get(expression, [expression])

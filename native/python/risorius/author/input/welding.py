@@ -101,8 +101,8 @@ def _open_vertices(mesh: ObjMesh) -> Ints:
 def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
     """Pairs of vertices in the same grid cell: the cell's first vertex and each other vertex.
 
-    The grid is also shifted by half a cell along each axis, so that two close vertices share a
-    cell in at least one grid.
+    Eight grids are used, shifted by half a cell along every combination of axes, so that two close
+    vertices share a cell in at least one grid.
     """
     out = []
     cell = 4 * same
