@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tests that files of older versions play the same values bit for bit.
 
-Bones and keys are compared in Live mode, in which these files were saved; Direct mode must show
-the same vertices.
+Bones and shape keys are compared in Live mode, in which these files were saved; Direct mode must
+show the same vertices.
 """
 
 import shutil

@@ -79,7 +79,7 @@ void bind_faults(py::module_& m) {
 
 using CheckerClass = py::class_<SkinChecker>;
 
-// Binds the methods that only read a skin.
+// Binds the methods of SkinChecker that find faults or nearest points, but repair nothing.
 void bind_looks(CheckerClass& c) {
   c.def_property_readonly(
        "shown",

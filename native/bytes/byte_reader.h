@@ -89,11 +89,13 @@ class ByteReader {
   /// Reads n values without a count, straight into out. In: n already checked by count(). After a
   /// failure the content of out is undefined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
-  /// Reads n integers without a count, as read_f32 does. `largest` is raised as in u32_list.
+  /// Read n integers without a count, as read_f32 does. `largest` of read_u32 is raised as in
+  /// u32_list.
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 
-  /// The path of the field that is being read, for errors: push on entry, pop on exit (see Field).
+  /// The path of the field that is being read, for errors. Objects of class Field add a name to the
+  /// path and remove it again.
   std::string where() const;
 
  private:

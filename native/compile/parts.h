@@ -88,7 +88,8 @@ Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatr
 /// Marks the inputs of blend shape channels and animated maps, up to the row counts of each LOD.
 void mark_channels_and_maps(const RigData& r, Used& used);
 
-/// Chooses the watched correctives, and fills the lists of steps of each LOD. Call it last.
+/// Chooses the watcher of each corrective, the factor that decides whether it is evaluated, and
+/// fills the lists of steps of each LOD. Call it last.
 /// In: used  the controls that the outputs of a LOD read
 ///     lods  the operations and solvers that run at a LOD
 Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& out);

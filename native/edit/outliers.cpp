@@ -8,7 +8,8 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Counts for each watched corrective and LOD how many rows, channels and maps read it.
+// Counts for each corrective in watched_correctives() and each LOD how many rows, channels and maps
+// read the corrective.
 class Uses {
  public:
   Uses(const dna::Dna& dna, const std::vector<Unit>& units)

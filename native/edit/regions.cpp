@@ -20,9 +20,9 @@ namespace {
 // noisy face in 1 and in 464 groups), by file size it is 0. Any value from 8 to 64 gives a
 // full-scale face the same groups.
 constexpr std::int64_t kColumnOverhead = 8;
-// Clusters are merged until there are at most one for each kJointsOfGroup joints, or kFewGroups.
-// Otherwise joints that share few controls would end in many small groups, which are slow to
-// evaluate.
+// Clusters are merged until there is at most one for each kJointsOfGroup joints; kFewGroups
+// clusters are always allowed. Without this limit, joints that share few controls would end in many
+// small groups, which are slow to evaluate.
 constexpr std::size_t kJointsOfGroup = 14, kFewGroups = 16;
 constexpr std::int64_t kMostRows = 65535;  // the format counts rows of a LOD in 16 bits
 

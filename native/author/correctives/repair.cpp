@@ -13,8 +13,9 @@ namespace risorius::author::detail {
 
 namespace {
 
-// A part of the pose is faded out in at most kFades rounds. Each round undoes 1 / kSteps more of
-// its motion at a fault.
+// A part of the pose is faded out in at most kFades rounds. In each round, the undone share of its
+// motion grows by 1 / kSteps, up to 1, at the vertices that still have a fault. There are more
+// rounds than steps, because undoing may cause faults at other vertices.
 constexpr std::size_t kFades = 9, kSteps = 6;
 constexpr double kUndone = 2.0;  // cost of undoing the whole motion; all faults of one kind cost 1
 // A repair with at most this cost ends the search for a better one. A repair that leaves any fault
@@ -247,9 +248,9 @@ void solve(Work& work, const std::vector<Vec3>& base) {
 }
 
 /// Whether a repair worsens neither a sum of faults nor, beyond small tolerances, the deepest
-/// vertex and the most stretched face of the skin. The sums leave out the faults that a part of the
-/// pose has if it is applied alone, because these faults are allowed. But undoing another part must
-/// not cause them.
+/// vertex and the most stretched face of the skin. The sums leave out allowed faults, which are the
+/// faults that one part of the pose has alone. Without the limits on depth and stretch, undoing
+/// another part could bring these faults into the pose.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&

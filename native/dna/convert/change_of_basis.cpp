@@ -57,8 +57,8 @@ Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
     out[i] = std::atan2(parity * r[j][k], r[k][k]);
     out[k] = std::atan2(parity * r[i][j], r[i][i]);
   }
-  // cos(90 degrees) in double is not exactly 0. Without this, a row of angles that should be 0
-  // would have tiny values.
+  // cos(90 degrees) in double is not exactly 0, so that an angle that should be 0 gets a tiny
+  // value. Such angles become 0, so that a row of them can be dropped.
   for (double& angle : out) {
     if (std::abs(angle) < 1e-14) angle = 0;
   }

@@ -323,8 +323,8 @@ void apply_to_networks(const LodPlan& plan, Lookup& lookup, Dna& dna) {
   }
 }
 
-// Reduces the row table of a network operation to the kept LODs. The table has a number of rows for
-// each layer and LOD, all LODs of a layer together.
+// Reduces the row table of a network operation to the kept LODs. The table has the number of rows
+// for each LOD of the first layer, then for each LOD of the second layer, and so on.
 void cut_row_table(const LodPlan& plan, std::size_t lod_count, MlOperation& op) {
   constexpr std::uint16_t kMlp = 3;
   const std::size_t table = op.parameters.empty() ? 0 : op.parameters.size() - 1;

@@ -18,8 +18,8 @@ class ClipWriter:
     """Records a clip to PATH.part frame by frame; close() renames it to PATH.
 
     A clip that was not closed stays as a .part file, which `ClipReader(part, recover=True)` reads
-    up to the last complete block. As a context manager, the writer closes at the end, but not after
-    an exception.
+    up to the last complete block. A `with` statement closes the clip at the end of its block, but
+    not after an exception.
     """
 
     def __init__(

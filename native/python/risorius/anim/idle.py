@@ -36,8 +36,9 @@ MICRO = {
     "mouthPressD": (0.05, 2.9),
 }
 MICRO_JAW = ("jawOpen", 0.018, 1.5)
-# Directions of saccades (frequency, x, y): up, down and the sides are about twice as frequent as
-# diagonals (Lee, Badler & Badler 2002, Eyes Alive, table of measured directions).
+# Directions of saccades: (share of all saccades, x, y). Up, down and the sides are about twice as
+# frequent as diagonals (Lee, Badler & Badler 2002, Eyes Alive, table of measured directions).
+# _DIAGONAL is x and y of a unit vector at 45 degrees.
 _DIAGONAL = 0.70710678
 _DIRECTIONS = (
     (0.16, 1.0, 0.0),

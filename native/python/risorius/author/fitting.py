@@ -55,7 +55,7 @@ def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Double
         positions: float64[J, 3], neutral positions of the joints.
 
     Returns:
-        Both float64[E, J, 3]; an angle is in radians.
+        The rotation vectors (axis times angle in radians) and the shifts, float64[E, J, 3] each.
     """
     moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
     return rotation_vectors(motions[..., :3]), moved - positions

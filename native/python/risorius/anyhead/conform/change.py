@@ -243,7 +243,8 @@ class Change:
 
         Args:
             middle: float64[3], the point.
-            reach: standard deviation of the Gaussian weights of the vertices.
+            reach: standard deviation of the Gaussian weights of the vertices by their distance
+                from the point, in the file's unit.
         """
         square = ((self.before.points - middle) ** 2).sum(axis=1)
         share = np.exp(-(square - square.min()) / (2 * reach**2))

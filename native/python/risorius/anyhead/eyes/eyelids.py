@@ -413,8 +413,8 @@ def _crossings(columns: Doubles, begins: Doubles, ends: Doubles) -> tuple[Ints, 
     """int64[n] each: edges and columns that cross.
 
     Args:
-        columns: float64[k], ascending.
-        begins, ends: float64[E], values of both ends of each edge.
+        columns: float64[k], angle across of each column in radians, ascending.
+        begins, ends: float64[E], angles across of both ends of each edge in radians.
     """
     low, high = np.minimum(begins, ends), np.maximum(begins, ends)
     first = np.searchsorted(columns, low, "left")

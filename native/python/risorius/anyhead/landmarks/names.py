@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lists the names of the landmarks of a face, and their names in sentences."""
+"""Lists the landmarks of a face: their names in files, and the words for them in sentences."""
 
 from __future__ import annotations
 
