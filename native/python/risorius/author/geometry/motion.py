@@ -73,7 +73,8 @@ def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Mot
 
 
 def _entries(dna: Dna, columns: Sequence[int]) -> tuple[Ints, Ints, Doubles]:
-    """Input, output and value of each nonzero number of the joint groups."""
+    """For each value other than 0 that an input in `columns` has in the joint groups: index of the
+    input, index of the output, and the value."""
     known = np.zeros(1 << 16, bool)  # one for each index, because the format has 16 bits
     known[np.asarray(columns, np.int64)] = True
     parts = []

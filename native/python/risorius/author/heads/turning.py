@@ -129,8 +129,10 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The largest pair of spheres that may be left and right eye, each with the index of its
-    mesh."""
+    """The pair of spheres that may be left and right eye, each with the index of its mesh.
+
+    Meshes named like eyes come before other meshes, then larger spheres before smaller ones.
+    """
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
         for j, right in found:

@@ -20,7 +20,8 @@ def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
     Raises:
-        ShapeFileError: no word of _NEUTRAL is a file name or is part of exactly one file name.
+        ShapeFileError: no file is named like a word of _NEUTRAL, and each of these words is part
+            of no file name or of several.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:
