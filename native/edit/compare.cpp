@@ -51,7 +51,8 @@ Frames random_frames(const rig::Rig& rig, std::uint32_t count, std::uint64_t see
   return out;
 }
 
-// The compared frames: each raw control alone at 1, then the random poses.
+// The compared frames: one frame for each raw control, with this control at 1 and the others at
+// their initial values; then the random poses.
 Frames all_frames(const rig::Rig& rig, const RegroupOptions& options) {
   Frames out;
   for (std::uint32_t c = 0; c < rig.raw_count; ++c) {

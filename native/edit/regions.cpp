@@ -123,7 +123,8 @@ class Clustering {
   std::size_t count_;
 };
 
-// The strongest effect of each control on one joint, as a share of the threshold.
+// The strongest effect of each control on one joint, as a share of the threshold. At a quaternion
+// joint it is raised by 1, so that no control counts as weak.
 using Strengths = std::map<std::uint16_t, double>;
 
 // The strength below which a control does not count for a joint. If most controls of the joint are

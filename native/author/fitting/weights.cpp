@@ -87,8 +87,8 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
-  // Only one joint without motion is a candidate: several such joints would fill the candidate
-  // slots.
+  // Only the first joint without motion is always a candidate: if all joints without motion were,
+  // they would fill the candidate slots.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (!state.joints[j].rests) continue;
     note(j, 100.0);
@@ -127,8 +127,8 @@ class Simplex {
  public:
   Simplex(Matrix gram, Column right) : gram_(std::move(gram)), right_(std::move(right)) {
     // The small ridge gives two joints that move alike equal weights, and keeps rounding errors
-    // from making one negative. The goal that the weights sum to 1 is a further row of the least
-    // squares, weighted so heavily that the sum is 1 up to rounding.
+    // from making a weight negative. The goal that the weights sum to 1 is a further row of the
+    // least squares, weighted so heavily that the sum is 1 up to rounding.
     gram_.diagonal().array() += 1e-7 * gram_.diagonal().maxCoeff();
     const double heavy = 1e4 * (gram_.diagonal().maxCoeff() + 1e-30);
     gram_.array() += heavy;

@@ -195,7 +195,8 @@ def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
 
 
 def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
-    """The transform to the eyeball of the target head that is near the estimated centre."""
+    """The transform to the eyeball of the target head that is nearest to the estimated centre; the
+    transform `way` if no eyeball is near."""
     near = [b for b in balls if np.linalg.norm(b.middle - way.becomes) < way.size * radius]
     if not near:
         return way

@@ -277,7 +277,8 @@ def _called(piece: HeadPart, kind: str) -> str:
 
 
 def _divide_mouth(out: Fittings, place: _Place) -> None:
-    """Attach upper teeth to the head, and lower teeth and tongue to the jaw."""
+    """Attach upper teeth and gums to the head, and lower teeth and gums and the tongue to the
+    jaw."""
     rows: list[Fitted] = []
     middle = _between_rows(out, place)
     for row in out.rows:

@@ -19,7 +19,8 @@ _OWN = ("tongue", "lash", "eye")  # meshes with shapes that do not follow from t
 
 
 def template_parts(dna: Dna) -> tuple[int, list[HeadPart]]:
-    """The index of the skin and all meshes of LOD 0, in cm, y up, the face towards +z.
+    """All meshes of LOD 0 in cm, y up, the face towards +z, and before them the index of the skin
+    among these meshes.
 
     Only shapes that do not follow from the skin are kept: tongue, lashes and pupils.
 

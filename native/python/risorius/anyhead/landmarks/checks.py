@@ -68,8 +68,8 @@ def pieces(surface: Surface) -> list[Surface]:
 
 
 def _overlapping(low: Doubles, high: Doubles) -> Ints:
-    """int64[n]: a group number for each box; boxes that overlap, directly or through others, have
-    the same number."""
+    """int64[n]: a group number for each box. Boxes that overlap, directly or through other boxes,
+    have the same number. More than 2000 boxes all get the number 0, to save time."""
     out = np.arange(len(low))
     if len(low) > 2000:  # hair of many strands
         return np.zeros(len(low), np.int64)
