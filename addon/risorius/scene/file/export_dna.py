@@ -271,7 +271,7 @@ class _Job:
             self.edited = True
             self.report.append(
                 told(
-                    "Joint {joint}: moved by {distance:.3f} mm, rotated by {angle:.3f} degrees.",
+                    "Joint {joint}: {distance:.3f} mm, {angle:.3f} degrees.",
                     joint=self._dna.joint_names[joint],
                     distance=edit.distance * self._unit * 1000,
                     angle=np.degrees(edit.angle),

@@ -111,7 +111,7 @@ def structure(
         return make(**{field: keywords[field] for field in own})
     if own:
         found = ", ".join(sorted(own))
-        raise ArgumentError(f"either {name} or {found} was expected, found both")
+        raise ArgumentError(f"{name}: no {found} beside it was expected, found both")
     return given
 
 
