@@ -221,7 +221,8 @@ def quaternions(angles: Float) -> Float:
             its own left shoulder; the face looks along -y, z is up.
 
     Returns:
-        float64[n, 4], w first; each has the sign that is nearest to its predecessor.
+        float64[n, 4], w first; roll is applied first, then pitch, then yaw. Each quaternion has
+        the sign that is nearest to its predecessor.
     """
     half = np.zeros((len(angles), 3))
     half[:, : angles.shape[1]] = angles / 2

@@ -225,7 +225,7 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """The raw controls above and below 0 of a GUI control, and the GUI control's name.
+    """Names: the raw controls that a GUI control drives above and below 0, and the GUI control.
 
     The second name is "" if no raw control is driven below 0.
     """

@@ -122,8 +122,9 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
     """Height of the picture, and height of its centre above the eyes.
 
-    The eyes are at the upper third, unless hair needs more room. The picture of a face with a neck
-    ends above the lower end of its mesh; a face without a neck is shown completely.
+    The eyes are a third of the picture's height below its top, unless hair needs more room. The
+    picture of a face with a neck ends above the lower end of its mesh; a face without a neck is
+    shown completely.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
     if -low <= _NECK * unit:

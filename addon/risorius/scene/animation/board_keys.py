@@ -132,7 +132,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
     """Convert slider keys of a new action to keys of board handles if the face board leads.
 
     Args:
-        rig: the character that will play it.
+        rig: the character that will play the action.
         action: an action that no other datablock plays.
 
     Returns:

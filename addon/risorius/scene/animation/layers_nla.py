@@ -162,7 +162,8 @@ def _set_influence(
     strip.use_animated_influence = True
     strip.influence = value
     start, end = strip.frame_start, strip.frame_end
-    # If the fades overlap, the peak is at their crossing: min((t - start) / in, (end - t) / out).
+    # If the fades overlap, the peak is at frame t where the lines (t - start) / fade_in and
+    # (end - t) / fade_out cross.
     top = min(1.0, (end - start) / max(fade_in + fade_out, 1e-9))
     keys = {start + fade_in * top: value * top, end - fade_out * top: value * top}
     if fade_in:

@@ -140,7 +140,7 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Move new keys of the active action into the tweak, and note controls moved without a key.
+    """Move new keys of the active action into the tweak; record controls moved without a key.
 
     Args:
         controls: an edited control armature.

@@ -157,7 +157,7 @@ def take(
     held: bool = False,
     old: Curves | None = None,
 ) -> int:
-    """Store edited sliders and bones in the tweak at a frame, and reset them to the keys below.
+    """Store edited sliders and bones in the tweak at a frame, and reset them to the keys below it.
 
     Args:
         controls: control armature with an active tweak.

@@ -312,7 +312,7 @@ def _paint(piece: Piece, which: Ints, share: Floats) -> tuple[Floats, Floats]:
 
 
 def _blurred(values: Floats, reach: int) -> Floats:
-    """Means over squares of 2 * reach + 1 samples; samples beyond the edge repeat the edge."""
+    """Means over squares with sides of 2 * reach + 1 samples; the edge is repeated outwards."""
     for axis in (0, 1):
         edges = [(0, 0), (0, 0)]
         edges[axis] = (reach + 1, reach)
