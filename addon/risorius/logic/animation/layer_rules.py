@@ -78,7 +78,7 @@ class Span:
         return (self.last - self.first) * self.scale
 
     def scene_range(self) -> tuple[float, float]:
-        """The frames of the scene in which the layer plays."""
+        """The first and the last frame of the scene at which the layer plays."""
         if self.warp is not None:
             return float(self.warp[0][0]), float(self.warp[0][-1])
         return self.start, self.start + self.period * self.repeat

@@ -155,9 +155,10 @@ def _place_strip(strip: bpy.types.NlaStrip, span: logic.Span) -> None:
 def _set_influence(
     strip: bpy.types.NlaStrip, value: float, fade_in: float = 0.0, fade_out: float = 0.0
 ) -> None:
-    """Key the influence of a strip: a constant value, with a fade at each end, in frames.
+    """Key the influence of a strip: a constant value, with a fade at each end.
 
-    A strip with animated influence ignores blend_in and blend_out.
+    The lengths of the fades are in frames; 0 means no fade. A strip with animated influence
+    ignores blend_in and blend_out.
     """
     strip.use_animated_influence = True
     strip.influence = value

@@ -169,7 +169,10 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
-    """Copy the stored DNA file, the array lengths and the armatures' properties to the old rig."""
+    """Copy the stored DNA file and the armatures' properties to the old rig.
+
+    The arrays of animated maps and blend shape channels get the lengths for the new file.
+    """
     rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], storage.text_of(rig)
     label = former.name if former is not None else text.name

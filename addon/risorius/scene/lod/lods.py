@@ -159,6 +159,6 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
-            # Otherwise a library override loses the value when the file is opened, and the flag
-            # would count as a choice of the user.
+            # Mark the value as overridable. Otherwise a library override loses the value when the
+            # file is opened, and the flag would count as a choice of the user.
             item.property_overridable_library_set(f'["{written}"]', True)
