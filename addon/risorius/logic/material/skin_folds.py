@@ -132,7 +132,8 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils do not count, so that they keep their subsurface scattering.
+    The material has no subsurface scattering where the value is 1. Rims of lids, lips and nostrils
+    do not count as borders, so that the skin around them keeps its subsurface scattering.
 
     Args:
         points: float[V, 3], in Blender units.

@@ -2,8 +2,8 @@
 """Replaces a character's DNA file and keeps its objects.
 
 The new character is built as separate objects first, so that a bad file changes nothing. Then its
-data move into the existing objects, meshes, keys and bones. So references to these and additions
-by the user stay.
+data move into the existing objects, meshes, shape keys and bones. So references to these data, and
+additions by the user, stay.
 """
 
 from __future__ import annotations
