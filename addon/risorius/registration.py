@@ -207,7 +207,7 @@ def _refresh_once() -> None:
 
 
 def unregister() -> None:
-    """Undo `register` in reverse."""
+    """Undo the steps of `register` in reverse order."""
     if _idle:
         bpy.utils.unregister_class(_idle.pop())
         words.forget_language()

@@ -47,7 +47,7 @@ class Timing:
         return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
 
     def seconds(self, frames: Float) -> Float:
-        """The inverse of `frames`."""
+        """Seconds on the clip's clock for frames of the scene; the inverse of `frames`."""
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:

@@ -51,7 +51,7 @@ class Placing:
         return self.offset + self.scale * frame
 
     def own(self, frame: float) -> float:
-        """The inverse of `shown`."""
+        """The frame of the action that plays at a frame of the scene; the inverse of `shown`."""
         return (frame - self.offset) / self.scale
 
 

@@ -152,6 +152,6 @@ def _lamp(row: _Row, unit: float) -> Lamp:
         far * math.sin(lift),
     )
     # A softbox of W watts emits W / pi per steradian along its axis. At the distance `far`, the
-    # face gets W / (pi far^2) per unit area.
+    # face gets W / (pi far^2) per unit area. The wanted light at the face is share * _EXPOSURE.
     watts = share * _EXPOSURE * math.pi * far * far
     return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

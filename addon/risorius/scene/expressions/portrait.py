@@ -273,7 +273,10 @@ class _Picture:
         return picture.reshape(self.high, self.high, 3)[::-1]
 
     def _hollows(self) -> Floats:
-        """float64[h * w] in [0, 1]: how far a sample lies behind the mean depth around it."""
+        """float64[h * w]: how far a sample lies behind the mean depth around it, 0 to 1.
+
+        The value is 1 from a distance of 6 % of the picture's height.
+        """
         depth = self.depth.reshape(self.high, self.high)
         there = np.isfinite(depth)
         held, reach = np.where(there, depth, 0.0), max(self.high // 24, 1)
