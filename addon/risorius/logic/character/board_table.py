@@ -33,7 +33,9 @@ _OPPOSITES = (
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a conditional: adds slope * value + cut to a raw control if low <= value <= high.
+    """A row of a DNA file's conditionals, which convert GUI controls to raw controls.
+
+    Adds slope * value + cut to a raw control if low <= value <= high.
 
     Attributes:
         gui, raw: indices of the GUI control and of the raw control.

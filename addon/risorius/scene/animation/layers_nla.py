@@ -21,8 +21,8 @@ _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
 def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
-    Blender evaluates the NLA below all layers, so the layers above that layer stay. Converted
-    layers are muted. The active action becomes the lowest new strip.
+    This layer and all layers above it stay, because Blender evaluates the NLA before all layers.
+    Converted layers are muted. The active action becomes the lowest new strip.
 
     Args:
         scene: gives the frame rate.

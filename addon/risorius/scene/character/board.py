@@ -36,7 +36,7 @@ class _Places:
     Attributes:
         names: names of all pose bones of the armature; if they change, the indices are renewed.
         live: Runtime of the handles.
-        at: int[n], indices into the flat float[bones, 3] of locations.
+        at: int[n], indices into the flattened array float[bones, 3] of locations.
         gui: int[n], index of the GUI control of each location.
         low, high: float32[n], range of each location.
         unit: float32[n], value of the GUI control for a location of 1.
