@@ -303,7 +303,7 @@ class Board:
 
 
 def _mouth_of(name: str) -> str:
-    """The name of the mouth shape in a marker's name, after the word and colon."""
+    """The mouth shape in the name of a marker, which may begin with a word and a colon."""
     return name.rpartition(":")[2].strip()
 
 

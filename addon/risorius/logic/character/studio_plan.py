@@ -90,7 +90,8 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 
     Args:
         apart: distance between the eyes, in Blender units.
-        low, high: corners of the bounding box of all meshes of the face, in the head's axes.
+        low, high: corners of the bounding box of all meshes of the face, in the head's axes and
+            Blender units.
 
     Raises:
         ValueError: `apart` is not above 0.

@@ -114,7 +114,8 @@ def _stage(
 ) -> Iterator[bpy.types.Scene]:
     """Context manager: the scene in which frames are evaluated.
 
-    This is a new scene with the given objects, or the user's scene if necessary."""
+    This is a new scene with the given objects, or the user's scene if necessary.
+    """
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:
             yield scene

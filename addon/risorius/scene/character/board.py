@@ -232,8 +232,8 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
         rig: the character.
 
     Returns:
-        Values of all existing sliders. If the board leads, sliders that its handles can move have
-        the values that the board gives them.
+        Values of all existing sliders. If the board leads, sliders that handles can move have the
+        values that the board gives them.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -244,7 +244,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Slider name -> value from the board, for the sliders that its handles can move.
+    """Slider name -> value from the board, for the sliders that the board's handles can move.
 
     Args:
         rig: the character.

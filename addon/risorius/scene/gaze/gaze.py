@@ -266,7 +266,7 @@ def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion])
 
 
 def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternion]) -> Float:
-    """The position of a point relative to the head, for a head that is not rotated.
+    """The position of a point that moves with the head, for a head that is not rotated.
 
     Both positions, `point` and the result, are in the armature's space.
     """

@@ -67,7 +67,7 @@ class _Tree:
         return node.outputs[1]
 
     def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
-        """Samples a value at vertex `index` of the mesh; `kind` is its data type."""
+        """Samples a value at vertex `index` of the mesh; `kind` is the data type of the value."""
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
         self.put(mesh, node.inputs[0])
         self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
