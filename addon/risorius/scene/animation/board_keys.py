@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts the current pose and the keys of an action between sliders and the face board.
 
-Either the sliders or the board lead, that is, move the face; the others have no effect.
+Either the sliders or the board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations

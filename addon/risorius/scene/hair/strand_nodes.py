@@ -156,7 +156,7 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A random displacement of each lock, up to `most` along each axis.
+    """A random displacement of each lock, up to `most` Blender units along each axis.
 
     Returns: a node that scales the displacement; the caller connects its input Scale.
     """
