@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers all classes, properties and handlers in order, and unregisters them in reverse."""
+"""Registers all classes, properties and handlers, and unregisters them in reverse order."""
 
 from collections.abc import Mapping
 

@@ -2,7 +2,7 @@
 """The table of GUI controls: which raw controls each drives, and its range.
 
 A DNA file with GUI controls contains the table. For other files it is made from the names of raw
-controls. Each raw control has a GUI control; two opposites (Up and Down, Wide and Narrow) share
+controls. Each raw control has a GUI control; two opposites, such as Up and Down, share
 one. GUI controls for Up, Down, Left and Right of one name share a handle.
 """
 

@@ -4,8 +4,7 @@
 The location of a handle in its own axes gives the value of its GUI control, independent of the
 positions of board, armature and face. Raw controls without a GUI control keep their sliders. Either
 the board or the sliders lead, that is, move the face. A leading board replaces only the sliders
-that its handles can move. All code that
-reads or sets the pose of a face uses this module.
+that its handles can move. All code that reads or sets the pose of a face uses this module.
 """
 
 from __future__ import annotations
