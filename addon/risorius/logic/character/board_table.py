@@ -2,8 +2,8 @@
 """The table of GUI controls: which raw controls each drives, and its range.
 
 A DNA file with GUI controls contains the table. For other files it is made from the names of raw
-controls. Each raw control has a GUI control; two opposites, such as Up and Down, share
-one. GUI controls for Up, Down, Left and Right of one name share a handle.
+controls. Each raw control has a GUI control; two opposites, such as Up and Down, share one. GUI
+controls for Up, Down, Left and Right of one name share a handle.
 """
 
 from __future__ import annotations
@@ -227,7 +227,7 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """Names: the raw controls that a GUI control drives above and below 0, and the GUI control.
+    """Three names: the raw controls driven above and below 0 by a GUI control, the GUI control.
 
     The second name is "" if no raw control is driven below 0.
     """

@@ -118,7 +118,7 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
     """float32[V, 3]: x and height of each point in face_coordinates, and distance from the mouth.
 
-    The distance is computed from x and from the height above the mouth, times 0.8.
+    The distance is computed from x and from 0.8 times the height above the mouth.
 
     Args:
         points: float[V, 3], in Blender units.

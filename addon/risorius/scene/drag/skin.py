@@ -122,7 +122,7 @@ class Skin:
     def mirrored(self, point: Point) -> Point | None:
         """The vertex nearest to the mirror image of a vertex in the neutral face.
 
-        None if the distance of both is at least _BESIDE times the size of the face.
+        None if this vertex is _BESIDE times the size of the face or more from the mirror image.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.
