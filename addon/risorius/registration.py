@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers all classes, properties and handlers in order, and unregisters them in reverse."""
+"""Registers all classes, properties and handlers, and unregisters them in reverse order."""
 
 from collections.abc import Mapping
 
@@ -207,7 +207,7 @@ def _refresh_once() -> None:
 
 
 def unregister() -> None:
-    """Undo `register` in reverse."""
+    """Undo the steps of `register` in reverse order."""
     if _idle:
         bpy.utils.unregister_class(_idle.pop())
         words.forget_language()

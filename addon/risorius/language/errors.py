@@ -84,7 +84,7 @@ def best(message: str, language: str, depth: int) -> _Found:
 
 
 def _value(name: str, value: str, language: str, depth: int) -> _Found:
-    """Translate a value of a message; in a list of names only the word before the last name."""
+    """Translate a value of a message. In a list of names, only the "and" is translated."""
     if name == _SEVERAL:
         each = [best(part, language, depth) for part in value.split(", ")]
         return _Found(", ".join(f.text for f in each), sum(f.letters for f in each))

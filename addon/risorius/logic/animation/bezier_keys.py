@@ -49,9 +49,10 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """Values of the cubic Bernstein polynomials for the fit of one cubic.
+    """Values of the cubic Bernstein polynomials for the fit of one cubic to a range of samples.
 
-    Each is float64[m]: values at the inner samples, then at the midpoints between samples.
+    Each is float64[m]: values at all samples except the first and the last one, then at the
+    midpoints between neighbouring samples.
     """
 
     near: Float
@@ -65,7 +66,8 @@ class _Basis(NamedTuple):
 class Fitter:
     """Fits Bezier curves to samples.
 
-    Cubics through the same number of equally spaced samples share one matrix of least squares.
+    Two fits to the same number of equally spaced samples use the same least-squares matrix, which
+    is cached.
     """
 
     def __init__(self, tolerance: float) -> None:

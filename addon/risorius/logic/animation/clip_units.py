@@ -47,7 +47,7 @@ class Timing:
         return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
 
     def seconds(self, frames: Float) -> Float:
-        """The inverse of `frames`."""
+        """Seconds on the clip's clock for frames of the scene; the inverse of `frames`."""
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
@@ -221,7 +221,8 @@ def quaternions(angles: Float) -> Float:
             its own left shoulder; the face looks along -y, z is up.
 
     Returns:
-        float64[n, 4], w first; each has the sign that is nearest to its predecessor.
+        float64[n, 4], w first; roll is applied first, then pitch, then yaw. Each quaternion has
+        the sign that is nearest to its predecessor.
     """
     half = np.zeros((len(angles), 3))
     half[:, : angles.shape[1]] = angles / 2

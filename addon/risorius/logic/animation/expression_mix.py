@@ -72,7 +72,7 @@ def mixed(
 def _flipped(
     goals: Mapping[str, float], present: Collection[str], regions: FaceRegions
 ) -> dict[str, float]:
-    """Swap left and right; a slider without a partner on this face keeps its weight."""
+    """Swap the weights of left and right sliders; a slider without a partner keeps its weight."""
     found = {}
     for name, value in goals.items():
         other = regions.mirrored(name)

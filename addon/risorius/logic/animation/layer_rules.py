@@ -78,13 +78,13 @@ class Span:
         return (self.last - self.first) * self.scale
 
     def scene_range(self) -> tuple[float, float]:
-        """The frames of the scene in which the layer plays."""
+        """The first and the last frame of the scene at which the layer plays."""
         if self.warp is not None:
             return float(self.warp[0][0]), float(self.warp[0][-1])
         return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames that the layer shows at these frames of the scene."""
+        """The source's frames that the layer shows at given frames of the scene."""
         if self.warp is not None:
             return np.interp(frames, *self.warp)
         if not self.period > 0.0:

@@ -51,7 +51,7 @@ class Placing:
         return self.offset + self.scale * frame
 
     def own(self, frame: float) -> float:
-        """The inverse of `shown`."""
+        """The frame of the action that plays at a frame of the scene; the inverse of `shown`."""
         return (frame - self.offset) / self.scale
 
 
@@ -116,8 +116,8 @@ def moved(
         end: frame at which the list ends.
 
     Returns:
-        The new list, and the indices of sounds that could not reach the new frame. If there is no
-        room, no sound moves.
+        The new list, and the indices of sounds that could not reach the new frame. If the moved
+        sounds do not fit between the other sounds, no sound moves.
     """
     begins = [wanted.get(i, s.begin) for i, s in enumerate(sounds)]
     low, high = -float("inf"), end - SHORTEST
@@ -196,7 +196,9 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
 def respelled(
     sounds: Sequence[Sound], place: int, said: Sequence[tuple[str, Sequence[str]]], end: float
 ) -> list[Sound]:
-    """Replace a word by the sounds of one or more words; the sounds share its time equally.
+    """Replace a word by the sounds of one or more words.
+
+    The new sounds share the time of the old word equally.
 
     Args:
         sounds: the list.
@@ -301,7 +303,7 @@ class Board:
 
 
 def _mouth_of(name: str) -> str:
-    """The name of the mouth shape in a marker's name, after the word and colon."""
+    """The mouth shape in the name of a marker, which may begin with a word and a colon."""
     return name.rpartition(":")[2].strip()
 
 

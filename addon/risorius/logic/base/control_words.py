@@ -61,7 +61,7 @@ def expand(table: Mapping[str, WrittenRow], sides: Mapping[str, str]) -> Control
     """Make two rows, for L and R, of each row with a * in its name.
 
     Args:
-        table: rows by the names of controls, without their prefix.
+        table: name of a control without its prefix -> row.
         sides: the sentences for L and R that name the side.
     """
     rows = {}

@@ -63,7 +63,7 @@ class Space:
         return np.asarray(values, np.float64) @ (self.axes.T * self.scale)
 
     def directions(self, values: NDArray[np.float32] | Float) -> Float:
-        """Convert normals, float[n, 3]; their lengths stay."""
+        """Convert normals, float[n, 3], to Blender's axes; their lengths stay."""
         return np.asarray(values, np.float64) @ self.axes.T
 
     def rotations(self, angles: NDArray[np.float32] | Float) -> Float:

@@ -2,8 +2,9 @@
 """Fits GUI controls to wanted raw controls.
 
 Several settings of the GUI controls may give the same raw controls. The fit minimises squared
-differences within the controls' ranges: it sets one GUI control after another to its best value,
-which a formula gives for each linear piece. So no step makes the fit worse.
+differences within the controls' ranges: it sets one GUI control after another to its best value.
+Raw controls are piecewise linear functions of a GUI control, and a formula gives the best value in
+each linear piece. So no step makes the fit worse.
 """
 
 from __future__ import annotations

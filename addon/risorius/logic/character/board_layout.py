@@ -230,7 +230,10 @@ def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
 
 
 def is_middle(table: BoardTable, gui: int) -> bool:
-    """Whether a GUI control belongs to no side. Args: table  all GUI controls; gui  an index."""
+    """Whether a GUI control belongs to no side.
+
+    Args: table  all GUI controls; gui  index of the GUI control.
+    """
     return not _side_of(_bone_of(table.names[gui])[0])
 
 

@@ -2,8 +2,8 @@
 """The table of GUI controls: which raw controls each drives, and its range.
 
 A DNA file with GUI controls contains the table. For other files it is made from the names of raw
-controls. Each raw control has a GUI control; two opposites (Up and Down, Wide and Narrow) share
-one. GUI controls for Up, Down, Left and Right of one name share a handle.
+controls. Each raw control has a GUI control; two opposites, such as Up and Down, share one. GUI
+controls for Up, Down, Left and Right of one name share a handle.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ _OPPOSITES = (
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a conditional: adds slope * value + cut to a raw control if low <= value <= high.
+    """A row of a DNA file's conditionals, which convert GUI controls to raw controls.
+
+    Adds slope * value + cut to a raw control if low <= value <= high.
 
     Attributes:
         gui, raw: indices of the GUI control and of the raw control.
@@ -225,7 +227,7 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """The raw controls above and below 0 of a GUI control, and the GUI control's name.
+    """Three names: the raw controls driven above and below 0 by a GUI control, the GUI control.
 
     The second name is "" if no raw control is driven below 0.
     """

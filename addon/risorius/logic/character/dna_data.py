@@ -28,7 +28,8 @@ class MeshData(Protocol):
     """One mesh with V positions and L layouts.
 
     A layout joins the indices of a position, a UV coordinate and a normal. The layouts of all
-    faces and the weights of all vertices are flat lists; offsets tell where each begins.
+    faces and the weights of all vertices are flat lists; offsets tell where the entries of
+    each face and of each vertex begin.
     """
 
     @property

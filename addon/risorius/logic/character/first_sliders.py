@@ -11,7 +11,7 @@ from .slider_rows import Row
 
 # Most used controls of each region, in the order of the panel, at most ten rows; * stands for the
 # sides L and R. Left and right share a row. The controls were chosen by how often expressions
-# of Risorius use them, and then by how often captures do.
+# of Risorius use them, and then by how often face captures use them.
 _FIRST = {
     "brow": (
         "browRaiseIn*",

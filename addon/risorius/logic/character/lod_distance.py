@@ -44,7 +44,7 @@ def level_at(
     rising = sorted(distances)
     wanted = sum(distance >= d for d in rising)
     if current is not None and wanted != current:
-        # The level changes only if the distance clearly exceeds or falls below its threshold.
+        # The level changes only if the distance is beyond its threshold by the fraction SLACK.
         factor = 1.0 + SLACK if wanted > current else 1.0 - SLACK
         eased = sum(distance >= d * factor for d in rising)
         wanted = max(current, eased) if wanted > current else min(current, eased)

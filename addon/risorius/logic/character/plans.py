@@ -432,7 +432,7 @@ def _faces(
 def _corner_values(
     values: NDArray[np.float32], layout: NDArray[np.uint32], corners: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Values of the face corners; None if the file has none or an index is out of range."""
+    """Values of the face corners; None if the file has no values or a bad index."""
     if not len(values) or not len(corners) or int(corners.max()) >= len(layout):
         return None
     indices = np.asarray(layout, np.int64)[corners]

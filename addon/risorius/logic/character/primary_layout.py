@@ -25,8 +25,8 @@ _FACE = (
     (0.0, 6.52), (1.6, 6.5), (3.35, 6.28), (4.45, 5.5), (4.82, 4.0), (4.8, 1.6), (4.72, -1.0),
     (4.55, -3.4), (4.15, -5.0), (3.3, -6.3), (2.2, -6.95), (0.0, -7.0),
 )  # fmt: skip
-# Tongue: x of its middle, half its width, y of its root, y at which the tip begins, length of the
-# tip.
+# Tongue, in board units: x of its middle, half its width, y of its root, y at which the tip begins,
+# length of the tip.
 _TONGUE = (6.0, 1.05, 2.95, -5.2, 0.7)
 
 

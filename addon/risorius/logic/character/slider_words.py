@@ -99,8 +99,8 @@ def matches(control: str, search: str, known: str = "") -> bool:
     Args:
         control: name of the control; a search word may occur anywhere in the name or its title.
         search: the typed search.
-        known: further search words of the control. A typed word matches one of these only if it is
-            the beginning of it, so that "ear" does not find "fear".
+        known: further search words of the control. A typed word matches such a word only if the
+            word begins with it, so that "ear" does not find "fear".
     """
     text, more = f"{control} {title(control)}".casefold(), known.casefold().split()
     return all(

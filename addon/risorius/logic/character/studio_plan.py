@@ -90,7 +90,8 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 
     Args:
         apart: distance between the eyes, in Blender units.
-        low, high: corners of the bounding box of all meshes of the face, in the head's axes.
+        low, high: corners of the bounding box of all meshes of the face, in the head's axes and
+            Blender units.
 
     Raises:
         ValueError: `apart` is not above 0.
@@ -122,8 +123,9 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
     """Height of the picture, and height of its centre above the eyes.
 
-    The eyes are at the upper third, unless hair needs more room. The picture of a face with a neck
-    ends above the lower end of its mesh; a face without a neck is shown completely.
+    The eyes are a third of the picture's height below its top, unless hair needs more room. The
+    picture of a face with a neck ends above the lower end of its mesh; a face without a neck is
+    shown completely.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
     if -low <= _NECK * unit:
@@ -151,6 +153,6 @@ def _lamp(row: _Row, unit: float) -> Lamp:
         far * math.sin(lift),
     )
     # A softbox of W watts emits W / pi per steradian along its axis. At the distance `far`, the
-    # face gets W / (pi far^2) per unit area.
+    # face gets W / (pi far^2) per unit area. The wanted light at the face is share * _EXPOSURE.
     watts = share * _EXPOSURE * math.pi * far * far
     return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

@@ -100,6 +100,9 @@ def is_well_in_view(
 ) -> bool:
     """Whether a view already shows a ball well, so that it need not move.
 
+    The distance may differ from `wanted` by at most a factor of 1.8, and the pivot may be at most
+    half a radius from the ball's centre.
+
     Args:
         middle, radius: centre and radius of the ball, in Blender units.
         wanted: distance at which the view shows the whole ball, from `distance`.

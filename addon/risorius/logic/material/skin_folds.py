@@ -116,9 +116,9 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V, 3]: for each point x and height of face_coordinates, distance from the mouth.
+    """float32[V, 3]: x and height of each point in face_coordinates, and distance from the mouth.
 
-    The distance is in the units of face_coordinates, with heights times 0.8.
+    The distance is computed from x and from 0.8 times the height above the mouth.
 
     Args:
         points: float[V, 3], in Blender units.
@@ -132,7 +132,8 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
 def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within 1 cm of an open border, falling to 0 at 2.5 cm.
 
-    Rims of lids, lips and nostrils do not count, so that they keep their subsurface scattering.
+    The material has no subsurface scattering where the value is 1. Rims of lids, lips and nostrils
+    do not count as borders, so that the skin around them keeps its subsurface scattering.
 
     Args:
         points: float[V, 3], in Blender units.

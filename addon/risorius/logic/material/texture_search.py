@@ -182,7 +182,10 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
 
 
 def read_mask(stem: str) -> dict[str, int]:
-    """Region in lower case -> channel of a mask file; empty if the file is no mask."""
+    """Region in lower case -> colour channel of a mask file, 0 (red) to 3 (alpha).
+
+    Empty if the file is no mask.
+    """
     word = stem.lower()
     packed = _PACKED.match(word)
     if packed:

@@ -68,7 +68,8 @@ def cells(totals: Totals) -> Float32:
     first = np.repeat(np.cumsum(totals) - totals, totals)
     corner = np.arange(len(face)) - first
     angle = 2 * np.pi * (corner + 0.5) / totals[face]
-    # A unit square's corners are sqrt(1/2) from its centre.
+    # A unit square's corners are sqrt(1/2) from its centre. Other polygons fit into a circle of
+    # radius 1/2.
     reach = np.where(totals[face] == 4, np.sqrt(0.5), 0.5) * (1 - 2 * _RIM)
     place = np.stack([face % side, face // side], axis=1) + 0.5
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts the current pose and the keys of an action between sliders and the face board.
 
-Either the sliders or the board lead, that is, move the face; the others have no effect.
+Either the sliders or the board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations
@@ -132,7 +133,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
     """Convert slider keys of a new action to keys of board handles if the face board leads.
 
     Args:
-        rig: the character that will play it.
+        rig: the character that will play the action.
         action: an action that no other datablock plays.
 
     Returns:

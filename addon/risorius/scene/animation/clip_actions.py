@@ -271,7 +271,7 @@ def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert quaternions float64[n, 4], w x y z, to values of a rotation mode.
 
-    Returns: float64[n, 3 or 4], angles in radians.
+    Returns: float64[n, 4], quaternions or angle and axis; float64[n, 3], Euler angles. Radians.
     """
     if mode == "QUATERNION":
         return turns

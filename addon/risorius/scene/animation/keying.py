@@ -3,7 +3,8 @@
 
 Code that moves sliders or control bones for the animator does so in a function that it passes to
 `by_hand`, or calls `changed` after the move. While a tweak is on, edits go into its additive layer.
-Either the sliders or the face board lead, that is, move the face; the others have no effect.
+Either the sliders or the face board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
 
 
 def note_edits(actions: Iterable[bpy.types.Action]) -> None:
-    """Note edited actions, so that their layers are compiled again."""
+    """Count an edit of each action, so that layers that play it are compiled again."""
     for action in actions:
         _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
 
@@ -358,8 +358,10 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """Times in seconds at which a layer plays a constant pose: always, from the start of the layer
-    on, or for the length of the layer."""
+    """The times in seconds, "start" and "end", between which a layer plays a constant pose.
+
+    Without "end" the pose plays for ever; an empty result means at all times.
+    """
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}

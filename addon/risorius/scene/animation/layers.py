@@ -281,7 +281,10 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """Yields collections of F-curves: of actions that only this armature plays, and its drivers."""
+    """Yields collections of F-curves that belong to this armature alone.
+
+    These are the F-curves of each action that only this armature plays, and its drivers.
+    """
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:

@@ -21,8 +21,8 @@ _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
 def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
-    Blender evaluates the NLA below all layers, so the layers above that layer stay. Converted
-    layers are muted. The active action becomes the lowest new strip.
+    This layer and all layers above it stay, because Blender evaluates the NLA before all layers.
+    Converted layers are muted. The active action becomes the lowest new strip.
 
     Args:
         scene: gives the frame rate.
@@ -155,14 +155,16 @@ def _place_strip(strip: bpy.types.NlaStrip, span: logic.Span) -> None:
 def _set_influence(
     strip: bpy.types.NlaStrip, value: float, fade_in: float = 0.0, fade_out: float = 0.0
 ) -> None:
-    """Key the influence of a strip: a constant value, with a fade at each end, in frames.
+    """Key the influence of a strip: a constant value, with a fade at each end.
 
-    A strip with animated influence ignores blend_in and blend_out.
+    The lengths of the fades are in frames; 0 means no fade. A strip with animated influence
+    ignores blend_in and blend_out.
     """
     strip.use_animated_influence = True
     strip.influence = value
     start, end = strip.frame_start, strip.frame_end
-    # If the fades overlap, the peak is at their crossing: min((t - start) / in, (end - t) / out).
+    # If the fades overlap, the peak is at frame t where the lines (t - start) / fade_in and
+    # (end - t) / fade_out cross.
     top = min(1.0, (end - start) / max(fade_in + fade_out, 1e-9))
     keys = {start + fade_in * top: value * top, end - fade_out * top: value * top}
     if fade_in:

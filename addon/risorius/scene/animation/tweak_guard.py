@@ -140,7 +140,7 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Move new keys of the active action into the tweak, and note controls moved without a key.
+    """Move new keys of the active action into the tweak; record controls moved without a key.
 
     Args:
         controls: an edited control armature.
@@ -311,8 +311,10 @@ def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve)
 def _take_all(
     controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
 ) -> None:
-    """Store the moved controls of several frames in the tweak. Then set controls that were keyed at
-    other frames to their pose without the tweak at the current frame.
+    """Store the moved controls of several frames in the tweak.
+
+    Then reset controls that were keyed at other frames: they get the values that they have at the
+    current frame without the tweak.
 
     hands: the moved controls, one _Hand for each frame; the last is of the current frame.
     """

@@ -157,7 +157,9 @@ def take(
     held: bool = False,
     old: Curves | None = None,
 ) -> int:
-    """Store edited sliders and bones in the tweak at a frame, and reset them to the keys below.
+    """Store edited sliders and bones in the tweak at a frame.
+
+    The sliders and bones are then reset to the values of the keys below the tweak.
 
     Args:
         controls: control armature with an active tweak.

@@ -59,7 +59,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
     Args:
         context: its scene defines the length of a unit.
         head: the mesh that is the face.
-        others: meshes that belong to it: eyes, teeth, hair.
+        others: meshes that belong to the head: eyes, teeth, hair.
     """
     rows = [shape_key_head.part_at_rest(context, item, head) for item in (head, *others)]
     turn = shape_key_head.turn_of(context, head)

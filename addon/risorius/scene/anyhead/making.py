@@ -170,7 +170,7 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
         path: the new DNA file.
 
     Returns:
-        A task with a list of sentences about the work as result.
+        A task whose result is a list of sentences about the work.
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> list[str]:

@@ -47,7 +47,7 @@ class Samples:
         places: float64[N, 4, 4], world matrices of the control armature.
         bones: property such as "location" -> float32[N, bones, width], values of the deforming
             armature's bones from the user's own animation; None if there is no such animation.
-        others: datablock -> {data path: list of values} of other animated properties.
+        others: datablock -> {data path: components at each frame} of other animated properties.
     """
 
     frames: NDArray[np.float64]
@@ -112,8 +112,10 @@ def _times(scene: bpy.types.Scene, frames: NDArray[np.float64]) -> NDArray[np.fl
 def _stage(
     context: Context, rigs: Sequence[ArmatureObject], items: Iterable[bpy.types.Object]
 ) -> Iterator[bpy.types.Scene]:
-    """Context manager: a new scene with the given objects to step through, or the user's scene if
-    necessary."""
+    """Context manager: the scene in which frames are evaluated.
+
+    This is a new scene with the given objects, or the user's scene if necessary.
+    """
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:
             yield scene

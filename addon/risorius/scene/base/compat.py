@@ -43,7 +43,7 @@ def _strips(layer: bpy.types.ActionLayer) -> list[bpy.types.ActionKeyframeStrip]
 
 
 def make_node_tree(material: bpy.types.Material) -> None:
-    """Give a material a node tree. Since 5.0 it always has one, and setting use_nodes warns."""
+    """Give a material a node tree. Since Blender 5.0 each has one, and setting use_nodes warns."""
     if material.node_tree is None:
         material.use_nodes = True
 

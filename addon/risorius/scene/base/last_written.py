@@ -45,7 +45,7 @@ def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
 
 
 def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender accepted a write to an object, because Blender reports no refusal.
+    """Record whether Blender accepted a write to an object, because Blender reports no refusal.
 
     Args:
         item: the object.

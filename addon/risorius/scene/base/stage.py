@@ -3,7 +3,7 @@
 
 The scene belongs to no file, so lists, saves, undo steps, appends and handlers do not find it. The
 armatures are set as cameras of its timeline markers, because Blender evaluates these cameras and
-their dependencies without counting a user.
+their dependencies without raising their user counts.
 """
 
 from __future__ import annotations

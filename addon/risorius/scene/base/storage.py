@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stores the DNA file inside the .blend: compressed bytes in a property of a Text datablock.
 
-A Text is used, because Blender copies the custom properties of scene objects at each update.
+A Text is used, because Blender copies the custom properties of scene objects at each update, but
+not the properties of Texts.
 """
 
 from __future__ import annotations

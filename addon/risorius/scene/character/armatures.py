@@ -181,8 +181,8 @@ def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
     """Add drivers to the rig so that Blender evaluates the controls even if they are hidden.
 
     Blender skips hidden objects that no visible object depends on, and the face would not move. The
-    drivers read each control bone, because Blender evaluates only the bones of a hidden armature
-    that something visible depends on.
+    drivers read each control bone, because Blender evaluates a bone of a hidden armature only if
+    something visible depends on this bone.
 
     Args:
         rig: the deforming armature.

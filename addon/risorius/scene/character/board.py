@@ -3,8 +3,8 @@
 
 The location of a handle in its own axes gives the value of its GUI control, independent of the
 positions of board, armature and face. Raw controls without a GUI control keep their sliders. Either
-the board or the sliders lead, that is, move the face; the others have no effect. All code that
-reads or sets the pose of a face uses this module.
+the board or the sliders lead, that is, move the face. A leading board replaces only the sliders
+that its handles can move. All code that reads or sets the pose of a face uses this module.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class _Places:
     Attributes:
         names: names of all pose bones of the armature; if they change, the indices are renewed.
         live: Runtime of the handles.
-        at: int[n], indices into the flat float[bones, 3] of locations.
+        at: int[n], indices into the flattened array float[bones, 3] of locations.
         gui: int[n], index of the GUI control of each location.
         low, high: float32[n], range of each location.
         unit: float32[n], value of the GUI control for a location of 1.
@@ -232,8 +232,8 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
         rig: the character.
 
     Returns:
-        Values of all existing sliders. If the board leads, sliders that its handles can move have
-        the values that the board gives them.
+        Values of all existing sliders. If the board leads, sliders that handles can move have the
+        values that the board gives them.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -244,7 +244,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """Slider name -> value from the board, for the sliders that its handles can move.
+    """Slider name -> value from the board, for the sliders that the board's handles can move.
 
     Args:
         rig: the character.

@@ -19,12 +19,12 @@ _COUNT = 32  # corners of a ring
 
 @dataclass(frozen=True)
 class Room:
-    """Extent of a face at the height of its eyes, in the space of its control armature.
+    """Extent of a face, in the space of its control armature.
 
     Attributes:
         middle: x of the face's centre.
         eyes: x of the midpoint between the eyes.
-        wide: half the width of the face.
+        wide: half the width of the face at the height of its eyes.
         top: z of the highest point of all meshes, hair included.
     """
 
@@ -181,7 +181,7 @@ def step_aside(controls: ArmatureObject, aside: bool) -> None:
 
 
 def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
-    """Whether an outline has the scale and position from `place`.
+    """Whether an outline has the scale and position that the function `place` sets.
 
     Args:
         bone: the control bone.

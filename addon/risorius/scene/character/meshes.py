@@ -127,7 +127,7 @@ def real_channels(item: MeshObject) -> dict[str, int]:
 
     Real keys are identified by the variable name of their drivers, so a shape key that the user
     drives by a channel does not count. If a driver was copied to another shape key, only the first
-    of both counts.
+    of the two keys counts.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}

@@ -211,7 +211,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; without unrotated bones.
+        "neck" and "head" -> Quaternion in the control armature's axes; unrotated bones are absent.
     """
     hold = body_of(controls)
     if hold is None:
@@ -221,7 +221,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
     if rest is None or hold.mute:
         return {}
     seen = body.evaluated_get(depsgraph)
-    # Rotation from the control armature's space to the body's space in the body's rest pose.
+    # `axes` rotates from the control armature's space to the body's space in the body's rest pose.
     axes = (rest.matrix_local @ hold.inverse_matrix @ controls.matrix_basis).to_quaternion()
     turns = {}
     for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):

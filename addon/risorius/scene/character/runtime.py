@@ -132,7 +132,7 @@ class Runtime:
         return board_layout.handles_of(self.table, ways, region_of, taken)
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
-        """The native converter from deltas of these joints to transforms of their pose bones."""
+        """The native converter from deltas of given joints to transforms of their pose bones."""
         space = self.space
         return native.module().BoneSpace(
             self.dna.neutral_joint_rotations,
@@ -154,9 +154,9 @@ class Turning:
         controls: indices of the raw controls of x, y, z and w.
         bone: the control bone that rotates the joint, "neck" or "head"; "": none.
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
-        armature_axes: converts the vector part of a quaternion from the armature's axes to the
-            file's.
-        bone_axes: converts the vector part from the axes of the joint's bone to the file's.
+        armature_axes: matrix that converts the vector part of a quaternion from the armature's
+            axes to the file's.
+        bone_axes: matrix that converts it from the axes of the joint's bone to the file's.
     """
 
     joint: int

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mirrors poses, copies or links the sides of a face, and sets poses of regions.
 
-Either the sliders or the face board lead, that is, move the face; the others have no effect.
+Either the sliders or the face board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
 
 
 def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
-    """Set sliders, clamped to their limits. Linked and missing sliders are ignored.
+    """Set sliders, clamped to their limits.
+
+    Missing sliders, and sliders that a driver links to the other side, are ignored.
 
     If a face board leads, its handles are moved to the nearest pose instead.
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds controls that are not at rest and that no animation moves, to warn after an import.
 
-Either the sliders or the face board lead, that is, move the face; the others have no effect.
+Either the sliders or the face board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations

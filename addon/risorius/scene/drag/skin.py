@@ -120,7 +120,9 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex nearest to the mirror image of a vertex in the neutral face, or None if far.
+        """The vertex nearest to the mirror image of a vertex in the neutral face.
+
+        None if this vertex is _BESIDE times the size of the face or more from the mirror image.
 
         Args:
             point: mesh and vertex; a vertex on the middle line is its own mirror.

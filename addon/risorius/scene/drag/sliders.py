@@ -2,7 +2,8 @@
 """Converts between sliders and the raw controls of the drag solver.
 
 The raw controls include the animation layers; the sliders do not.
-Either the sliders or the face board lead, that is, move the face; the others have no effect.
+Either the sliders or the face board lead, that is, move the face. A leading board replaces only the
+sliders that its handles can move.
 """
 
 from __future__ import annotations

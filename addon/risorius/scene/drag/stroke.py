@@ -88,7 +88,7 @@ class Stroke:
         skin: the meshes in the scene.
         state: sliders at the mouse press.
         turns: transforms from file space to world space.
-        reach: float32[3, R], motion of the point per control, in file units.
+        reach: float32[3, R], motion of the point in file units if a control grows by 1.
         raw: float32[R], current raw controls of the face.
         best: single controls for this drag, best first: (index, value, remaining distance).
     """

@@ -39,7 +39,7 @@ def begin(reader: str) -> None:
         conditions.hold_ordinary(rig, on=True)
     _bring_up()
     if reader == GLTF and not bpy.app.timers.is_registered(_let_go):
-        # An exporter that fails never calls `end`, so a timer does.
+        # An exporter that fails never calls `end`, so a timer calls it.
         bpy.app.timers.register(_let_go, first_interval=_LOOK_AGAIN)
 
 

@@ -273,7 +273,10 @@ class _Picture:
         return picture.reshape(self.high, self.high, 3)[::-1]
 
     def _hollows(self) -> Floats:
-        """float64[h * w] in [0, 1]: how far a sample lies behind the mean depth around it."""
+        """float64[h * w]: how far a sample lies behind the mean depth around it, 0 to 1.
+
+        The value is 1 from a distance of 6 % of the picture's height.
+        """
         depth = self.depth.reshape(self.high, self.high)
         there = np.isfinite(depth)
         held, reach = np.where(there, depth, 0.0), max(self.high // 24, 1)
@@ -312,7 +315,7 @@ def _paint(piece: Piece, which: Ints, share: Floats) -> tuple[Floats, Floats]:
 
 
 def _blurred(values: Floats, reach: int) -> Floats:
-    """Means over squares of 2 * reach + 1 samples; samples beyond the edge repeat the edge."""
+    """Means over squares with sides of 2 * reach + 1 samples; the edge is repeated outwards."""
     for axis in (0, 1):
         edges = [(0, 0), (0, 0)]
         edges[axis] = (reach + 1, reach)

@@ -40,7 +40,7 @@ def check(live: runtime.Runtime, item: Item) -> None:
 
     Raises:
         LibraryError: the face lacks all controls of a built-in expression, or at least one control
-            of another expression.
+            of the user's own expression.
     """
     sliders = clip_actions.sliders_of(live)
     weights = item.expression.weights

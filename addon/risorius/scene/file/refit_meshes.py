@@ -37,8 +37,8 @@ class Shape:
     Attributes:
         points: float32[V, 3], the basis.
         moved: float64[V, 3], offsets of the basis by the user's edit.
-        keys: name of a shape key -> float32[V, 3] positions; most unedited shape keys of Risorius
-            are left out.
+        keys: name of a shape key -> float32[V, 3] positions. A shape key of Risorius is left out
+            if it is known to be unedited, has no vertex group, and no shape key is relative to it.
         relative: name of a shape key -> name of the shape key to which it is relative.
         channels: name of a shape key of Risorius -> index of its blend shape channel in the old
             file.

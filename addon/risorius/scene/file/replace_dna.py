@@ -2,8 +2,8 @@
 """Replaces a character's DNA file and keeps its objects.
 
 The new character is built as separate objects first, so that a bad file changes nothing. Then its
-data move into the existing objects, meshes, keys and bones. So references to these and additions
-by the user stay.
+data move into the existing objects, meshes, shape keys and bones. So references to these data, and
+additions by the user, stay.
 """
 
 from __future__ import annotations
@@ -169,7 +169,10 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
-    """Copy the stored DNA file, the array lengths and the armatures' properties to the old rig."""
+    """Copy the stored DNA file and the armatures' properties to the old rig.
+
+    The arrays of animated maps and blend shape channels get the lengths for the new file.
+    """
     rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], storage.text_of(rig)
     label = former.name if former is not None else text.name

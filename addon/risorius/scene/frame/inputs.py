@@ -168,7 +168,10 @@ def _rests(bone: bpy.types.PoseBone) -> bool:
 
 
 def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
-    """A bone's rotation relative to rest and parent, in the armature's axes; None if it is 0."""
+    """A bone's rotation relative to rest and parent, in the armature's axes.
+
+    None if the bone is missing or not rotated.
+    """
     if bone is None or _rests(bone):
         return None
     turn = rig_placement.own_turn(seen, bone)

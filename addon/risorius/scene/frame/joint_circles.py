@@ -107,7 +107,7 @@ def _keys_of(rig: ArmatureObject) -> list[bpy.types.Key]:
 
 
 def _followed_by(owner: bpy.types.Object, bone: str) -> Iterator[Followed]:
-    """Objects and bones on which an object, or the given bone of it, depends directly."""
+    """Objects and bones on which an object, or the given bone of this object, depends directly."""
     if owner.parent is not None:
         yield owner.parent, owner.parent_bone if owner.parent_type == "BONE" else ""
     for hold in owner.constraints:

@@ -2,7 +2,7 @@
 """Solo and mute: shows a face with some controls only, or without joints, shapes or animated maps.
 
 The controls keep their values, so keys, bakes and exports do not change. The deforming armature
-stores the setting, so that undo restores it. Saving removes the setting during the save, so that
+stores the setting, so that undo restores it. During a save the setting is removed, so that
 files do not contain it. Renders ignore it unless the user chooses otherwise.
 """
 

@@ -55,7 +55,9 @@ def target_of(
     turns: Mapping[str, Quaternion],
     local: Vector | None,
 ) -> Target | None:
-    """The Target of a character, or None if it is at rest.
+    """The Target of a character.
+
+    None if the target bone is missing, or if it follows the head and is at rest.
 
     Args:
         seen: the evaluated control armature.
@@ -84,7 +86,8 @@ def target_of(
         return None
     far = (rest - _middle(seen)).length
     reach = min(way.length / max(_BLEND * far, 1e-9), 1.0)
-    # At rest the eyes look straight ahead; they converge as the target moves away from rest.
+    # At rest the eyes look straight ahead. They converge as the target moves away from rest, and
+    # fully if it has moved by _BLEND times its rest distance from the eyes.
     meet = seen.risorius_converge * float(np.sin(reach * np.pi / 2.0)) ** 2
     return Target(rest, way, meet)
 
@@ -263,7 +266,7 @@ def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion])
 
 
 def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternion]) -> Float:
-    """The position of a point relative to the head, for a head that is not rotated.
+    """The position of a point that moves with the head, for a head that is not rotated.
 
     Both positions, `point` and the result, are in the armature's space.
     """

@@ -15,7 +15,7 @@ _OWN = "risorius_gaze"  # custom property of an Empty that `follow_world` made
 
 
 def holder_of(controls: ArmatureObject) -> bpy.types.Object | None:
-    """The object that the eyes' target follows, or None if it follows the head."""
+    """The object that the eyes' target follows, or None if the target follows the head."""
     hold = _hold_of(controls)
     return hold.target if hold is not None else None
 

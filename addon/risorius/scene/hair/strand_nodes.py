@@ -67,7 +67,7 @@ class _Tree:
         return node.outputs[1]
 
     def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
-        """Samples a value at vertex `index` of the mesh; `kind` is its data type."""
+        """Samples a value at vertex `index` of the mesh; `kind` is the data type of the value."""
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
         self.put(mesh, node.inputs[0])
         self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
@@ -116,7 +116,8 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
     if kind.along:
-        # The last row has no next row, so its points slide along the segment that ends at it.
+        # Points slide along the segment to the next row. The last row has no next row, so its
+        # points slide along the segment before it: `back` is 2, the number of vertices in a row.
         back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
         most = min(_MOST_SLID, kind.along / unit / (_lengths(item, rows).mean() / (rows - 1)))
         share = g.random(-most, 0.4 * most, 5, lock)
@@ -155,7 +156,7 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 
 
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
-    """A random displacement of each lock, up to `most` along each axis.
+    """A random displacement of each lock, up to `most` Blender units along each axis.
 
     Returns: a node that scales the displacement; the caller connects its input Scale.
     """
@@ -291,7 +292,8 @@ def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: 
         "ADD", g.random(0.0, math.tau, 6, _lock(g, strand, kind)), g.random(-0.6, 0.6, 7, strand)
     )
     angle = g.math("ADD", g.math("MULTIPLY", way, math.tau / pitch), begin)
-    # The radius grows from 0 at the root, so that roots do not form circles.
+    # The radius grows from 0 at the root to its full value at a length of two radii, so that roots
+    # do not form circles.
     far = g.math("MULTIPLY", g.math("MINIMUM", g.math("DIVIDE", way, 2 * radius), 1.0), radius)
     far = g.math("MULTIPLY", far, g.random(0.7, 1.3, 8, strand))
     normal = g.node("GeometryNodeInputNormal").outputs[0]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Turns recordings of live capture into actions, or keeps them in memory for the user.
 
-A recording waits if it cannot become an action at its end, or if its face or file is gone, because
-a performance cannot be repeated.
+A recording waits if it cannot become an action at its end, or if its face or .blend file is gone,
+because a performance cannot be repeated.
 """
 
 from __future__ import annotations

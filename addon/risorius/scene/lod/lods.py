@@ -61,8 +61,8 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
 
     Args:
         rig: the deforming armature.
-        viewport: level of the viewport; None leaves it.
-        render: level of renders, SAME to follow the viewport; None leaves it.
+        viewport: level of the viewport; None: unchanged.
+        render: level of renders, SAME to follow the viewport; None: unchanged.
     """
     if viewport is not None:
         rig[parts.LOD] = int(viewport)
@@ -84,7 +84,7 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
 
     Args:
         rig: the deforming armature.
-        enable: True: on.
+        enable: True: on; False: off.
         size: size of the face in Blender units, for initial distances.
     """
     levels = built(rig)
@@ -159,6 +159,6 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
-            # Otherwise a library override loses the value when the file is opened, and the flag
-            # would count as a choice of the user.
+            # Mark the value as overridable. Otherwise a library override loses the value when the
+            # file is opened, and the flag would count as a choice of the user.
             item.property_overridable_library_set(f'["{written}"]', True)

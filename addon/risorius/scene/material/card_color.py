@@ -50,7 +50,7 @@ def _places(uvs: NDArray[np.float32], starts: NDArray[np.int32]) -> NDArray[np.f
 
     Args:
         uvs: float32[N, 2] per corner.
-        starts: int32[F], first corner of each face; none is empty.
+        starts: int32[F], first corner of each face; each face has corners.
     """
     counts = np.diff(np.append(starts, len(uvs)))
     middles = np.add.reduceat(uvs.astype(np.float64), starts) / counts[:, None]

@@ -28,9 +28,8 @@ _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
 # Depth in the mouth, divided by the distance between the eyes, and colour by which the surface is
-# multiplied at this depth. The factor imitates the shadows of lips and
-# cheeks: in Material Preview and exports, which have no cast shadows, molars would otherwise be as
-# bright as incisors.
+# multiplied at this depth. The colour imitates the shadows of lips and cheeks: in Material Preview
+# and exports, which have no cast shadows, molars would otherwise be as bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -63,7 +62,7 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 def eyes(graph: Graph, look: Look) -> None:
     """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The clear coat over these is the cornea. The coat keeps the smooth normal of the eyeball, so
+    The clear coat over all three is the cornea. The coat keeps the smooth normal of the eyeball, so
     that the highlight is round. The hollow iris is lit on the side away from the light, as
     refraction lights a real iris.
 

@@ -135,8 +135,8 @@ def _build(
     _choose_picture(look, graph)
     if look.kind != "eyes":
         return [material]
-    # A copy in a second slot: the solid view has one colour for each material, and a visible iris
-    # shows the direction of an eye.
+    # The iris gets a copy of the material in a second slot, because the solid view has one colour
+    # for each material, and a visible iris shows the direction of an eye.
     iris = material.copy()
     made.append(iris)
     iris.name, iris.diffuse_color = f"{material.name}_iris", _IRIS_COLOR

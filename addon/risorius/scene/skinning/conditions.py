@@ -269,7 +269,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Note undo or redo: the next update, of all restored data, does not count as an edit."""
+    """Record an undo or redo: the next update, of all restored data, does not count as an edit."""
     _restored.now = True
 
 
