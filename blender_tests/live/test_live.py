@@ -194,7 +194,7 @@ def test_a_recording_is_an_action(dna_file, port):
     keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
     assert np.allclose(keys[:, 0], [11 + n / 60 * 24 for n in numbers], atol=1e-4)
     assert np.allclose(keys[:, 1], [n / 16.0 for n in numbers], atol=1e-7)
-    # Blender plays the recording: at whole frames, values lie between those of received faces.
+    # At whole frames, played values are interpolated between the values of received faces.
     for frame in (11, 13, 15):
         bpy.context.scene.frame_set(frame)
         at = np.interp((frame - 11) / 24 * 60, numbers, np.array(numbers) / 16.0)

@@ -209,8 +209,10 @@ class Graph:
         return tuple(node.outputs[:3])
 
     def rest_points(self, size: NDArray[np.float64]) -> Socket:
-        """Coordinates on the undeformed mesh in Blender units, so that patterns move with the skin.
-        `size` is the extent of the mesh."""
+        """Coordinates on the undeformed mesh, in Blender units from a corner of its bounding box.
+
+        Patterns at these coordinates move with the skin. `size`: float64[3], extent of the mesh.
+        """
         generated = self.node("TexCoord").outputs["Generated"]
         return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
 
@@ -278,7 +280,7 @@ class Graph:
         """Nodes connected to the output, each after its sources.
 
         Args:
-            sources: the nodes that feed a node.
+            sources: node -> the nodes that are linked to its inputs.
         """
         order, seen, stack = [], {self.output}, [(self.output, iter(sources[self.output]))]
         while stack:

@@ -105,7 +105,7 @@ def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
 
 
 def names_of(live: runtime.Runtime) -> native.ControlNames:
-    """The names of the controls raw | corrective | network | pose of a file."""
+    """The names of all controls of a file, in the order raw, corrective, network, pose."""
     return _known_of(live)[1]
 
 

@@ -85,7 +85,7 @@ def have_nodes(rig: ArmatureObject) -> bool:
 
 
 def note_old(rig: ArmatureObject) -> bool:
-    """Note baked caches in the scenes of a character of an older file.
+    """Record the baked caches in the scenes of a character of an older file.
 
     Args:
         rig: its deforming armature.
@@ -100,7 +100,7 @@ def note_old(rig: ArmatureObject) -> bool:
 
 
 def look() -> None:
-    """Forget noted caches that were freed. Costs nothing if no cache is noted."""
+    """Remove freed caches from the record. Costs nothing if no cache is recorded."""
     if any(_late.values()):
         there = {key for scene in bpy.data.scenes for key in _baked(scene)}
         for keys in _late.values():

@@ -269,7 +269,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Note undo or redo: the next update, of all restored data, does not count as an edit."""
+    """Record an undo or redo: the next update reports all restored data, which is not an edit."""
     _restored.now = True
 
 
@@ -514,7 +514,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
-    """Whether a mesh has blend shapes but no live shape key, as in KEYS mode."""
+    """Whether a mesh has blend shapes but no live shape key, as with a key per channel (KEYS)."""
     number = runtime.mesh_number(live, item)
     moves = number is not None and live.morph(number).channel_indices.size > 0
     return moves and meshes.live_block(item) is None

@@ -181,7 +181,8 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
     """float32[V, 3]: positions of a mesh after its blend shapes and before skinning.
 
-    In LIVE mode the live shape key has these positions. None if the mesh has no shape keys.
+    In LIVE mode, in which the armature modifier deforms the mesh, the live shape key has these
+    positions. None if the mesh has no shape keys.
 
     Args:
         item: the mesh object.

@@ -85,7 +85,7 @@ class Applies(Mixes):
     """Base of operators that set an expression by a click, without dragging."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        """Set the expression at a click; Ctrl flips it, Shift adds it.
+        """Set the expression at a click; Ctrl swaps left and right, Shift adds it to the pose.
 
         Args:
             context: context of the operator.

@@ -133,7 +133,7 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
 
 
 def _once_more() -> None:
-    """Undo Blender's paste and run our operator, so that one undo reverts all."""
+    """Undo Blender's paste and run our operator, so that one undo step reverts the paste."""
     context = current_context()
     window = _posing_window(context.window_manager)
     if window is None:
