@@ -350,7 +350,7 @@ def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
 
 
 def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
-    """The hash is computed, not taken from a property."""
+    """The hash of a stored file or image is computed, not taken from a property."""
     first = scene.load(textured)
     text = first["risorius_dna"]
     text["risorius_bytes"] = text["risorius_bytes"][:-9]

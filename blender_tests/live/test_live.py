@@ -67,7 +67,7 @@ def session_of(rig):
 
 
 def tick_until(rig, frames):
-    """Wait until this number of faces of the subject has arrived, then run the timer once."""
+    """Wait until this number of frames of the subject has arrived, then run the timer once."""
     module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:
@@ -339,14 +339,14 @@ def begin_recording(rig, *steps):
 
 
 def jaw_keys(rig):
-    """The keys of the jaw, float64[keys, 2]."""
+    """Frame and value of each key of the jaw, float64[keys, 2]."""
     path = f'pose.bones["face"]["{JAW_OPEN}"]'
     curve = next(c for c in scene.curves(scene.controls(rig)) if c.data_path == path)
     return np.array([tuple(k.co) for k in curve.keyframe_points])
 
 
 def only_recording(faces):
-    """The only waiting recording, which must have this number of faces."""
+    """The only waiting recording, which must have this number of captured frames."""
     (recording,) = scene.submodule("scene.live.recordings").waiting()
     assert len(recording.take) == faces
     return recording

@@ -146,7 +146,10 @@ def _mapped(label, metadata=None):
 
 
 def _before_and_after(rig, tmp_path):
-    """Render without and with the map. Returns pictures, places of pixels, and their change."""
+    """Render without and with the map.
+
+    Returns: change of each pixel, (x, z) of each pixel, whether the head covers the pixel.
+    """
     head = scene.meshes(rig)[0]
     for index, item in scene.meshes(rig).items():
         item.hide_render = index != 0

@@ -160,7 +160,7 @@ class Graph:
             vector: coordinates.
             scale: cells of noise for each unit of vector.
             detail: number of octaves.
-            roughness: factor of each octave relative to the one before.
+            roughness: amplitude of each octave, divided by the amplitude of the octave before.
         """
         node = self.node("TexNoise")
         self.put(vector, node.inputs["Vector"])
@@ -261,7 +261,7 @@ class Graph:
         return node.outputs["Normal"]
 
     def tidy(self) -> None:
-        """Lay the nodes out in columns by their distance from the output."""
+        """Arrange the nodes in columns by the largest number of links between node and output."""
         sources = defaultdict(list)  # collected once, because socket.links searches the whole tree
         for link in self.tree.links:
             sources[link.to_node].append(link.from_node)

@@ -28,7 +28,7 @@ class Present:
 
     Attributes:
         live: Runtime of the character.
-        raw: float32[R] raw controls, including bones and layers, before solo and mute.
+        raw: float32[R] raw controls with the effects of bones and layers, before solo and mute.
         lod: the shown LOD.
         look: look_masks.Look, which applies solo and mute.
     """

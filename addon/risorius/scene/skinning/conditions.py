@@ -66,7 +66,7 @@ _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", 
 # not count as an edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
-# Scene and view layer -> the last write that an update of its graph reported.
+# Scene and view layer -> number of the last write that an update of the layer's graph reported.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 _restored = session.value("conditions.restored", False, ("load",))
 # Datablock that is no object -> number of its drivers when it was last updated.

@@ -46,7 +46,7 @@ class Frame:
         live: Runtime of the character.
         shape: the inputs of the shown pose.
         bones: bones of the deforming armature.
-        writer: writer of the bones that the evaluator owns.
+        writer: bone_writer.Writer of the bones that the evaluator writes.
     """
 
     live: runtime.Runtime

@@ -97,7 +97,7 @@ class Applies(Mixes):
 
 
 class Blends(Mixes):
-    """Blends an expression by moving the mouse; one undo step, and Esc restores the pose."""
+    """Base of operators that blend an expression by moving the mouse; Esc restores the pose."""
 
     bl_options = {"REGISTER", "UNDO", "GRAB_CURSOR", "BLOCKING"}
 
