@@ -2,7 +2,7 @@
 """Decides which meshes of a face can be in Direct mode, and whether its bones have to be posed.
 
 Direct mode writes final vertex positions to the live shape key of a mesh and disables its armature
-modifier. A Plan is made when the file changes and kept during playback. The tables have session
+modifier. A Plan is computed again after edits, and reused during playback. The tables have session
 uids of datablocks as keys.
 """
 
