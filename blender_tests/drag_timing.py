@@ -60,7 +60,7 @@ def main(file: str) -> None:
 
 
 def surface_vertices(surface, live, mesh):
-    """A hundred vertices over the mesh that controls move most."""
+    """Indices of 100 vertices of a mesh, chosen among the vertices that controls move most."""
     raw = np.array(live.rests, np.float32)
     some = np.linspace(0, surface.vertex_counts[mesh] - 1, 2000).astype(int)
     reach = np.linalg.norm(surface.jacobian(raw, mesh, some), axis=(1, 2))

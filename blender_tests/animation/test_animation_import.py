@@ -205,7 +205,7 @@ def test_the_head_turns_as_the_clip_says(rig, rotation_mode):
     _played(rig, 12)
     seen = controls.evaluated_get(bpy.context.evaluated_depsgraph_get())
     turn = place.own_turn(seen, seen.pose.bones["head"])
-    # An independent formula: roll, then pitch, then yaw about Blender's axes.
+    # An independent formula: roll about y, then pitch about x, then yaw about z (Blender's axes).
     wanted = Euler((-0.2, -0.25, 0.45), "YXZ").to_quaternion()
     assert turn.rotation_difference(wanted).angle < 1e-3  # in the bone's interpolation
     nose, crown = turn @ Vector((0, -1, 0)), turn @ Vector((0, 0, 1))

@@ -350,7 +350,7 @@ def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
 
 
 def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
-    """The hash is computed, not taken from a property."""
+    """The hash of a stored file or image is computed, not taken from a property."""
     first = scene.load(textured)
     text = first["risorius_dna"]
     text["risorius_bytes"] = text["risorius_bytes"][:-9]
@@ -367,7 +367,7 @@ def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
 
 
 def test_a_face_has_one_live_key_where_nothing_else_is_chosen(dna_file):
-    """One live key is the default: a shape key per channel, 92 of 17,465 vertices, takes 19 MB."""
+    """One live key is the default; 92 keys of 17,465 vertices, one per channel, take 19 MB."""
     rig = scene.load(dna_file)
     scene.set_controls(rig, jawOpen=0.5)
     keys = [[b.name for b in m.data.shape_keys.key_blocks] for m in scene.meshes(rig).values()]

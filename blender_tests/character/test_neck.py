@@ -285,7 +285,7 @@ def test_an_override_of_a_linked_face_fires_them(face, tmp_path):
 
 
 def _nods(rig):
-    """Add keys of the head's control bone; a constraint on the joint's bone limits its rotation."""
+    """Animate the head's control bone, and limit the rotation of the joint's bone."""
     bone = scene.controls(rig).pose.bones["head"]
     bone.rotation_mode = "XYZ"
     for frame, angle in ((1, 0.0), (5, 0.8)):

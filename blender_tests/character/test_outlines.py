@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Outlines of the control bones are beside the face and are no objects of a scene.
 
-Hiding them keeps keys visible.
+Hiding the outlines does not hide the bones' keyframes in the editors.
 """
 
 import shutil

@@ -2,8 +2,8 @@
 """Blender's vertices equal those of an independent NumPy implementation for the same controls.
 
 The NumPy side computes pose, morph and skinning in float64 from the format's description
-(tests/python/support/oracle.py, support/oracle.py). Compared are all levels, both shape modes,
-edits, playback, frames of a render engine, and subframes.
+(tests/python/support/oracle.py, support/oracle.py). The tests compare all levels of
+detail, both shape modes, edits, playback, frames of a render engine, and subframes.
 """
 
 import importlib.util
@@ -58,7 +58,7 @@ class _Face:
         return {int(m): oracle.vertices(self.dna, int(m), pose) for m in there}
 
     def error(self, shown, raw, lod):
-        """The largest distance of shown from wanted vertices, as a share of the face's size."""
+        """Largest coordinate difference of shown and wanted vertices, as a share of face size."""
         wanted = self.wanted(raw, lod)
         assert set(shown) == set(wanted)
         size = max(np.ptp(points, axis=0).max() for points in wanted.values())
@@ -75,7 +75,7 @@ class _Face:
         scene.update(scene.controls(self.rig))
 
     def animate(self, seed):
-        """Key every control with random values. Returns frame -> raw controls float64[R]."""
+        """Key every control with random values. Returns a function: frame -> raw float64[R]."""
         random = np.random.default_rng(seed)
         bone = scene.face(self.rig)
         for frame in (1, 5, 10):

@@ -23,7 +23,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def man():
-    """The sample face, and the vertex that the left corner of its mouth moves most."""
+    """The sample face, and the vertex of its head that mouthCornerPullL moves most."""
     bpy.ops.risorius.add_character()
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     scene.set_controls(rig, mouthCornerPullL=1.0)

@@ -70,7 +70,7 @@ def _import(kind, path):
 
 
 def _partner(points, wanted):
-    """For each wanted vertex the nearest imported one; some formats split or sort vertices."""
+    """Index of the imported vertex nearest to each wanted one; some formats reorder vertices."""
     tree = KDTree(len(points))
     for i, point in enumerate(points):
         tree.insert(Vector(point), i)

@@ -301,7 +301,7 @@ JOY = {LEFT: 1.0, RIGHT: 0.94, JAW: 0.24}  # the weights of joy for controls of 
 
 @pytest.fixture
 def lower_jaw(tmp_path, folder):
-    """A face whose lower half the jaw moves, and whose upper half the head moves."""
+    """A face: the jaw joint moves its lower half, and the head joint moves its upper half."""
     dna = faces.small_face(head_grid=(14, 21))
     dna.meshes = [dna.meshes[0]]
     dna.mesh_names, dna.lod_count = ["head_lod0_mesh"], 1
@@ -340,7 +340,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     after = oracle.vertices(dna, 0, risorius.Rig(dna).evaluate(moved))
     still = np.linalg.norm(after - before, axis=1) < 1e-6
     assert 0.3 < still.mean() < 0.7
-    # The face fills the picture from the front: the picture is 1.05 times its largest side.
+    # The picture shows the face from the front, and is 1.05 times as large as its largest side.
     low, high = before.min(axis=0), before.max(axis=0)
     half = 1.05 * (high - low)[[0, 2]].max() / 2
     edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # -1 to 1

@@ -45,7 +45,7 @@ PROPERTIES = {
     "risorius_landmark_found",
     "landmark": "risorius_landmark risorius_landmark_found",
 }
-# Values that hide the effect of others are tested in their own session.
+# Wrong values that hide the effects of other values: each is tested in a session of its own.
 ALONE = (
     ("rig", "risorius_controls", "numbers"),
     ("rig", "risorius_controls", "an object"),

@@ -176,7 +176,7 @@ def test_what_is_not_asked_for_is_not_written(dna_file, tmp_path):
 
 
 def test_a_basis_edit_by_edit_mode_is_no_edit_of_keys(dna_file, tmp_path):
-    """Blender moves all shape keys along and rounds; only neutral positions may be exported."""
+    """Edit mode also moves and rounds all shape keys; only neutral positions are exported."""
     import bmesh
 
     rig = scene.load(dna_file, "KEYS")

@@ -119,7 +119,7 @@ def test_what_blender_saves_is_the_same_head(saved, scale, head, tmp_path):
     assert np.ptp(mesh.uvs, axis=0).min() > 0.9
     wanted = face_shapes.expressions(positions)
     assert list(moved) == list(wanted)
-    # Blender may reorder vertices, so each is found by its place.
+    # Blender may reorder vertices, so each vertex is found by its position.
     unit = METRES * scale
     place = np.array([2.0, 3.0, -1.0]) / 1.5
     apart = np.linalg.norm(mesh.positions[:, None] / unit - positions[None] - place, axis=2)

@@ -32,7 +32,7 @@ OF_HEADS = (
 
 
 def _calls(folder):
-    """Operator -> calls with `//` paths, each with the file that it must write in the folder."""
+    """Operator -> [(arguments with `//` paths, file that it must write in the folder, or "")]."""
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
     opened = 0.8 * (np.arange(240) % 60 < 20)
     risorius.Clip([JAW], [opened], 60.0).save(folder / "opens.rzc")

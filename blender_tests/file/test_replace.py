@@ -209,7 +209,7 @@ def test_what_users_add_stays(mode, dna_file, other_file):
 
 
 def test_a_face_with_other_topology(mode, dna_file, tmp_path):
-    """The new mesh is finer on the same sphere; all data move to near their old places."""
+    """The new mesh is finer; the user's data move to new vertices near their old places."""
     path = _save(small_face(head_grid=(19, 21)), tmp_path)
     rig = scene.load(dna_file, mode)
     head = _decorate(rig)

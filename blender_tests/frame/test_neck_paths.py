@@ -43,9 +43,9 @@ def two_necks():
 
 
 class _Reference:
-    """The expected face at the keys, from the description of the format.
+    """The expected face at the frames of KEYS, computed from the description of the DNA format.
 
-    It has channels, and vertices in the face's own space.
+    It gives values of the blend shape channels, and vertices in the face's own space.
     """
 
     def __init__(self, dna, rig):

@@ -204,7 +204,7 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis of a coil is nearly parallel to the straight card, so that the radius is measured
+        # The axis of a coil is nearly parallel to the straight card, so the radius is measured
         # from the mean of the coil's points.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000

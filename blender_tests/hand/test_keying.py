@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that move controls insert keys like Blender's own edits; breakdowns; tweaks."""
+"""Tests of breakdowns, of tweaks, and of the keys that operators on controls insert."""
 
 import bpy
 import numpy as np

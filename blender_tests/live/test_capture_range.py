@@ -13,7 +13,7 @@ RATE = 30
 
 
 def bump(count, at, height):
-    """A movement up and down over 30 frames, with a flat top of a few frames."""
+    """A rise to `height` in 15 frames, 5 frames at it around `at`, and a fall in 15 frames."""
     distance = np.clip(np.abs(np.arange(count) - at) - 2.0, 0.0, 15.0)
     return height * (0.5 + 0.5 * np.cos(np.pi * distance / 15.0))
 

@@ -67,7 +67,7 @@ def session_of(rig):
 
 
 def tick_until(rig, frames):
-    """Wait until this number of faces of the subject has arrived, then run the timer once."""
+    """Wait until this number of frames of the subject has arrived, then run the timer once."""
     module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:
@@ -194,7 +194,7 @@ def test_a_recording_is_an_action(dna_file, port):
     keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
     assert np.allclose(keys[:, 0], [11 + n / 60 * 24 for n in numbers], atol=1e-4)
     assert np.allclose(keys[:, 1], [n / 16.0 for n in numbers], atol=1e-7)
-    # Blender plays the recording: at whole frames, values lie between those of received faces.
+    # At whole frames, played values are interpolated between the values of received faces.
     for frame in (11, 13, 15):
         bpy.context.scene.frame_set(frame)
         at = np.interp((frame - 11) / 24 * 60, numbers, np.array(numbers) / 16.0)
@@ -339,14 +339,14 @@ def begin_recording(rig, *steps):
 
 
 def jaw_keys(rig):
-    """The keys of the jaw, float64[keys, 2]."""
+    """Frame and value of each key of the jaw, float64[keys, 2]."""
     path = f'pose.bones["face"]["{JAW_OPEN}"]'
     curve = next(c for c in scene.curves(scene.controls(rig)) if c.data_path == path)
     return np.array([tuple(k.co) for k in curve.keyframe_points])
 
 
 def only_recording(faces):
-    """The only waiting recording, which must have this number of faces."""
+    """The only waiting recording, which must have this number of captured frames."""
     (recording,) = scene.submodule("scene.live.recordings").waiting()
     assert len(recording.take) == faces
     return recording

@@ -146,7 +146,10 @@ def _mapped(label, metadata=None):
 
 
 def _before_and_after(rig, tmp_path):
-    """Render without and with the map. Returns pictures, places of pixels, and their change."""
+    """Render without and with the map.
+
+    Returns: change of each pixel, (x, z) of each pixel, whether the head covers the pixel.
+    """
     head = scene.meshes(rig)[0]
     for index, item in scene.meshes(rig).items():
         item.hide_render = index != 0
@@ -176,7 +179,8 @@ def test_a_map_without_textures_shows_in_its_area_only(tmp_path, label, side):
     points = np.array([v.co for v in scene.meshes(rig)[0].data.vertices])
     unit = 0.36 * np.ptp(points[:, 0])
     top = points[:, 2].max() - 1.75 * unit
-    # The brow's ellipse in units of the face, on one side of the middle line.
+    # Distance from the middle of the area between the brows; 1 at the edge of its ellipse, which
+    # animated_maps and skin_folds call glabella.
     away = np.hypot(x / 0.26, (z - top - 0.36 * unit) / 0.32) / unit
     inside = solid & (away < 0.8) & (side * x > 0.05 * unit)
     outside = solid & ((away > 1.5) | (side * x < -0.2 * unit))

@@ -128,7 +128,7 @@ def test_many_pictures_have_a_bound_together(tmp_path, monkeypatch):
 
 
 def test_a_large_flat_picture_is_taken(tmp_path):
-    """Masks with 8192 pixels per side may be compressed to a thousandth."""
+    """A mask with 8192 pixels per side may have a file a thousand times smaller than its pixels."""
     textures = scene.submodule("scene.material.image_loading")
     path = tmp_path / "flat.png"
     path.write_bytes(_bomb(8192, 8192))

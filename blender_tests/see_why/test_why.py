@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""See Why: solo and mute, causes of motion, heat maps, correctives; files contain none of them."""
+"""See Why: solo and mute, causes of motion, heat maps, correctives; saved files have none of it."""
 
 import bpy
 import numpy as np

@@ -117,7 +117,7 @@ def test_a_save_between_undo_and_the_next_update(pair, tmp_path):
 
 
 def test_a_file_that_blender_writes_by_itself(pair, tmp_path):
-    """A partial file has finished positions and disabled modifiers; the add-on restores them."""
+    """A file of `libraries.write` has disabled modifiers; the face returns to Direct mode."""
     shown = scene.snapshot(pair.direct)
     blend = tmp_path / "copied.blend"
     bpy.data.libraries.write(str(blend), {bpy.context.scene})

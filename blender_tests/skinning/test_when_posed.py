@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones are posed while something needs them, and rest afterwards; meshes stay in Direct mode."""
+"""Bones are posed only while something needs them; meshes stay in Direct mode meanwhile."""
 
 import bpy
 import pytest
@@ -140,7 +140,7 @@ def node_of_the_rig(rig):
 
 
 def hook(rig):
-    """Add a modifier to a mesh of the face that follows a bone."""
+    """Add a Hook modifier, which follows a bone, to a mesh of the face."""
     head = scene.meshes(rig)[0]
     modifier = head.modifiers.new("Hook", "HOOK")
     modifier.object, modifier.subtarget = rig, "FACIAL_C_Jaw"
@@ -175,7 +175,7 @@ def test_bones_are_posed_while_they_are_needed(pair):
 
 
 def test_pose_mode(pair):
-    """In pose mode the face is Live, because the user poses the bones."""
+    """In pose mode the face is in Live mode, because the user poses the bones."""
     for rig in pair.each():
         rig.hide_viewport = False
         rig.hide_set(False)

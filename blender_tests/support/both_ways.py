@@ -91,7 +91,7 @@ class Pair:
         return done
 
     def apart(self, lod=0):
-        """Largest distance between both faces' vertices in armature space, over the face's size."""
+        """Largest coordinate difference of vertices in armature space, as a share of face size."""
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))

@@ -57,7 +57,7 @@ def _manager():
 def _read_preferences(step):
     """Read the user's preferences, because bpy starts with factory settings.
 
-    bpy before 4.5 crashes while reading them, so that the extension is enabled directly.
+    bpy before 4.5 crashes while reading them, so the extension is enabled directly.
     """
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()

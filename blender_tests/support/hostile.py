@@ -2,7 +2,7 @@
 """Makes broken DNA files, and valid files with unusual content.
 
 Broken files have indices out of range, cycles of joints or huge counts. The library refuses to
-write them, so that they are made by changing bytes.
+write them, so the bytes of valid files are changed.
 """
 
 from pathlib import Path
@@ -46,7 +46,7 @@ def cut_short(content, count):
 def with_flipped_bytes(content, count, seed):
     """Yield `count` copies of a file, each with one to eight randomly changed bytes.
 
-    Most of them are near the beginning, where counts and offsets are.
+    Most changed bytes are near the beginning, where counts and offsets are.
     """
     random = np.random.default_rng(seed)
     for _ in range(count):

@@ -40,7 +40,7 @@ def main():
     _start(options.zip)
     from support import past, past_scenes
 
-    # A .blend contains its path, so that files are saved in a folder with a neutral name.
+    # A .blend contains its path, so files are saved in a folder with a neutral name.
     work = Path(tempfile.gettempdir()) / "risorius-past"
     shutil.rmtree(work, ignore_errors=True)
     if options.record:

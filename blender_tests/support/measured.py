@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A fake UILayout that finds texts which Blender would cut off.
 
-It calculates the widths of Blender's layouts at an interface scale of 1 with Blender's font: in a
-column each part has the column's width, a row divides its width by the requests of its parts, a
-split by its factor, and with use_property_split names use the left two fifths.
+It calculates the widths of Blender's layouts at an interface scale of 1 with Blender's font. Each
+part of a column has the column's width. A row divides its width in proportion to the widths that
+its parts request, and a split by its factor. With use_property_split, names get the left two
+fifths of the width.
 """
 
 from types import SimpleNamespace

@@ -135,7 +135,7 @@ ROUTES = {
     "link": link,
     "override": override,
 }
-# Routes that are not used for files that contain library overrides.
+# Keys of ROUTES (ways to open a file) that are not used for files with library overrides.
 NOT_OVERRIDDEN = ("append", "link", "override")
 
 

@@ -71,7 +71,7 @@ def opened(positions):
 
 
 class Onto(Package):
-    """Also replaces the transfer, which gives one expression, and conform.
+    """Also replaces the functions that transfer expressions (here only jawOpen) and conform a face.
 
     Attributes:
         asked: arguments of each call.

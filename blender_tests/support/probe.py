@@ -46,7 +46,7 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Let a scene render with the probe, in a context. Yields its records, which grow."""
+    """Context manager: renders of a scene use the probe. Yields the dict that they fill."""
     bpy.utils.register_class(Probe)
     before = setup.render.engine
     Probe.seen = {}

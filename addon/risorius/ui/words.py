@@ -159,7 +159,7 @@ def local(text: str) -> str:
 
 
 def mark(text: str) -> str:
-    """Mark a label that Blender translates itself, so that the test of the tables finds it."""
+    """Mark a label that Blender itself translates, for the test of our translation tables."""
     return text
 
 

@@ -160,7 +160,7 @@ class Graph:
             vector: coordinates.
             scale: cells of noise for each unit of vector.
             detail: number of octaves.
-            roughness: factor of each octave relative to the one before.
+            roughness: amplitude of each octave, divided by the amplitude of the octave before.
         """
         node = self.node("TexNoise")
         self.put(vector, node.inputs["Vector"])
@@ -209,8 +209,10 @@ class Graph:
         return tuple(node.outputs[:3])
 
     def rest_points(self, size: NDArray[np.float64]) -> Socket:
-        """Coordinates on the undeformed mesh in Blender units, so that patterns move with the skin.
-        `size` is the extent of the mesh."""
+        """Coordinates on the undeformed mesh, in Blender units from a corner of its bounding box.
+
+        Patterns at these coordinates move with the skin. `size`: float64[3], extent of the mesh.
+        """
         generated = self.node("TexCoord").outputs["Generated"]
         return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
 
@@ -259,7 +261,7 @@ class Graph:
         return node.outputs["Normal"]
 
     def tidy(self) -> None:
-        """Lay the nodes out in columns by their distance from the output."""
+        """Arrange the nodes in columns by the largest number of links between node and output."""
         sources = defaultdict(list)  # collected once, because socket.links searches the whole tree
         for link in self.tree.links:
             sources[link.to_node].append(link.from_node)
@@ -278,7 +280,7 @@ class Graph:
         """Nodes connected to the output, each after its sources.
 
         Args:
-            sources: the nodes that feed a node.
+            sources: node -> the nodes that are linked to its inputs.
         """
         order, seen, stack = [], {self.output}, [(self.output, iter(sources[self.output]))]
         while stack:

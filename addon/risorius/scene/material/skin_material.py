@@ -99,8 +99,8 @@ class Skin:
             graph.set(Coat_Weight=_OILY, Coat_Ior=_IOR)
 
     def _subsurface(self, color: Value) -> None:
-        """Set subsurface scattering: shorter in dark skin, and none near an open border, because
-        light would leak there."""
+        """Set subsurface scattering. Its distance is shorter in dark skin. It is off near an open
+        border, because light would leak there."""
         graph, look = self.graph, self.look
         light = graph.node("RGBToBW")
         graph.put(color, light.inputs[0])

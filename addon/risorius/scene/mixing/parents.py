@@ -33,7 +33,7 @@ Regions = Mapping[str, Mapping[int, float]]
 
 
 class MixError(FaceError, ValueError):
-    """Faces cannot be mixed; the sentence gives the reason."""
+    """Faces cannot be mixed; the message gives the reason."""
 
 
 def region_names() -> tuple[str, ...]:

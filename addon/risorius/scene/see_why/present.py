@@ -28,7 +28,7 @@ class Present:
 
     Attributes:
         live: Runtime of the character.
-        raw: float32[R] raw controls, including bones and layers, before solo and mute.
+        raw: float32[R] raw controls with the effects of bones and layers, before solo and mute.
         lod: the shown LOD.
         look: look_masks.Look, which applies solo and mute.
     """
@@ -105,7 +105,7 @@ def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
 
 
 def names_of(live: runtime.Runtime) -> native.ControlNames:
-    """The names of the controls raw | corrective | network | pose of a file."""
+    """The names of all controls of a file, in the order raw, corrective, network, pose."""
     return _known_of(live)[1]
 
 

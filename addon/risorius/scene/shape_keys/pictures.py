@@ -48,7 +48,7 @@ class Model:
         points: float64[V, 3], the face looks along -y.
         ways: name of a shape key -> float32[V, 3], displacements from the neutral head.
         triangles: int64[F, 3], vertex indices.
-        frame: centre of the pictures, and half their height.
+        frame: centre of the pictures, and half their height, in the unit of `points`.
         paths: name of a key -> file of its picture.
     """
 

@@ -26,7 +26,8 @@ class Writer:
         where: int64[n], indices of the pose bones that the evaluator writes.
         space: risorius.BoneSpace of these bones, in the same order.
         turning: for each joint of neck and head: (name of the control bone, row in `where`, share
-            of the rotation, Quaternion of the joint's rest rotation in the armature's axes).
+            of the control bone's rotation that the joint gets, Quaternion of the joint's rest
+            rotation in the armature's axes).
         buffers: property such as "location" -> float32, its values for all bones, flat; None if
             the evaluator writes every bone.
         driving: joint -> index of its pose bone, for joints whose rotation is in raw controls.

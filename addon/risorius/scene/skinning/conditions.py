@@ -2,7 +2,7 @@
 """Decides which meshes of a face can be in Direct mode, and whether its bones have to be posed.
 
 Direct mode writes final vertex positions to the live shape key of a mesh and disables its armature
-modifier. A Plan is made when the file changes and kept during playback. The tables have session
+modifier. A Plan is computed again after edits, and reused during playback. The tables have session
 uids of datablocks as keys.
 """
 
@@ -66,7 +66,7 @@ _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", 
 # not count as an edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
-# Scene and view layer -> the last write that an update of its graph reported.
+# Scene and view layer -> number of the last write that an update of the layer's graph reported.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 _restored = session.value("conditions.restored", False, ("load",))
 # Datablock that is no object -> number of its drivers when it was last updated.
@@ -269,7 +269,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Record an undo or redo: the next update, of all restored data, does not count as an edit."""
+    """Record an undo or redo: the next update reports all restored data, which is not an edit."""
     _restored.now = True
 
 
@@ -514,7 +514,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
-    """Whether a mesh has blend shapes but no live shape key, as in KEYS mode."""
+    """Whether a mesh has blend shapes but no live shape key, as with a key per channel (KEYS)."""
     number = runtime.mesh_number(live, item)
     moves = number is not None and live.morph(number).channel_indices.size > 0
     return moves and meshes.live_block(item) is None

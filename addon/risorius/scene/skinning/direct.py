@@ -46,7 +46,7 @@ class Frame:
         live: Runtime of the character.
         shape: the inputs of the shown pose.
         bones: bones of the deforming armature.
-        writer: writer of the bones that the evaluator owns.
+        writer: bone_writer.Writer of the bones that the evaluator writes.
     """
 
     live: runtime.Runtime
@@ -181,7 +181,8 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
     """float32[V, 3]: positions of a mesh after its blend shapes and before skinning.
 
-    In LIVE mode the live shape key has these positions. None if the mesh has no shape keys.
+    In LIVE mode, in which the armature modifier deforms the mesh, the live shape key has these
+    positions. None if the mesh has no shape keys.
 
     Args:
         item: the mesh object.

@@ -4,7 +4,7 @@
 A voice is the recorded speech from which an action was made. A sound is a phoneme and the frame at
 which it begins. In each curve only the keys between the last key before the changed frames and the
 first key after the changed frames are replaced. These two keys stay, but their handles towards the
-replaced keys are set anew. All other keys are unchanged.
+replaced keys are computed again. All other keys are unchanged.
 """
 
 from __future__ import annotations
@@ -104,7 +104,8 @@ def note(
         action: action of the clip.
         clip: clip of a correctable voice.
         timing: maps the times of the clip to frames of the action.
-        tolerance: tolerance of the action's keys; 0 if each sample has a key.
+        tolerance: largest difference of a slider from the clip after the fit of the action's keys;
+            0 if each sample has a key.
         intensity: strength of mouth and brows with which the clip was made.
         visemes: visemes of the face, used for the clip.
     """

@@ -2,7 +2,7 @@
 """Updates saved data of characters to the current form, one step for each form (version number).
 
 Linked characters cannot be written, so code that reads characters must understand every form. A
-character of a newer form is unchanged and plays with the features that this version knows.
+character of a newer form is not changed, and only the features that this version knows are used.
 """
 
 from __future__ import annotations

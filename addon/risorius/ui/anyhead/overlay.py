@@ -22,7 +22,7 @@ class Dot(NamedTuple):
     """A drawn landmark.
 
     Attributes:
-        mark: its place, colour and radius.
+        mark: its place in world space, its colour, and its radius in pixels.
         label: its name in the user's language; "" if the landmark is not selected.
     """
 

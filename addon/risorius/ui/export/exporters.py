@@ -150,7 +150,7 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
         path: file to write, in a folder that is used for this export only.
 
     Raises:
-        FaceError: the exporter reports an error, wrote nothing, or wrote a part of the file.
+        FaceError: the exporter reports an error, wrote nothing, or wrote only a part of the file.
     """
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)

@@ -85,7 +85,7 @@ class Applies(Mixes):
     """Base of operators that set an expression by a click, without dragging."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        """Set the expression at a click; Ctrl flips it, Shift adds it.
+        """Set the expression at a click; Ctrl swaps left and right, Shift adds it to the pose.
 
         Args:
             context: context of the operator.
@@ -97,7 +97,7 @@ class Applies(Mixes):
 
 
 class Blends(Mixes):
-    """Blends an expression by moving the mouse; one undo step, and Esc restores the pose."""
+    """Base of operators that blend an expression by moving the mouse; Esc restores the pose."""
 
     bl_options = {"REGISTER", "UNDO", "GRAB_CURSOR", "BLOCKING"}
 

@@ -161,7 +161,7 @@ def _ask_once(look: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; a timer calls this, as panels must not start it."""
+    """Start the operator that draws pictures; called by a timer, because panels must not do it."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.render_thumbnails.poll():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender reads its properties from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
-"""Settings of the grid of expressions and of a click; they belong to the window manager."""
+"""Settings of the grid of expressions and of clicks on it; they belong to the window manager."""
 
 from typing import cast
 

@@ -92,7 +92,7 @@ def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -
 
 
 def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Draw the name of the face, or its first mode with the button Done.
+    """Draw the name of the face, or the first of its active modes with the button Done.
 
     Args:
         layout: layout of the panel.

@@ -85,7 +85,7 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
 
 
 def _size(rig: ArmatureObject) -> float:
-    """The longest side of all bounding boxes, one for each mesh, in Blender units."""
+    """The longest side among the bounding boxes of a face's meshes, in Blender units."""
     return max((max(m.dimensions[:]) for m in parts.meshes_of(rig)), default=0.25)
 
 

@@ -4,8 +4,8 @@
 """Makes Blender's Paste Pose Flipped swap the sliders of a face too.
 
 Blender swaps bones by L and R in their names. Sliders are properties of one bone, which Blender
-pastes unchanged. So our operator replaces Blender's on the same keys and swaps the sliders too. If
-Blender's operator is called from a menu, it is undone and ours runs.
+pastes unchanged. So our operator has the shortcut of Blender's operator, and swaps the sliders too.
+If Blender's operator is called from a menu, its paste is undone and our operator runs.
 """
 
 from collections.abc import Collection
@@ -133,7 +133,7 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
 
 
 def _once_more() -> None:
-    """Undo Blender's paste and run our operator, so that one undo reverts all."""
+    """Undo Blender's paste and run our operator, so that one undo step reverts the paste."""
     context = current_context()
     window = _posing_window(context.window_manager)
     if window is None:

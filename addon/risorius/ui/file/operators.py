@@ -180,8 +180,8 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 def draw_export(self: Menu, _context: Context) -> None:
     """Add the entries for faces to the menu File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Users also find Blender's own exporters in this menu, but these write faces that are not baked
-    # in their rest pose.
+    # Users also find Blender's own exporters in this menu, but these write a face in its rest pose
+    # unless it is baked.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

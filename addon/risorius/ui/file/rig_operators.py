@@ -246,7 +246,7 @@ def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object])
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:
-    """Draw Make Rig from Shape Keys in the menu of the shape key list or in the menu Object."""
+    """Draw the entry Make Rig from Shape Keys in the menu Object or of the shape key list."""
     self.layout.separator()
     self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
 

@@ -21,7 +21,8 @@ class RISORIUS_PT_mix(FacePanel, Panel):
     def poll(cls, context: Context) -> bool:
         """Whether no face is active.
 
-        Otherwise the panel is in Options, because the tab has no room for it on a laptop's screen.
+        While a face is active, another panel Mix Faces is in Options, because the tab then has no
+        room for it on a laptop's screen.
         """
         return active_controls(context) is None
 

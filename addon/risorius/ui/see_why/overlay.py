@@ -47,7 +47,7 @@ def stop() -> None:
 
 
 class _Pen:
-    """Draws boxes and text in pixels of the region, in sizes for the interface scale."""
+    """Draws boxes, lines and text at pixels of the region; text grows with the interface scale."""
 
     def __init__(self, context: Context) -> None:
         self.scale: float = context.preferences.system.ui_scale
@@ -80,7 +80,7 @@ class _Pen:
         return float(blf.dimensions(0, text)[0])
 
     def cut(self, text: str, most: float) -> str:
-        """A text that is shortened with dots to a width in pixels."""
+        """The text, shortened with dots if it is wider than `most` pixels."""
         if self.width(text) <= most:
             return text
         while text and self.width(text + "...") > most:

@@ -25,8 +25,8 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # height of the large picture, in lines
 _LITTLE = 2.0  # height of a picture in the list, in lines
-# (session uid of a head's mesh, value of its sample picture) for which the panel has already
-# started to draw missing pictures.
+# (session uid of a head's mesh, value of the assigned.Choice whose sample picture is shown) for
+# which the panel has already started to draw missing pictures.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
@@ -192,7 +192,7 @@ def _ask_once(mesh: int, sample: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; a timer calls this, as panels must not start it."""
+    """Start the operator that draws pictures; called by a timer, because panels must not do it."""
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.shape_key_pictures.poll():

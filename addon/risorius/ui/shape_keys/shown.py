@@ -93,7 +93,7 @@ def words_of_value(value: str) -> str:
 
 
 def value_of(row: assigned.Row) -> assigned.Said:
-    """A shape key's assignment in the form of a file of names. Args: row  from assigned.of."""
+    """A shape key's assignment as a file of assignments stores it. Args: row  from assigned.of."""
     if row.expression:
         return f"@{row.expression}"
     return row.controls[0] if len(row.controls) == 1 else list(row.controls)

@@ -102,7 +102,7 @@ class _CorrectsSound(_Corrects):
     def _corrected(
         self, sounds: Sequence[Sound], place: int, end: float
     ) -> tuple[list[Sound], int]:
-        """The list after a correction at `place`, and the index to select. Raises: SpokenError."""
+        """The sounds after a correction of sounds[place]; index to select. Raises: SpokenError."""
         raise NotImplementedError
 
 
