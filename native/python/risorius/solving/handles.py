@@ -84,7 +84,7 @@ def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floa
 
 
 def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
-    """int64[V]: the mirrored vertex of each vertex; a vertex on the midline has itself, -1: none.
+    """int64[V]: the mirrored vertex of each vertex, on the midline the vertex itself; -1: none.
 
     Args:
         places: float64[V, 3], positions at rest.

@@ -139,7 +139,8 @@ class Unknowns:
         return np.asarray((jacobian[:, self.first] + both) * self.scale)
 
     def change(self, values: Doubles, count: int) -> Doubles:
-        """float64[R]: the change of the controls. Args: values: float64[U]; count: R."""
+        """float64[R]: the change of the controls. Args: values: float64[U], of the
+        unknowns; count: number R of controls."""
         out = np.zeros(count)
         out[self.first] = out[self.second] = values * self.scale
         return out

@@ -18,7 +18,8 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 # eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-# Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
+# Fractions of the rim's displacement by which the eight rings (OUTER) outside the rim move, the
+# nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
