@@ -165,7 +165,7 @@ def cheapest_change(
         price: float64[n] above 0, price per unit of x.
         elsewhere: bool[n], unknowns that should be used only if they help enough.
         tolerance: allowed distance beyond the smallest possible one.
-        worth: decrease of the distance that the unknowns elsewhere must bring.
+        worth: decrease of the distance that must result from using the unknowns `elsewhere`.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end, alone = [(path.x.copy(), path.missing)], _END * path.price, -1.0

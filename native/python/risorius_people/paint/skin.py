@@ -71,7 +71,7 @@ class Texels:
         raster: raster of the head's texture.
         place: float32[n, 3], position of each texel in decimetres.
         step: float32[n, 2], width and height of each texel on the surface in decimetres.
-        scale: number of this texture's texels per texel at HEAD_SIZE.
+        scale: side of this texture divided by HEAD_SIZE.
     """
 
     def __init__(self, raster: Raster, positions: Floats) -> None:
