@@ -45,8 +45,8 @@ class Matcher {
   /// [V] matches with the target's samples that are nearest by position, normal and bending.
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The closest point to a vertex on the target's triangles with a similar normal; triangle -1:
-  /// none.
+  /// The point of the target that is closest to a vertex, among triangles with a similar normal;
+  /// triangle -1: there is none.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();

@@ -178,7 +178,7 @@ def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
 
     Args:
         take: performance with the face's topology.
-        positions: float[V, 3], the face's vertices at rest.
+        positions: float[V, 3], the face's vertices in the neutral pose.
     """
     own = np.asarray(positions, np.float64)
     first = np.asarray(take.frames[0] if take.neutral is None else take.neutral, np.float64)

@@ -118,7 +118,8 @@ class Surface:
         return probe.jacobian()
 
     def strongest(self) -> Doubles:
-        """float64[R]: largest displacement of a vertex per unit of each control, from rest.
+        """float64[R]: largest displacement of a vertex from the neutral pose, per unit of each
+        control.
 
         It is measured once, on about two thousand vertices spread evenly over the meshes of the
         LOD.

@@ -161,7 +161,8 @@ class Recogniser:
 def _pcm(samples: Samples) -> bytes:
     """16-bit samples with silence before and after, at the loudness that the model expects.
 
-    A little constant noise is added, because the logarithm of exact silence is undefined.
+    Quiet noise, the same in each call, is added, because the logarithm of exact silence is
+    undefined.
     """
     pad = np.zeros(int(_PAD * RATE), np.float32)
     loud = float(np.quantile(np.abs(samples), 0.99)) if len(samples) else 0.0

@@ -82,7 +82,7 @@ class Lids:
 
     Attributes:
         side: "l" or "r".
-        rings: int64[13, COLUMNS], see find_rings.
+        rings: int64[13, COLUMNS], 13 = OUTER + 1 + INNER, see find_rings.
         openness: height of the upper lid above the middle of the ball, in radii of the iris.
         middle: float64[3], middle of the ball in decimetres.
         radius: radius of the ball in decimetres.

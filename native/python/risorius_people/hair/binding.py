@@ -245,7 +245,7 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
 
 
 def _apart_from_head(dna: Dna) -> list[int]:
-    """Indices of the joints that are not the head joint or below it."""
+    """Indices of the joints that are neither the head joint nor its descendants."""
     head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
     on_head = np.arange(len(parents)) == head
     for _ in range(len(parents)):
