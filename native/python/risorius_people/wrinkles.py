@@ -159,7 +159,7 @@ class Surface:
 
 
 def _frames(triangles: Floats) -> Floats:
-    """float64[n, 2, 2]: two edges of each triangle in the triangle's plane."""
+    """float64[n, 2, 2]: two edges of each triangle as columns, in the triangle's plane."""
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
     first = a / length[:, None]

@@ -31,7 +31,7 @@ class PerformanceError(RisoriusError):
 
 
 class Performance(NamedTuple):
-    """The vertices of one moving mesh."""
+    """The vertex positions of one moving mesh in each frame."""
 
     frames: Floats
     """float32[F, V, 3]: positions in each frame."""

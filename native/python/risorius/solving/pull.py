@@ -46,8 +46,8 @@ class Drag:
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: the weighted distances to the targets. Args: positions: float64[P, 3], of the
-        points."""
+        """float64[m]: targets minus positions along the directions, times the roots of the
+        weights. Args: positions: float64[P, 3], of the points."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 

@@ -126,8 +126,8 @@ def _power(most: float) -> float:
 
 
 def _welded(mesh: Mesh) -> tuple[Ints, Ints, Ints, Ints]:
-    """Position and texture coordinate of each vertex of the page, the vertex of each corner, and
-    the first corner of each polygon."""
+    """Indices: position and texture coordinate of each vertex of the page, the vertex of each
+    corner, and the first corner of each polygon."""
     layouts = mesh.face_layouts.astype(np.int64)
     places = mesh.layout_positions.astype(np.int64)
     if not len(mesh.texture_coordinates):

@@ -39,7 +39,8 @@ _MARK = "<!--FACE-->"
 # Scripts of the empty page, each with its id.
 _ELEMENT = re.compile(r'<script[^>]* id="(library|viewer)"[^>]*>([^<]*)</script>')
 _BOOT = re.compile(r"<script>(/\*BOOT\*/.*?)</script>", re.DOTALL)
-# Layers that the evaluator needs; meshes are stored apart, in fewer bytes.
+# Layers of the DNA file that the evaluator needs. The geometry layer is not among them, because
+# the page stores meshes in fewer bytes.
 RIG = (
     "behavior",
     "machine_learned_behavior",

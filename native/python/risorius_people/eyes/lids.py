@@ -25,8 +25,8 @@ _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
 # round the ball, so without this distance they would be inside the ball at half of the look.
 _LIFT = 0.38
-# Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
-# eyes turn by a third of this, and their lower lids stay still.
+# Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The eyes
+# of the data turn by a third of these angles, and their lower lids stay still.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm by which the lower lid rises in a look
 _SKIN = 0.9  # mm: smallest distance of the skin around the rim from the eye

@@ -47,7 +47,7 @@ def _number(by: object) -> float:
 def _lid_turn(places: Places, by: object) -> Floats:
     """Rotates about the middle of the eye, so that a lid slides on the ball.
 
-    `by` is the angle in radians, positive: up.
+    `by` is 1 (up) or -1 (down). The row's `size` sets the length of the displacement.
     """
     arm = places.positions - places.eye_of()
     way = np.cross(np.array([-1.0, 0, 0]), arm)

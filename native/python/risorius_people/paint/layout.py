@@ -75,7 +75,9 @@ def _unit(places: Floats) -> Floats:
 
 
 def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
-    """Maps [0, 1] onto itself so that the middle is stretched `more` times as much as the ends."""
+    """Maps [0, 1] onto itself; places near `middle` are stretched `more` times as much as the ends.
+
+    `reach` is the distance from `middle` at which the additional stretch has fallen to a third."""
     steps = np.linspace(0, 1, 513)
     density = 1 + (more - 1) * np.exp(-(((steps - middle) / reach) ** 4))
     total = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])

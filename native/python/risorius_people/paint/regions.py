@@ -264,7 +264,8 @@ def oil(face: Face) -> Floats:
 
 
 def freckled(face: Face) -> Floats:
-    """Density of freckles by the sun, 0 to 1: on nose, cheeks, and less on the forehead."""
+    """Density of freckles that the sun causes, 0 to 1: on nose and cheeks, and less on the
+    forehead."""
     nose = face.spot(0, -0.24, 0.2, 0.13)
     cheeks = face.spot(0.36, -0.3, 0.2, 0.16)
     return np.asarray(
