@@ -54,7 +54,7 @@ struct Psd {
   float weight = 1;
 };
 
-/// An entry in the list of correctives that a factor watches.
+/// A watched corrective (see psds), as an entry in the list of one of its factors.
 struct Watch {
   std::uint16_t psd = 0;    // the corrective, an index into psds
   std::uint16_t other = 0;  // the control of a second factor; with one factor, that factor again
@@ -179,7 +179,7 @@ struct MlLayer {
   float alpha = 0;               // the slope of the leaky ReLU below 0
 };
 
-/// A joint that networks move, in addition to its joint groups.
+/// A joint that networks move in addition to the joint groups.
 struct MlJoint {
   std::uint32_t joint = 0;
   std::uint32_t is_quaternion = 0;  // 1: the rotation is a quaternion, 0: Euler angles

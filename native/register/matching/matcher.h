@@ -60,8 +60,9 @@ class Matcher {
   /// Whether a vertex in a cavity of the template has a counterpart on the target: `found` is
   /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
-  /// [V] matches with the closest points of the target. In: robust  mm, distance at which the
-  /// weight of a match is a quarter
+  /// [V] matches with the closest points of the target.
+  /// In: farthest  mm, largest distance of a match
+  ///     robust    mm, distance at which the weight of a match is a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

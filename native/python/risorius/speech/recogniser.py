@@ -196,7 +196,7 @@ def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
 
 
 def _segments(decoder: Any, count: int) -> list[Segment]:
-    # hyp() must precede seg(), because it frees memory that segments of seg() still use.
+    # hyp() must precede seg(), because hyp() frees memory that segments of seg() still use.
     if decoder.hyp() is None:
         return []
     found = decoder.seg() or ()
