@@ -54,7 +54,7 @@ struct Psd {
   float weight = 1;
 };
 
-/// An entry in the list of correctives that a factor watches.
+/// A watched corrective (see psds), as an entry in the list of one of its factors.
 struct Watch {
   std::uint16_t psd = 0;    // the corrective, an index into psds
   std::uint16_t other = 0;  // the control of a second factor; with one factor, that factor again
@@ -179,7 +179,7 @@ struct MlLayer {
   float alpha = 0;               // the slope of the leaky ReLU below 0
 };
 
-/// A joint that networks move, in addition to its joint groups.
+/// A joint that networks move in addition to the joint groups.
 struct MlJoint {
   std::uint32_t joint = 0;
   std::uint32_t is_quaternion = 0;  // 1: the rotation is a quaternion, 0: Euler angles
@@ -274,8 +274,8 @@ struct RigArrays {
 
   A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
   A<float> initial_controls;  // [controls]: values before any step runs
-  // The table from GUI controls to raw controls. For the inverse, gui_ranges lists ranges of rows
-  // with equal bounds, sorted by GUI control and then by their first rows.
+  // The table from GUI controls to raw controls. For the conversion from raw to GUI controls,
+  // gui_ranges lists ranges of rows with equal bounds, sorted by GUI control and then by first row.
   A<ConditionalRow> gui_rows;
   A<GuiRange> gui_ranges;
   A<std::uint32_t> gui_range_rows;  // indices into gui_rows
@@ -309,8 +309,8 @@ struct RigArrays {
   A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]: where each control's columns begin
   A<JointColumn> joint_columns;          // by control, then by group
-  // The same columns sorted by group and then by control, for frames in which most columns are
-  // active. The weight of a column is the value of its control.
+  // The columns of joint_columns, sorted by group and then by control, for frames in which most
+  // columns are active. The weight of a column is the value of its control.
   A<simd::Column> group_columns;
   // [LODs, controls + 1]: one entry for each control; the last entry is for all controls together.
   // Empty if a coefficient is not finite, because columns of controls at 0 must not be read then.
@@ -355,8 +355,8 @@ struct RigArrays {
   A<std::uint16_t> shape_inputs, shape_outputs;
   A<std::uint32_t> shape_lods;  // [LODs]
   // The channels of each control, as indices into shape_inputs, for frames in which most controls
-  // are 0. Both arrays are empty if two entries write one channel: then the last entry counts, even
-  // if its control is 0.
+  // are 0. shape_begins and shapes_of_controls are empty if two entries write one channel: then the
+  // last entry counts, even if its control is 0.
   A<std::uint32_t> shape_begins;  // [controls + 1]
   A<std::uint16_t> shapes_of_controls;
   // The table from controls to animated maps. A LOD has the first map_lods[lod] rows.

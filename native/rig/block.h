@@ -20,7 +20,7 @@ enum class BlockCheck {
 };
 
 /// The joint_values of a Rig, if they are not in its RigData. They are written straight into the
-/// block, because copying them would take longer than all the rest.
+/// block, because copying them would take longer than all other work of make_rig().
 struct LateValues {
   std::size_t count = 0;
   std::function<void(std::span<float>)> write;  // overwrites all of them

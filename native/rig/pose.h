@@ -115,9 +115,9 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> layers[2];         // input and output of a network layer
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
-  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in some frame
-  core::AlignedVector<float> frame_weights;  // [controls, kFrames]: values of the controls; between
-                                             // calls 0 for correctives and networks
+  std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in some frame
+  // [controls, kFrames]: values of the controls. Correctives and networks are 0 between two calls.
+  core::AlignedVector<float> frame_weights;
 };
 
 /// Make a pose and a workspace of the sizes that the rig needs.

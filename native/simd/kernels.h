@@ -75,7 +75,8 @@ struct SkinRun {
   std::uint32_t vertices = 0, fours = 0;
 };
 inline constexpr std::size_t kSkinGroup = 4;
-/// Floats of a bone's matrix as `skin_rows` writes it; it begins on a cache line.
+/// Number of floats that `skin_rows` writes for the matrix of a bone. Each matrix begins on a cache
+/// line.
 inline constexpr std::size_t kSkinRow = 16;
 /// Some vertices of a skin, run after run. Each group of a run first lists four influences of its
 /// first vertex, then four of its second, and so on, then the next four of each vertex. Missing

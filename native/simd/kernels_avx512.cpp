@@ -167,8 +167,8 @@ struct V {
     const auto places = static_cast<__mmask16>(mask);
     _mm512_mask_storeu_ps(to, places, _mm512_maskz_expand_ps(places, load(from)));
   }
-  // Used if several frames have the same order: the value of each place is found once, and a
-  // permutation takes half the time of an expansion.
+  // A decoded mask, used if a piece is placed in several frames: the index of each place's value is
+  // found once, and a permutation takes half the time of an expansion.
   struct Orders {
     __mmask16 places;
     __m512i values;

@@ -33,7 +33,7 @@ struct BlockSums<std::index_sequence<kFrame...>, std::index_sequence<kRow...>> {
   RISORIUS_INLINE void add(std::size_t f, V::Reg weight, const V::Reg* rows) {
     ((sums[f][kRow] = V::madd(weight, rows[kRow], sums[f][kRow])), ...);
   }
-  // Adds a column to all frames. In: weights  one for each frame
+  // Adds a column to the sums of all frames. In: weights  one for each frame
   template <class T>
   RISORIUS_INLINE void add(const T* column, const float* weights) {
     const V::Reg rows[] = {V::load(column + kRow * V::kLanes)...};

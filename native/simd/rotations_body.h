@@ -93,7 +93,7 @@ RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   }
 }
 
-// Copies kTurns rotations from memory into one array for each of their numbers, and back.
+// Copies kTurns rotations from memory into one array for each of their components, and back.
 // In: at  the offset of each rotation
 struct OneByOne {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,

@@ -78,7 +78,8 @@ def _only_cleans_up(source: list[str], number: int, before: int) -> bool:
 
 
 def native_files(report: dict[str, Any]) -> list[File]:
-    """The files of a JSON report of gcovr. Counts of all instances of a function are added."""
+    """The files of a JSON report of gcovr. Counts of all instances of a function (as of a
+    template) are added."""
     files = []
     for told in report["files"]:
         ran: Counter[int] = Counter()

@@ -42,7 +42,8 @@ def any_heads(folder: Path) -> None:
 
 
 def sheets(folder: Path) -> None:
-    """Draw a sheet of each DNA file in a folder, of all together, and of all speaking a clip."""
+    """Draw a sheet of each DNA file in a folder, one of all faces, and one of all faces that speak
+    a clip."""
     maker = [sys.executable, str(PROJECT / "packaging" / "films" / "any_heads_sheet.py")]
     faces = [str(face) for face in sorted(folder.glob("*.dna"))]
     for face in faces:

@@ -89,7 +89,8 @@ def remeshed(
 
 
 def scan(points: Doubles, faces: Faces, seed: int = 4) -> tuple[Doubles, Faces]:
-    """A mesh like a scan: noise of 0.1 mm, and five holes in the rear 60 % of its polygons.
+    """A mesh like a scan: with noise of 0.1 mm (standard deviation on each axis), and with five
+    holes in the rear 60 % of its polygons.
 
     Args:
         points: vertex positions, float64[V, 3], cm.

@@ -21,8 +21,8 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 from progress import Progress  # noqa: E402
 
-# Width and height of the film in pixels, and frames of the acting per frame of the film. Chosen so
-# that demo.sh takes ten minutes on two cores; three minutes of them are compilation.
+# Width and height of the film in pixels, and frames of the acting per frame of the film. With
+# these values demo.sh takes ten minutes on two cores; three minutes of them are compilation.
 FILM, STEP = 288, 2
 
 

@@ -133,7 +133,7 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
     Args:
         mesh: the mesh; changed.
-        weights: float64[v, 9].
+        weights: float64[v, 9], a column for each of the nine JOINTS.
     """
     kept = np.where(weights > 1e-3, weights, 0)
     kept /= kept.sum(axis=1, keepdims=True)

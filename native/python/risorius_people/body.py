@@ -130,7 +130,10 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Skin weights [V, 9] of spine_04, neck_01, neck_02 and head, by height along the tilted neck.
+    """Skin weights [V, 9] by height along the tilted neck: columns of JOINTS, 0 after the first
+    four.
+
+    The first four joints are spine_04, neck_01, neck_02 and head.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -157,7 +160,7 @@ def skin_weights(
     joints: dict[str, Floats],
     jaw_open: ex.Expression,
 ) -> Floats:
-    """Skin weights [V, 9] of the base mesh's vertices; rows sum to 1.
+    """Skin weights [V, 9] of the base mesh's vertices for the nine JOINTS; rows sum to 1.
 
     A vertex's weight of the jaw joint is the vertex's displacement by jawOpen along the rigid
     motion of the jaw joint, as a fraction of this motion.
@@ -207,7 +210,7 @@ class Body:
         eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on
             the eyeballs.
         man: body of the man, which is this object if it is the man's body.
-        weights: float64[V, 9], skin weights.
+        weights: float64[V, 9], skin weights for the nine JOINTS.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:

@@ -14,8 +14,8 @@ from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, edges
 from .source import BaseMesh
 
 GROUP = "helper-tights"
-# Height y of the collar's seam at x = z = 0, its drop per decimetre of z (to the front), and its
-# rise per square decimetre of x^2 (to the side).
+# COLLAR: height y of the collar's seam at x = z = 0. COLLAR_SLOPE: drop of the seam per decimetre
+# of z (to the front). COLLAR_ROUND: rise of the seam per square decimetre of x^2 (to the side).
 COLLAR = 5.66
 COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3

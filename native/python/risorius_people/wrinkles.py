@@ -2,10 +2,10 @@
 """Makes wrinkles from compression: masks of expressions, and the relief of the folds.
 
 Folds are perpendicular to the direction of compression, so their lines follow from the expression.
-The smallest stretch of each polygon gives the depth, its direction gives the lines (line integral
-convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using Line Integral Convolution",
-1993). Maps and masks have MetaHuman's names, so that programs which know these names show the
-wrinkles.
+The smallest stretch of each polygon gives the depth of the folds. The direction perpendicular to it
+gives the lines (line integral convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using
+Line Integral Convolution", 1993). Maps and masks have MetaHuman's names, so that programs which
+know these names show the wrinkles.
 """
 
 from __future__ import annotations
@@ -116,7 +116,8 @@ class Surface:
         size = np.linalg.det(edges)
         flat = np.abs(size) < 1e-12
         edges[flat] = np.eye(2)
-        # to_uv maps directions in the triangle's plane to directions in the texture.
+        # `back` is the inverse of the neutral edges. to_uv maps directions in the triangle's plane
+        # to directions in the texture.
         self.back = np.linalg.inv(self.rest)
         self.to_uv = edges @ self.back
 
@@ -158,7 +159,7 @@ class Surface:
 
 
 def _frames(triangles: Floats) -> Floats:
-    """float64[n, 2, 2]: two edges of each triangle in the triangle's plane."""
+    """float64[n, 2, 2]: two edges of each triangle as columns, in the triangle's plane."""
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
     first = a / length[:, None]

@@ -22,7 +22,7 @@ class FeatureTree {
     std::int32_t index = -1;  // -1: none
     float squared = 0;        // squared distance
   };
-  /// The nearest feature whose squared distance is below `squared`.
+  /// The nearest feature whose squared distance is below `squared`; index -1: there is none.
   Found nearest(const Feature& query, float squared) const;
   std::size_t size() const { return features_.size(); }
 

@@ -127,8 +127,8 @@ void Matcher::add_backwards(const Points& points, const Points& normals, const C
         }
       },
       8);
-  // Several samples may find the same vertex, so that a vertex gets the weighted mean of their
-  // points and normals.
+  // Each sample of the target finds a vertex. Several samples may find the same vertex, which then
+  // gets the weighted mean of their points and normals.
   Points to(points.size(), Vec3::Zero()), looking = to;
   std::vector<double> weight(points.size(), 0.0);
   for (std::size_t i = 0; i < count; ++i) {

@@ -45,8 +45,8 @@ class Matcher {
   /// [V] matches with the target's samples that are nearest by position, normal and bending.
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The closest point to a vertex on the target's triangles with a similar normal; triangle -1:
-  /// none.
+  /// The point of the target that is closest to a vertex, among triangles with a similar normal;
+  /// triangle -1: there is none.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();
@@ -60,8 +60,9 @@ class Matcher {
   /// Whether a vertex in a cavity of the template has a counterpart on the target: `found` is
   /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
-  /// [V] matches with the closest points of the target. In: robust  mm, distance at which the
-  /// weight of a match is a quarter
+  /// [V] matches with the closest points of the target.
+  /// In: farthest  mm, largest distance of a match
+  ///     robust    mm, distance at which the weight of a match is a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

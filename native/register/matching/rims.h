@@ -24,7 +24,8 @@ class Rims {
   /// Matches border vertices of the template with borders of the target that have a similar length
   /// and outward direction. Such a match has little weight along the border.
   /// In: points, normals  [V] current vertices of the template
-  ///     farthest         mm
+  ///     farthest         mm, largest distance of a match; a different outward direction adds to
+  ///                      the distance
   ///     matches          [V] replaced for border vertices with a match
   void match(const std::vector<RimEdge>& edges, const Points& points, const Points& normals,
              double farthest, std::vector<Match>& matches) const;

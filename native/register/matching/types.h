@@ -19,7 +19,7 @@ struct Form {
   std::vector<Triangle> triangles;
 };
 
-/// The goal of a vertex. weight 0: the vertex has no goal.
+/// The point of the target to which a vertex is pulled. weight 0: the vertex is not pulled.
 struct Match {
   Vec3 point = Vec3::Zero();
   Vec3 normal = Vec3::Zero();  // of the target at the point, length 1

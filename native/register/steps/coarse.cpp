@@ -52,8 +52,8 @@ struct Coarse::Impl {
   ///      between  entries of the blocks of two nodes, below the diagonal
   void add_stiffness(double stiffness, std::vector<Block>& own,
                      std::vector<Eigen::Triplet<double>>& between) const;
-  /// Adds a small weight for the current motion, so that the system also determines nodes without
-  /// matches.
+  /// Adds a small weight that keeps each node at its current motion, so that the system also
+  /// determines nodes without matches.
   void hold(std::vector<Block>& own, Eigen::MatrixX3d& right) const;
   bool factorize(const std::vector<Block>& own, std::vector<Eigen::Triplet<double>>& entries);
 };

@@ -22,6 +22,7 @@ class Coarse {
   /// Solves for motions of the nodes that bring vertices near their matches. False: the system has
   /// no solution.
   /// In: matches  [V] the match of each vertex
+  ///     pull     weights of the other equations against the matches
   bool solve(const std::vector<Match>& matches, const std::vector<Landmark>& landmarks, Pull pull);
   /// [V] positions of the vertices after the motions.
   Points moved() const;

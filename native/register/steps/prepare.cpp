@@ -162,7 +162,7 @@ double openness(const author::detail::Nearest& own, const Vec3& point, const Vec
   const Vec3 side = normal.unitOrthogonal(), other = normal.cross(side);
   int open = 0;
   for (int i = 0; i < kRays; ++i) {
-    // The directions lie on a spiral and are denser near the normal.
+    // The directions of the rays are on a spiral and are denser near the normal.
     const double share = (i + 0.5) / kRays, radius = std::sqrt(share), turn = 2.399963 * i;
     const Vec3 way =
         radius * (std::cos(turn) * side + std::sin(turn) * other) + std::sqrt(1 - share) * normal;

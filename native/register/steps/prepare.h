@@ -37,7 +37,7 @@ core::Result<Target> near_target(const Mesh& target, const Points& start, const 
 /// Computes the properties of the template's vertices.
 /// In: start    the template in millimetres
 ///     trusted  as in RegisterOptions
-///     spacing  mm between samples, as of the target's samples
+///     spacing  mm between the target's samples; samples of the template get the same spacing
 Looks looks_of(const Form& start, const std::vector<std::uint8_t>& trusted, double spacing,
                std::size_t threads);
 

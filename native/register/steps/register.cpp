@@ -25,7 +25,7 @@ struct CoarseStep {
   int rounds;
   steps::Counting counting;
 };
-/// Steps that turn and stretch a template whose start only comes from pairs.
+/// Steps that rotate and stretch a template whose start comes from pairs alone.
 constexpr std::array<CoarseStep, 3> kFar{{
     {300, 10, 3, {30, 150, 60, 0.7, false}},
     {100, 5, 4, {30, 150, 50, 0.5, true}},

@@ -157,7 +157,7 @@ Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t
   skin.bones.shrink_to_fit();
   skin.weights.shrink_to_fit();
   std::vector<std::uint8_t> used(std::size_t{bone_count} + 1);
-  // Missing influences have the bone bone_count, which is not listed below.
+  // Missing influences have the bone bone_count, which the loop over bones leaves out.
   for (const std::uint16_t bone : skin.bones) used[bone] = 1;
   for (std::uint32_t b = 0; b < bone_count; ++b) {
     if (used[b] != 0) skin.bones_used.push_back(static_cast<std::uint16_t>(b));

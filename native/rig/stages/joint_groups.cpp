@@ -280,8 +280,8 @@ class Placer {
                                       &simd::Piece::block);
     return extra_;
   }
-  // Copies the rows of the last block if it is incomplete, through a copy of full size: the memory
-  // after it must not be written.
+  // Copies the rows of the last block if it is incomplete, through a temporary block of full size,
+  // because the memory after the block must not be written.
   void place_last(std::size_t block, std::size_t frame) noexcept {
     float last[simd::kPlaces];
     const simd::PlacedFrames one{frames_.from + frame * frames_.from_stride, 0, last, 0, 1};

@@ -113,7 +113,7 @@ void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::siz
 
 // Computes the blend shape channels of `count` frames.
 // In:  values    [controls, kFrames] the values of all controls, frame after frame for each control
-//      controls  [count, controls] the same values, control after control for each frame
+//      controls  [count, controls] the transpose of values without frames beyond count
 // Out: out       [count, channels]
 void frame_channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                     const float* values, std::size_t count, const float* controls,

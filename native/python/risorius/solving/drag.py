@@ -80,8 +80,8 @@ def solve_drag(
             the two axes of a screen, which leave the depth free; None: all three axes.
         weights: float[P], importance of each point; None: 1.
         limits: the controls that may change, and their ranges; None: all, from 0 to 1.
-        sharing: ease, partners and opposites of the controls; None: all controls have the same
-            ease, and none has a partner or an opposite.
+        sharing: ease (how readily each control changes), partners and opposites of the controls;
+            None: all controls have the same ease, and none has a partner or an opposite.
         method: "least_squares"; "transpose", which changes controls in proportion to their effect
             on the points and moves less elsewhere; or "sparse", which changes few controls, about
             one per direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
@@ -210,10 +210,10 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls of other parts of the face (see LOCAL) get ELSEWHERE, so that a dragged brow does not
-    turn the eyes, although turning the eyes moves the brow. The others get an ease by the ratio of
-    their effect here to their effect on the whole face, so that the brow lowers before the whole
-    face contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face (see LOCAL) get the small ease ELSEWHERE, so that a dragged
+    brow does not turn the eyes, although turning the eyes moves the brow. The others get an ease by
+    the ratio of their effect here to their effect on the whole face, so that the brow lowers before
+    the whole face contracts, which would lower it too. The largest ease is 1.
 
     Args:
         surface: surface of the face.

@@ -39,7 +39,8 @@ _FREED = 4.0  # limits of a selected control during the fit, as a multiple of it
 
 
 def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
-    """Selects the cheapest change that comes near enough, then fits the selected controls.
+    """Selects the controls of the cheapest change that comes near enough to the targets, and fits
+    them.
 
     The price of a control is divided by its ease and multiplied by the root of its effect on the
     points, so that of several controls in one direction a strong one is preferred to weak ones at
@@ -81,10 +82,11 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
 
 
 def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The best pose near the change `x`, float64[U], among poses that change the same controls.
+    """The best pose near `begin` + the change `x`, among poses that change the same controls as x.
 
-    It uses full Gauss-Newton steps, whose result is continuous in the targets. If the result is far
-    from the targets, halved steps are tried, too, and the nearer result is used.
+    `x` is float64[U], values of the unknowns. The function uses full Gauss-Newton steps, whose
+    result is continuous in the targets. If the result is far from the targets, halved steps are
+    tried, too, and the nearer result is used.
     """
     units, change = drag.unknowns, drag.unknowns.change(x, len(begin))
     drag = drag.held([*map(int, np.flatnonzero(change == 0))], begin)
@@ -159,8 +161,8 @@ def _agreeing(
 ) -> tuple[Drag, Doubles]:
     """For each control that is on in the pose `every`, fixes its opposite.
 
-    Returns: the drag, and the pose `few` in which each fixed control has the smaller of its values
-        in `few` and `every`.
+    Returns: the drag with these controls fixed, and the pose `few` in which each fixed control has
+        the smaller of its values in `few` and `every`.
     """
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
@@ -175,7 +177,8 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with the additional controls that the linearised drag needs to come near enough.
+    """A pose with additional controls: by linear equations, it is at most `aim` mm from the
+    targets.
 
     Controls that have already changed have a price near 0.
     """

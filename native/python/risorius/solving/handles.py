@@ -63,7 +63,7 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
     """int64[n]: vertices that are visible from the front, without the inside of the mouth.
 
     Args:
-        places: float64[V, 3], positions at rest.
+        places: float64[V, 3], neutral positions.
         surface: surface of the face, which knows the file's axes.
         size: largest extent of the mesh.
     """
@@ -77,17 +77,18 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
 
 
 def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floats:
-    """float32[n, 3, R]: displacement of each vertex per unit of each control, at rest."""
+    """float32[n, 3, R]: displacement of each vertex per unit of each control, from
+    the neutral pose."""
     rest = surface.rig.initial_raw_controls
     parts = [vertices[i : i + _CHUNK] for i in range(0, len(vertices), _CHUNK)]
     return np.concatenate([surface.jacobian(rest, mesh, part) for part in parts])
 
 
 def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
-    """int64[V]: the mirrored vertex of each vertex; a vertex on the midline has itself, -1: none.
+    """int64[V]: the mirrored vertex of each vertex, on the midline the vertex itself; -1: none.
 
     Args:
-        places: float64[V, 3], positions at rest.
+        places: float64[V, 3], neutral positions.
         side: index of the axis from left to right.
         up: index of the vertical axis.
         size: largest extent of the mesh.

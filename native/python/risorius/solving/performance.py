@@ -19,7 +19,8 @@ from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)  # scales that a difference of units explains
 _FARTHEST = 1e9  # largest coordinate; squares of larger values would overflow
-# Fraction of the face's size: an axis-aligned placement with a smaller error is preferred.
+# Fraction of the face's size: an axis-aligned placement with a smaller error than this is used
+# instead of the placement with the smallest error.
 _NEAR = 0.03
 
 
@@ -30,7 +31,7 @@ class PerformanceError(RisoriusError):
 
 
 class Performance(NamedTuple):
-    """The vertices of one moving mesh."""
+    """The vertex positions of one moving mesh in each frame."""
 
     frames: Floats
     """float32[F, V, 3]: positions in each frame."""
@@ -171,13 +172,13 @@ def _samples(path: str | os.PathLike[str], schema: Any, library: Any) -> Perform
 def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
     """Converts the performance to a face's unit and axes.
 
-    Vertices correspond, so the rotation, scale and translation that bring the first frame nearest
-    to the face can be computed. If right angles, a power of ten as scale and no translation fit
-    almost as well, these are used.
+    Vertices correspond, so the rotation, scale and translation that bring the take's neutral mesh
+    (or without one its first frame) nearest to the face can be computed. If right angles, a power
+    of ten as scale and no translation fit almost as well, these are used.
 
     Args:
         take: performance with the face's topology.
-        positions: float[V, 3], the face's vertices at rest.
+        positions: float[V, 3], the face's vertices in the neutral pose.
     """
     own = np.asarray(positions, np.float64)
     first = np.asarray(take.frames[0] if take.neutral is None else take.neutral, np.float64)

@@ -46,8 +46,8 @@ class Drag:
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: the weighted distances to the targets. Args: positions: float64[P, 3], of the
-        points."""
+        """float64[m]: targets minus positions along the directions, times the roots of the
+        weights. Args: positions: float64[P, 3], of the points."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 
@@ -139,7 +139,8 @@ class Unknowns:
         return np.asarray((jacobian[:, self.first] + both) * self.scale)
 
     def change(self, values: Doubles, count: int) -> Doubles:
-        """float64[R]: the change of the controls. Args: values: float64[U]; count: R."""
+        """float64[R]: the change of the controls. Args: values: float64[U], of the
+        unknowns; count: number R of controls."""
         out = np.zeros(count)
         out[self.first] = out[self.second] = values * self.scale
         return out

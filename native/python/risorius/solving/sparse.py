@@ -69,7 +69,7 @@ class _Path:
             end: price at which the path ends.
 
         Returns:
-            The unknown that began to move from rest, or -1.
+            The unknown that began to move from 0, or -1.
         """
         if not (self.state == _MOVES).any():
             wish = self._wish()
@@ -122,8 +122,8 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """For each resting unknown, the price's decrease until it begins to move, and its
-        direction."""
+        """For each unknown that stays at 0, the price's decrease until the unknown begins to move,
+        and the direction of its motion."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -165,7 +165,7 @@ def cheapest_change(
         price: float64[n] above 0, price per unit of x.
         elsewhere: bool[n], unknowns that should be used only if they help enough.
         tolerance: allowed distance beyond the smallest possible one.
-        worth: decrease of the distance that the unknowns elsewhere must bring.
+        worth: decrease of the distance that must result from using the unknowns `elsewhere`.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end, alone = [(path.x.copy(), path.missing)], _END * path.price, -1.0

@@ -118,7 +118,8 @@ class Surface:
         return probe.jacobian()
 
     def strongest(self) -> Doubles:
-        """float64[R]: largest displacement of a vertex per unit of each control, from rest.
+        """float64[R]: largest displacement of a vertex from the neutral pose, per unit of each
+        control.
 
         It is measured once, on about two thousand vertices spread evenly over the meshes of the
         LOD.
@@ -132,7 +133,8 @@ class Surface:
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 
     def _far(self) -> Doubles:
-        """float64[V, R]: displacement of about two thousand vertices per unit of each control."""
+        """float64[V, R]: how far each of about two thousand vertices moves per unit of each
+        control."""
         if self._moved is None:
             count = self.control_count
             every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)

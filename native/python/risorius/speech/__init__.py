@@ -64,7 +64,7 @@ def speak(
 
     Args:
         path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
-        transcript: the spoken words in English, if known; the mouth is much better with them.
+        transcript: the spoken words in English, if known; the mouth then moves more correctly.
         rate: frames per second of the clip.
         seed: seed of the blinks' times; equal files and arguments give equal clips.
         intensity: factor on mouth shapes, brows and nods, 0 to 4; lips still close completely.

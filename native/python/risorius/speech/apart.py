@@ -6,9 +6,11 @@ ffmpeg. The linker then makes the recogniser use that library, and it fails or c
 separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
     this process                                 separate process
-    one line of JSON: the task           -->     speak()
-    share, share, ..., clip or error     <--     lines of JSON
-    the pipe closes: cancelled, or dead  -->     ends
+    sends the task as a line of JSON     -->     calls speak()
+    reads the lines                      <--     sends lines of JSON: the fraction of the work done,
+                                                 again and again; then the clip or an error
+    closes the pipe: by cancel(), or     -->     ends
+    because this process has ended
 """
 
 from __future__ import annotations

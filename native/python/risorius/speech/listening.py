@@ -299,7 +299,8 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
 def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[Phoneme]:
     """The phonemes, shortened by silences that the decoder included in them.
 
-    A silent closure of a stop within a word is kept. A phoneme keeps at least 30 ms.
+    The silent closure of a stop consonant (such as p) within a word is kept. A phoneme keeps at
+    least 30 ms.
 
     Args:
         found: phonemes in order.
@@ -329,7 +330,7 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
 
 
 def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
-    """Whether a silence that starts at `begin` is the closure of a stop inside a word."""
+    """Whether a silence that starts at `begin` is the closure of a stop consonant inside a word."""
     phone = phones[last]
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 

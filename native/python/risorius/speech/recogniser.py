@@ -161,7 +161,8 @@ class Recogniser:
 def _pcm(samples: Samples) -> bytes:
     """16-bit samples with silence before and after, at the loudness that the model expects.
 
-    A little constant noise is added, because the logarithm of exact silence is undefined.
+    Quiet noise, the same in each call, is added, because the logarithm of exact silence is
+    undefined.
     """
     pad = np.zeros(int(_PAD * RATE), np.float32)
     loud = float(np.quantile(np.abs(samples), 0.99)) if len(samples) else 0.0
@@ -195,7 +196,7 @@ def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
 
 
 def _segments(decoder: Any, count: int) -> list[Segment]:
-    # hyp() must precede seg(), because it frees memory that segments of seg() still use.
+    # hyp() must precede seg(), because hyp() frees memory that segments of seg() still use.
     if decoder.hyp() is None:
         return []
     found = decoder.seg() or ()

@@ -24,7 +24,7 @@ _EXPECTED = "a phoneme such as AA, a mouth such as M B P, or sil"
 
 
 class SheetError(RisoriusError):
-    """An unusable file of phonemes; the message names the place."""
+    """An unusable file of phonemes; the message names the file, and the line if there is one."""
 
     code = "phoneme_file"
 

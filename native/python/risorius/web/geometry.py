@@ -17,9 +17,11 @@ from .kinds import kind_of
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
-# Steps are powers of two, so that values which are multiples of such steps are stored exactly.
-# Others are rounded: for a bust of 500 mm by up to 2 um in positions and 15 um in shapes, a
-# sixteenth of a pixel in a picture of 1024 pixels, which is invisible.
+# Steps in which numbers are stored, not yet rounded down to a power of two: of positions and of
+# shapes as fractions of the face's size, of texture coordinates, and of skin weights. Steps are
+# powers of two, so that multiples of them are stored exactly. Other values are rounded: for a bust
+# of 500 mm by up to 2 um in positions and 15 um in shapes, less than a sixteenth of a pixel if it
+# fills a picture of 1024 pixels.
 _PLACE, _SHAPE, _TEXTURE, _WEIGHT = 2.0**-17, 2.0**-14, 2.0**-13, 2.0**-10
 _DIRECTION = 127.0
 
@@ -35,8 +37,8 @@ class _Streams:
 
         Args:
             values: whole numbers of any shape.
-            stride: numbers are stored as the difference to the number `stride` before; 0: numbers
-                are stored unchanged.
+            stride: numbers are stored as the difference to the number `stride` places before; 0:
+                they are stored unchanged.
         """
         whole = np.asarray(values, np.int64).ravel()
         if stride:
@@ -99,7 +101,8 @@ def _mesh(mesh: Mesh, kind: str, size: float, streams: _Streams) -> dict[str, An
 def _steps(
     about: dict[str, Any], name: str, values: npt.ArrayLike, most: float, streams: _Streams
 ) -> None:
-    """Appends values as integer steps, axis by axis; `about` gets the step and the layout."""
+    """Appends values as integer multiples of a step up to `most`, axis by axis; `about` gets the
+    step and the layout."""
     exact = np.asarray(values, np.float64)
     step = _step(exact, most)
     about[name] = [step, *streams.add(np.rint(exact.T / step))]
@@ -123,8 +126,8 @@ def _power(most: float) -> float:
 
 
 def _welded(mesh: Mesh) -> tuple[Ints, Ints, Ints, Ints]:
-    """Position and texture coordinate of each vertex of the page, the vertex of each corner, and
-    the first corner of each polygon."""
+    """Indices: position and texture coordinate of each vertex of the page, the vertex of each
+    corner, and the first corner of each polygon."""
     layouts = mesh.face_layouts.astype(np.int64)
     places = mesh.layout_positions.astype(np.int64)
     if not len(mesh.texture_coordinates):

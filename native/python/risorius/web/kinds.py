@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-# The first match counts, so that eyelashes are not eyes.
+# (kind, parts of names). The first kind whose part matches counts, so that a mesh of eyelashes is
+# not of the kind eyes.
 _KINDS = (
     ("lashes", ("lash", "eyebrow")),
     ("hair", ("hair", "brow", "beard", "moustache", "mustache", "sideburn", "ponytail", "stubble")),

@@ -39,7 +39,8 @@ _MARK = "<!--FACE-->"
 # Scripts of the empty page, each with its id.
 _ELEMENT = re.compile(r'<script[^>]* id="(library|viewer)"[^>]*>([^<]*)</script>')
 _BOOT = re.compile(r"<script>(/\*BOOT\*/.*?)</script>", re.DOTALL)
-# Layers that the evaluator needs; meshes are stored apart, in fewer bytes.
+# Layers of the DNA file that the evaluator needs. The geometry layer is not among them, because
+# the page stores meshes in fewer bytes.
 RIG = (
     "behavior",
     "machine_learned_behavior",
@@ -194,9 +195,9 @@ def _captures(names: list[str]) -> dict[str, Any]:
     """The mapping with which the page reads tables of captures that a user drops on it.
 
     Returns:
-        "rows": curve -> [control, weight], the control being a raw control's index or the name of
-        an angle. "shares": [index of a control, index of the control of which it takes back a
-        share].
+        "rows": curve -> list of [control, weight], the control being a raw control's index or the
+        name of an angle. "shares": list of [index of control A, index of control B]: the value of A
+        is divided by the value of B, such as mouthClose by jawOpen.
     """
     mapping = load_mapping(_CAPTURES)
     index = {short_name(name): i for i, name in enumerate(names)}

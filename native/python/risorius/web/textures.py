@@ -48,7 +48,8 @@ class Textures:
                 self.named.setdefault(base_name(words[1]), {}).setdefault(words[2], name)
 
     def read(self, name: str) -> bytes:
-        """The bytes of a picture, or b""; names that lead to other folders are refused."""
+        """The bytes of a picture; b"" if it is missing or too large, no
+        browser shows it, or its name leads to another folder."""
         if not is_file_name(name):
             return b""
         for folder in self._folders:

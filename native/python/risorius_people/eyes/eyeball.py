@@ -41,7 +41,7 @@ _BEHIND = np.array(
 _CORNEA_RINGS = np.array(
     [0.06, 0.14, 0.24, 0.34, 0.44, 0.53, 0.61, 0.68, 0.75, 0.82, 0.89, 0.95, 1.0]
 )
-# Indices of the rings that the coarse LOD keeps.
+# Indices of the rings of the ball that the coarse LOD keeps.
 _COARSE_BALL = [0, 1, 2, 4, 6, 8, 10, 11, 12, 15, 17, 19, 21, 22, 23, 24, 25, 26]
 _COARSE_CORNEA = [1, 3, 5, 7, 9, 12]
 # Distances of the limbus and of the angle SIDE_ANGLE (radians from the gaze) from the middle of the

@@ -18,14 +18,15 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 # eye, and a ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-# Fractions of the rim's displacement by which the eight rings around it move, the nearest first.
+# Fractions of the rim's displacement by which the eight rings (OUTER) outside the rim move, the
+# nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
 # round the ball, so without this distance they would be inside the ball at half of the look.
 _LIFT = 0.38
-# Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
-# eyes turn by a third of this, and their lower lids stay still.
+# Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The eyes
+# of the data turn by a third of these angles, and their lower lids stay still.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm by which the lower lid rises in a look
 _SKIN = 0.9  # mm: smallest distance of the skin around the rim from the eye
@@ -81,7 +82,7 @@ class Lids:
 
     Attributes:
         side: "l" or "r".
-        rings: int64[13, COLUMNS], see find_rings.
+        rings: int64[13, COLUMNS], 13 = OUTER + 1 + INNER, see find_rings.
         openness: height of the upper lid above the middle of the ball, in radii of the iris.
         middle: float64[3], middle of the ball in decimetres.
         radius: radius of the ball in decimetres.

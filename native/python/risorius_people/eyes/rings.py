@@ -64,7 +64,7 @@ def _rings(
 
 
 def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
-    """Index of the skin vertex nearest to an upper lash."""
+    """Index of the skin vertex nearest to the lashes in the middle of this eye's upper lid."""
     body = groups["body"]
     lashes = base.positions[groups[f"helper-{side}-eyelashes-2"]]
     middle = lashes[np.abs(lashes[:, 0] - lashes[:, 0].mean()).argsort()[:12]]

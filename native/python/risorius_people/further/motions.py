@@ -47,7 +47,7 @@ def _number(by: object) -> float:
 def _lid_turn(places: Places, by: object) -> Floats:
     """Rotates about the middle of the eye, so that a lid slides on the ball.
 
-    `by` is the angle in radians, positive: up.
+    `by` is 1 (up) or -1 (down). The row's `size` sets the length of the displacement.
     """
     arm = places.positions - places.eye_of()
     way = np.cross(np.array([-1.0, 0, 0]), arm)
@@ -144,7 +144,7 @@ def _root(points: Floats, share: Floats, begin: float) -> Floats:
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Shifts the tongue by the vector `by`; the tip moves most."""
+    """Shifts the tongue in the direction of the vector `by`; the tip moves most."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 
@@ -180,7 +180,7 @@ def _tongue_roll(places: Places, _: object) -> Floats:
 
 
 def _tongue_press(places: Places, _: object) -> Floats:
-    """Presses the middle of the tongue against the palate; it widens, and the tip stays."""
+    """Presses the middle of the tongue against the palate. The tongue widens, and its tip stays."""
     _, points, share = _on_tongue(places)
     bump = np.exp(-(((share - 0.55) / 0.25) ** 2))
     way = np.column_stack(

@@ -81,8 +81,8 @@ def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Fl
         head: the head mesh of the LOD.
         strips: the hair of the LOD.
         unit: length of the strips' unit in the unit of the mesh.
-        own: float64[n, 12], `whereabouts` of the roots on the head of LOD 0; the nearest places on
-            this head are used. None: this head is LOD 0.
+        own: float64[n, 12], `whereabouts` of the roots on the head of LOD 0; each root gets the
+            place on this head with the nearest 12 numbers. None: this head is LOD 0.
         there: float64[V, 12], `whereabouts` of the head's vertices.
     """
     positions = np.asarray(head.positions, np.float64) / unit
@@ -245,7 +245,7 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
 
 
 def _apart_from_head(dna: Dna) -> list[int]:
-    """Indices of the joints that are not the head joint or below it."""
+    """Indices of the joints that are neither the head joint nor its descendants."""
     head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
     on_head = np.arange(len(parents)) == head
     for _ in range(len(parents)):

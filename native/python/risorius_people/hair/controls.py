@@ -16,8 +16,8 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# Control -> (half of the lid: -1 at the nose, 1 at the temple; shift (x, y, z) of a hair's tip in
-# hair lengths).
+# Control without its side -> (the half of the lid whose lashes it moves: -1 at the nose, 1 at the
+# temple; shift (x, y, z) of a lash's tip, y up and z to the front, in lengths of the lash).
 _WAYS = {
     "eyelashesUpIN": (-1, (0.0, 1.0, -0.3)),
     "eyelashesUpOUT": (1, (0.0, 1.0, -0.3)),

@@ -273,7 +273,7 @@ def _ended(
     Args:
         surface: surface of the head.
         points, out: float64[n, rows, 3] each, from `grow`.
-        end: float64[n], height of each guide's end on the man's head.
+        end: float64[n], height y of each guide's end on the man's head, as in Surface.man.
         near: indices of vertices that the guides may come near.
     """
     n, rows, _ = points.shape

@@ -128,7 +128,8 @@ def joined(parts: list[Strips]) -> Strips:
 
 
 def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
-    """Positions and normals, float64[V, 3] each: left and right edge row by row, strip by strip."""
+    """Positions and normals, float64[V, 3] each: strip by strip and row by row, the vertex of the
+    left edge, then of the right edge."""
     left, right = strips.points + strips.sides, strips.points - strips.sides
     positions = np.stack([left, right], axis=2).reshape(-1, 3)
     normals = np.repeat(strips.normals.reshape(-1, 3), 2, axis=0)

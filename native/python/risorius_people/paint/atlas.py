@@ -8,7 +8,8 @@ import numpy as np
 from ..polygons import Floats, Ints
 
 ATLAS_SIZE = 1024
-# Kind -> (first column, first row, width and height of a tile in texels, tiles per row).
+# Kind -> (column and row at which the first tile begins, width and height of a tile, all in texels;
+# number of tiles, which are side by side).
 TILES = {
     "scalp": (0, 512, 128, 512, 8),
     "brows": (0, 256, 64, 256, 8),

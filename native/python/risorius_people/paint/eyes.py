@@ -118,7 +118,8 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: crypts, lozenge gaps between fibres, mostly at the collarette."""
+    """float64[h, w] from 0 to 1: crypts, which are lozenge-shaped gaps between fibres, mostly at
+    the collarette."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
@@ -180,7 +181,8 @@ def _draw(image: Floats, points: Floats) -> None:
 
     Args:
         image: float64[size, size]; changed.
-        points: float64[n, 3]: angle about the centre in radians, distance from it, strength.
+        points: float64[n, 3]: angle about the image's centre in radians, distance from the centre
+            as a fraction of the image's side, strength from 0 to 1.
     """
     x = (0.5 + points[:, 1] * np.cos(points[:, 0])) * EYE_SIZE - 0.5
     y = (0.5 + points[:, 1] * np.sin(points[:, 0])) * EYE_SIZE - 0.5

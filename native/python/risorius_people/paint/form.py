@@ -37,7 +37,7 @@ def stressed(polygons: Polygons, places: Floats) -> Floats:
         places: float64[V, 3], positions of its vertices in decimetres.
 
     Returns:
-        The weighted sum over the scales, limited to _MOST.
+        The sum of the heights at each of _SCALES, weighted by its fraction, limited to _MOST.
     """
     edges = np.array(list(edges_of(polygons.faces)))
     about = np.maximum(np.bincount(edges.ravel(), minlength=len(places)), 1)[:, None]

@@ -14,8 +14,8 @@ from ..polygons import Floats, Ints, Polygons
 
 STRIP = 0.22  # fraction of the texture's height for all islands except the face
 _MARGIN = 0.006  # margin around each island, as a fraction of the texture's side
-# Across and down the face island: middle of the enlarged area, its reach, and its texel density
-# relative to the island's rim.
+# Across and down the face island: middle of the enlarged area and its reach, as fractions of the
+# island's width or height; and its texel density relative to the island's rim.
 _ACROSS = (0.5, 0.19, 2.0)
 _DOWN = (0.63, 0.25, 1.45)
 
@@ -75,7 +75,9 @@ def _unit(places: Floats) -> Floats:
 
 
 def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
-    """Maps [0, 1] onto itself so that the middle is stretched `more` times as much as the ends."""
+    """Maps [0, 1] onto itself; places near `middle` are stretched `more` times as much as the ends.
+
+    `reach` is the distance from `middle` at which the additional stretch has fallen to a third."""
     steps = np.linspace(0, 1, 513)
     density = 1 + (more - 1) * np.exp(-(((steps - middle) / reach) ** 4))
     total = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])
@@ -89,7 +91,7 @@ def _into(places: Floats, low: tuple[float, float], high: tuple[float, float]) -
 
 
 def _fitted(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Centres coordinates in a cell as large as possible, if necessary rotated by 90°."""
+    """Scales coordinates until they fill a cell, rotated by 90° if they become larger that way."""
     room = np.array(high) - np.array(low) - 2 * _MARGIN
 
     def scale(size: Floats) -> float:

@@ -102,7 +102,8 @@ def thinned(points: Floats, style: str) -> Floats:
 
 
 def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
-    """Position along a brow, 0 at the nose and 1 at the temple, and height above its middle line.
+    """Position along a brow, 0 at the nose and 1 at the temple, and height above the brow's middle
+    line in decimetres.
 
     Args:
         points: float64[n, 3], on the man's head.

@@ -28,7 +28,7 @@ _REACH = 0.12  # decimetres: size of the spots of the noise in fields
 
 @dataclass
 class Face:
-    """The vertices of a head, relative to the left eye.
+    """The vertices of a head: x from the middle of the face, y and z from the left eye's middle.
 
     Attributes:
         x: float64[V], to the side; the character's left is positive.
@@ -38,8 +38,8 @@ class Face:
         mouth: float64[V], number of the base mesh's edge loops from the inside of the mouth, which
             is an island of the texture; negative inside.
         eyes: float64[V], number of edge loops from the skin behind the lids; negative there.
-        uneven: float64[V, 3], noise with mean 0 and deviation about 1, equal on both sides of
-            texture seams.
+        uneven: float64[V, 3], three noises with mean 0 and standard deviation about 1, equal on
+            both sides of texture seams.
     """
 
     x: Floats
@@ -102,7 +102,7 @@ def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
 
     Args:
         polygons: polygons of the head; the insides are islands of its texture.
-        places: float64[V, 3], relative to the left eye, in decimetres.
+        places: float64[V, 3] in decimetres, from the same origin as in Face.
     """
     label = islands(polygons)
     corner = np.concatenate([np.asarray(face) for face in polygons.faces])
@@ -149,7 +149,7 @@ def _rings(edges: Ints, inside: Ints, outside: Ints) -> Floats:
 
 
 def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Floats:
-    """float64[n]: smooth noise in space, with mean 0 and deviation about 1.
+    """float64[n]: smooth noise in space, with mean 0 and standard deviation about 1.
 
     Args:
         places: float64[n, 3], positions.
@@ -264,7 +264,8 @@ def oil(face: Face) -> Floats:
 
 
 def freckled(face: Face) -> Floats:
-    """Density of freckles by the sun, 0 to 1: on nose, cheeks, and less on the forehead."""
+    """Density of freckles that the sun causes, 0 to 1: on nose and cheeks, and less on the
+    forehead."""
     nose = face.spot(0, -0.24, 0.2, 0.13)
     cheeks = face.spot(0.36, -0.3, 0.2, 0.16)
     return np.asarray(

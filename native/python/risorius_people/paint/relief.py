@@ -15,7 +15,7 @@ from .raster import filled
 from .skin import Skin
 
 PORE = 0.0020  # depth of a pore
-# step of a normal's components, because finer steps are invisible and compress badly
+# Step of the stored components 0.5 n of a normal. Finer steps are invisible and compress badly.
 _STEP = 2 / 255
 _LIPS = 0.0004  # height of the lips' lines
 _CREASE = 0.0045  # depth of a crease
@@ -79,7 +79,7 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    # Gloss is more visible on dark skin, so dark skin is rougher.
+    # Gloss is more visible on dark skin, so dark skin gets more roughness.
     matte = dry + 0.11 * skin.deep
     out = 0.48 + matte - (0.13 - 0.054 * skin.deep) * field["oil"]
     out += 0.02 * texels.coarse + 0.03 * texels.middle

@@ -71,7 +71,7 @@ class Texels:
         raster: raster of the head's texture.
         place: float32[n, 3], position of each texel in decimetres.
         step: float32[n, 2], width and height of each texel on the surface in decimetres.
-        scale: number of this texture's texels per texel at HEAD_SIZE.
+        scale: side of this texture divided by HEAD_SIZE.
     """
 
     def __init__(self, raster: Raster, positions: Floats) -> None:
@@ -289,7 +289,7 @@ class Skin:
 
     @cached_property
     def lines(self) -> Floats:
-        """float32[n]: lines across the lips, with mean 0 and deviation 1."""
+        """float32[n]: lines across the lips, with mean 0 and standard deviation 1."""
         texels = self.texels
         tile = patterns.mottling(512, 2.3, np.random.default_rng(41), 14)
         across = np.rint(texels.place[:, 0] / 0.0042 + 1.5 * texels.middle).astype(int) % 512

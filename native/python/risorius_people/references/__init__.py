@@ -21,7 +21,7 @@ SHIPPED = Path(__file__).with_name("joints.npz")
 
 
 def shipped() -> Reference:
-    """The joints for build.RIG, which the package contains."""
+    """The joints for the options build.RIG, from a file of the package."""
     return Reference.read(SHIPPED)
 
 

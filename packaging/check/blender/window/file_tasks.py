@@ -285,7 +285,8 @@ bpy.app.handlers.render_complete.clear()
 
 
 def _bake(hand: Hand) -> Iterator[Check]:
-    """Insert two keyframes, bake the face by Blender's search, undo by Done, and export glTF."""
+    """Insert two keyframes, bake the face by Blender's search, undo the bake by the button Done,
+    and export glTF."""
     ready_tab(hand)
     go_to(hand, 1)
     key_all(hand)

@@ -94,7 +94,8 @@ def show_tab(wide=0):
 
 
 def quiet():
-    """Set preferences for the tests, such as the file browser in this window; remove the cube."""
+    """Set preferences for the tests, such as the file browser in this window. Remove the default
+    cube and light."""
     preferences = bpy.context.preferences
     preferences.view.filebrowser_display_type = "SCREEN"
     preferences.view.show_tooltips = False
