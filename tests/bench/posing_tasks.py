@@ -292,7 +292,10 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(raw controls, key events) of drags of a vertex: with all sliders, or with one of three."""
+    """(raw controls, key events) of drags of a vertex: with all sliders, then with one slider,
+
+    for each of the three sliders that alone bring the vertex nearest to its target.
+    """
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(
         face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))

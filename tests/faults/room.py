@@ -177,7 +177,7 @@ def measured(arguments: Sequence[str], folder: Path) -> Done:
 
 
 def complaints(done: Done, codes: Sequence[int]) -> list[str]:
-    """Sentences on faults in a command's end: exit code, traceback, no sentence, many lines."""
+    """Sentences about a wrong end of a command: exit code, traceback, no or too much text."""
     lines = done.err.strip().splitlines()
     out = []
     if done.code not in codes:

@@ -68,10 +68,12 @@ class Seeds {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
 
-  /// Adds a seed for the target with a deliberate fault: one run with it must find the fault.
+  /// Adds a seed for the fuzz target `greedy`, which has a deliberate fault. One run with this seed
+  /// must find the fault.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
 
-  /// Adds rows, and packed buffers of each mode, in the form that packed_fuzz reads.
+  /// Adds rows to be packed, and packed buffers of each meshopt mode, in the form that packed_fuzz
+  /// reads.
   void add_packed() {
     namespace author = risorius::author;
     using Mode = author::PackedMode;

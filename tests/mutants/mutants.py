@@ -48,7 +48,8 @@ SOURCES = {
 SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
 WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
 MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
-# Without debug symbols and with low optimisation, because each mutant is compiled and linked.
+# Options of CMake. They omit debug symbols and lower optimisation, because each mutant is compiled
+# and linked.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -185,7 +186,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; otherwise it proves nothing."""
+        """Whether the failed test passes without the mutant; if not, its failure proves nothing."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
