@@ -200,7 +200,7 @@ def _moves(dna, joints):
 
 
 def _rows():
-    """Controls of each ARKit unit by arkit.toml: unit -> {control: value}.
+    """Controls of each ARKit shape by arkit.toml: name of the shape -> {control: value}.
 
     If a control is a share of another control, the other control is added with the value 1.
     """
@@ -212,10 +212,10 @@ def _rows():
 
 
 def _wanted(data, body, unit, row):
-    """The displacement that an ARKit unit should give, float64[V, 3], in the data's unit.
+    """The displacement that an ARKit shape (`unit`) should give, float64[V, 3], in decimetres.
 
-    A unit that is a share of the open jaw is taken together with the open jaw. For eyes and lids,
-    which have other tests, it is the displacement of the person's own controls.
+    mouthClose, which depends on the open jaw, is added to jawOpen. Eyes and lids have other tests;
+    for them the displacement of the person's own controls is returned.
     """
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
@@ -235,7 +235,7 @@ def _wanted(data, body, unit, row):
 
 @pytest.mark.parametrize("lod", [0, 1])
 def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
-    """Each vertex deviates by at most 0.1 % of the head's height from the unit in the data."""
+    """Each vertex deviates by at most 0.1 % of the head's height from ARKit's shape in the data."""
     data, dna, parts, positions, _, body = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
@@ -322,7 +322,7 @@ def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
 def test_extra_the_packed_face_gives_back_its_units(sample, packed):
-    """The extension's man reproduces ARKit units within 0.8 mm.
+    """The extension's man reproduces ARKit's shapes within 0.8 mm.
 
     This includes lips that stay closed while the jaw opens, where five controls and five
     correctives rotate the same joints.
