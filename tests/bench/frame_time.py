@@ -131,7 +131,7 @@ def step(frames):
 
 
 def own_time(package, frames):
-    """Stage -> median ms over one pass, from the timings of the add-on's overlay."""
+    """Stage of the add-on's work on a frame -> median ms over all frames, as its overlay shows."""
     timing = sys.modules[f"{package}.scene.frame.timing"]
     stages = []
     for frame in range(2, frames + 1):

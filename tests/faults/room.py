@@ -138,7 +138,10 @@ class Room:
 def begin(
     arguments: Sequence[str], limit: Callable[[], None] | None = None
 ) -> subprocess.Popen[str]:
-    """Start a command, and wait until it can be interrupted. limit: called in its process."""
+    """Start a command, and wait until it can be interrupted.
+
+    limit: called in the child process before the command starts; None: nothing is called.
+    """
     process = subprocess.Popen(
         [sys.executable, "-c", READY, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,

@@ -120,7 +120,7 @@ class Copy:
         self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Copy changed files and build. Equal files keep their times, so that Ninja skips them."""
+        """Copy changed files and build. Unchanged copies keep their times, so Ninja skips them."""
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,

@@ -323,7 +323,7 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
 
 // Compares the poses of scalar kernels `a` with the poses of `b`. SSE4 must give the same bits.
 // Other sets are compared only if the controls are equal, because a control that differs in its
-// last bits may select another row of a table.
+// last bits may select another row of a table. In: tame  false: only the bits of SSE4 are compared
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";

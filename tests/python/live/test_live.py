@@ -433,7 +433,11 @@ def test_subjects_that_stream_keep_their_places():
 
 
 def flood(receiver, seconds, at, steps=lambda n: ()):
-    """Send 6 packets per second for each of 32 invented subjects, and packets of steps(n)."""
+    """Give a receiver 6 packets per second for each of 32 invented subjects.
+
+    After round n of these packets come the packets (step, sender) of steps(n). at(k) is the
+    address of subject k.
+    """
     for n in range(round(6 * seconds)):
         for k in range(32):
             address = at(k)
