@@ -132,7 +132,7 @@ class Seeds {
   void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file,
            std::size_t largest = kLargestSeed) {
     bytes.insert(bytes.end(), file.begin(), file.end());
-    // Blocks of rigs may be larger, because they are padded.
+    // Seeds with the block of a rig may be four times as large, because blocks are padded.
     if (bytes.size() > (target == "rig" ? 4 : 1) * (largest + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);

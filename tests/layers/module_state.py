@@ -38,7 +38,8 @@ FIXED = {
     "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
     "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
 }  # fmt: skip
-# Classes whose objects a constant may be. A Lock is in the same state after each `with`.
+# Mutable classes whose objects are allowed as values of names in UPPER_CASE. A Lock is in the same
+# state after each `with`.
 VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
 CHANGES = {
     "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",

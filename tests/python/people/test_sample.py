@@ -577,7 +577,7 @@ def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
 
 
 def test_a_displacement_is_carried_by_the_change_of_form():
-    """On a stretched and sheared sheet, a carried motion along an edge remains along this edge."""
+    """A motion along an edge, transferred to a stretched and sheared sheet, is along this edge."""
     side = 12
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)

@@ -130,7 +130,7 @@ def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
 
 @pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
 def test_hairs_of_a_card_fade_out_to_its_sides(who):
-    """Otherwise a card with even hairs, or hairs cut off at its sides, looks like a rectangle."""
+    """A card must have fewer hairs towards its sides, or else it looks like a rectangle."""
     cover = paint_strands(people.PEOPLE[who])[..., 3]
     curly = who in ("fighter", "woman")
     for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
