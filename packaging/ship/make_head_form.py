@@ -394,7 +394,8 @@ def expression(
         rows: rows of the kept points, with the eyes' points at the end.
     """
     rest = heads.base.positions[heads.kept]
-    # The face units are made for the adult face of the data, but the base mesh is not an adult.
+    # The face units (shapes of expressions) are made for the adult face of the data, but the base
+    # mesh is not an adult.
     person = Person("", "male", 25, {"caucasian": 1.0}, *[(0, 0, 0)] * 6, 0, ((0, 0, 0), (0, 0, 0)))
     for name, weight in person.shape().items():
         rest = rest + weight * heads.shape(f"{TARGETS}{name}.target.gz")

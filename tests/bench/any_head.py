@@ -13,11 +13,11 @@ with the expressions of the default template, on ICT's heads too.
 Columns, in mm: *surface*, mean distance of trusted vertices from the head; *along*, their mean
 error along the surface; *corner*, the largest error of the six corners of eyes and mouth; *rows*,
 the percentage of expressions and correctives within 0.3 mm on average and 1.2 mm for 95 % of the
-vertices that they move, and the worst of both (before repair, at strength 1); after repair *gap*,
-the widest gap of closed lids, *cut*, the deepest cut of lids into an eye (0.05 mm count as none),
-and *lips*, the gap of the lips where the jaw opens and the mouth closes; *misses*, the targets that
-the head does not reach. CPU seconds are of the whole head. With --only registration, expressions
-are left out.
+vertices that they move; *worst mean* and *worst 95 %*, the largest of these two errors (before
+repair, at strength 1); after repair *gap*, the widest gap of closed lids, *cut*, the deepest cut of
+lids into an eye (0.05 mm count as none), and *lips*, the gap of the lips where the jaw opens and
+the mouth closes; *misses*, the targets that the head does not reach. CPU seconds are of the whole
+head. With --only registration, expressions are left out.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@
 A mutant is killed by the first test that fails or takes much longer than without the mutant.
 tests.toml lists the tests of each file, the fastest first. A mutant that does not build is replaced
 by another one. Results are stored in build/mutants, so that an interrupted run continues.
---survivors tests the surviving mutants again with the present tests.
+--survivors tests the surviving mutants again with the present tests. --programs runs only the
+GoogleTest programs.
 """
 
 from __future__ import annotations

@@ -202,7 +202,8 @@ def _moves(dna, joints):
 def _rows():
     """Controls of each ARKit shape by arkit.toml: name of the shape -> {control: value}.
 
-    If a control is a share of another control, the other control is added with the value 1.
+    If a control has an effect in proportion to another control, such as mouthLipsTogether to
+    jawOpen, the other control is added with the value 1.
     """
     whole = shares()
     return {
