@@ -202,8 +202,8 @@ def _moves(dna, joints):
 def _rows():
     """Controls of each ARKit shape by arkit.toml: name of the shape -> {control: value}.
 
-    If a control has an effect in proportion to another control, such as mouthLipsTogether to
-    jawOpen, the other control is added with the value 1.
+    If the value of a control is a fraction of another control, as mouthLipsTogether is of jawOpen,
+    the other control is added with the value 1.
     """
     whole = shares()
     return {
