@@ -116,7 +116,7 @@ class Heads:
         self.axes = self._axes()
 
     def shape(self, name: str) -> Doubles:
-        """float32[kept, 3]: a shape of the data as displacements, decimetres. It is cached."""
+        """float32[n, 3]: the displacements of a shape at the n vertices self.kept, dm. Cached."""
         if name not in self._read:
             self._read[name] = self.source.target(name, self.count)[self.kept].astype(np.float32)
         return self._read[name]
@@ -156,7 +156,7 @@ class Heads:
         return (name, f"{folder}/r-{last[2:]}") if last.startswith("l-") else (name,)
 
     def draw(self, dice: np.random.Generator) -> Doubles:
-        """float64[kept, 3]: positions of a random head, decimetres."""
+        """float64[n, 3]: positions of the n vertices self.kept of a random head, decimetres."""
         out = self.base.positions[self.kept].copy()
         shares = dice.dirichlet(np.full(len(ORIGINS), 0.6))
         person = Person(
@@ -178,7 +178,7 @@ class Heads:
         return out
 
     def expression(self, names: tuple[str, ...]) -> Doubles:
-        """float64[kept, 3]: the sum of the displacements of face units, decimetres."""
+        """float64[n, 3]: sum of the displacements of face units at the vertices self.kept, dm."""
         return np.sum([self.shape(f"{FACE_UNITS}{name}.target") for name in names], axis=0)
 
 
@@ -394,7 +394,8 @@ def expression(
         rows: rows of the kept points, with the eyes' points at the end.
     """
     rest = heads.base.positions[heads.kept]
-    # The face units are made for the adult face of the data, but the base mesh is not an adult.
+    # The face units (shapes of expressions) are made for the adult face of the data, but the base
+    # mesh is not an adult.
     person = Person("", "male", 25, {"caucasian": 1.0}, *[(0, 0, 0)] * 6, 0, ((0, 0, 0), (0, 0, 0)))
     for name, weight in person.shape().items():
         rest = rest + weight * heads.shape(f"{TARGETS}{name}.target.gz")

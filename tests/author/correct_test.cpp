@@ -185,7 +185,7 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
 
 /// Repairs a pose of the sheet of skin. The pose has a single part (such as an expression), and the
 /// skin without this part has the same positions. So taking the part back removes no fault, and
-/// only the least squares solve can help. The faults of the undeformed sheet are allowed.
+/// only the least squares solve can help. Faults that the sheet has before the pose are allowed.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));
@@ -199,7 +199,7 @@ Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
     }
     for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
   }
-  // The sums that the repair reports equal the sums of the repaired pose.
+  // The sums of faults that the repair reports equal the sums measured in the repaired pose.
   const auto sums = check.sum(look(check, scene.pose(mended)), allowed);
   EXPECT_NEAR(sums->volume, repair->after.volume, 1e-3);
   EXPECT_EQ(sums->stretched, repair->after.stretched);
@@ -291,8 +291,8 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
   auto positions = scene.skin.neutral;  // the upper sheet moves down by 2 mm, through the lower one
   for (std::size_t v = count; v < positions.size(); ++v) positions[v][2] -= 2.0;
   const auto found = look(check, {positions, {}});
-  // Light reaches into the narrow gap only at its rim. Faults must be found only at vertices that
-  // are shown.
+  // The gap is narrow, so that from outside only vertices near its rim can be seen. Faults must be
+  // found only at such vertices, for which shown() is true.
   double deepest = 0.0;
   std::size_t inside = 0;
   for (std::size_t v = count; v < positions.size(); ++v) {
@@ -310,7 +310,7 @@ TEST(Correct, WhatGoesIntoOneAnotherGoesBackByHalfEach) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, {scene.skin.neutral, {}});
   const std::uint32_t count = kSheet * kSheet;
-  // The upper sheet moves down at the rim, where light enters and vertices are shown.
+  // The upper sheet moves down at the rim of the gap, where the vertices can be seen from outside.
   auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < count; ++v) {
     const double d = std::hypot(x_of(v) + 20.0, y_of(v)) / 6.0;

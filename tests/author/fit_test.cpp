@@ -484,7 +484,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
 
 TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
   const Shapes shapes = two_sides();
-  // On each side two joints have the same position. Each of them moves in another expression.
+  // On each side two joints have the same position, and move in different expressions.
   std::vector<GivenJoint> joints(5);
   for (std::size_t j = 1; j < 5; ++j) {
     joints[j].position = {j % 2 == 1 ? 0.5 : -0.5, 0.0, -0.4};

@@ -23,7 +23,7 @@ def rigid_motion(rest: Floats, now: Floats) -> tuple[Floats, Floats]:
     """The rotation R [3, 3] and shift t [3] for which now = rest R^T + t fits best.
 
     Args:
-        rest, now: the same points, [n, 3].
+        rest, now: [n, 3], positions of the same points in the neutral pose and in a frame.
     """
     a, b = rest.mean(axis=0), now.mean(axis=0)
     u, _, vt = np.linalg.svd((now - b).T @ (rest - a))

@@ -169,7 +169,7 @@ class Hair:
 
 
 class Face:
-    """A person in the neutral pose, with all checked parts."""
+    """A person in the neutral pose, with all checked parts: eyes, rows of teeth, hair."""
 
     def __init__(self, path: Path) -> None:
         self.dna = risorius.load(str(path))

@@ -51,7 +51,7 @@ def random_acting(names: Sequence[str], seed: int, frames: int, clip: Any = None
 
 
 class _Actor:
-    """Poses of a rig's controls, drawn one after the other."""
+    """Draws random poses, which are values of a rig's controls. Each call of frame() draws one."""
 
     def __init__(self, names: Sequence[str], seed: int, clip: Any) -> None:
         self._random = np.random.default_rng(seed)

@@ -63,7 +63,7 @@ def captured(clip, names, noise):
 
 
 def baked_clips(rig, clip):
-    """Two clips of a baked animation: curves of joints and of blend shapes that change.
+    """Two clips of a baked animation: changing joint curves, and changing blend shape weights.
 
     Args:
         rig: a risorius.Rig.

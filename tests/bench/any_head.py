@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Measures heads of known truth end to end, without a click, against all targets.
+"""Measures automatic rigs of heads with a known true shape, and compares them with all targets.
 
     python tests/bench/any_head.py [--heads 20] [--first 400] [--kind decimated] [--ict ict.npz]
         [--only registration]
 
-Every fourth seed is an identity of ICT FaceKit, laid on by ICT's own skin; without its file these
-rows are NOT RUN. The others are random people of the sample's generator, laid on by the man. KINDS
-of remeshing take turns; none of them welds the lips. Eyes and teeth are those that the program
-fits in. Contacts of ICT's heads are those of the default template's expressions.
+Every fourth seed gives an identity of ICT FaceKit, to which ICT's own skin is registered; without
+ICT's file these rows are NOT RUN. The other seeds give random people of the sample's generator, to
+which the sample man is registered. The heads use the remeshings of KINDS in turn; none of them
+welds the lips. Eyes and teeth come from the template. Contacts (*gap*, *cut*, *lips*) are measured
+with the expressions of the default template, on ICT's heads too.
 
 Columns, in mm: *surface*, mean distance of trusted vertices from the head; *along*, their mean
 error along the surface; *corner*, the largest error of the six corners of eyes and mouth; *rows*,
 the percentage of expressions and correctives within 0.3 mm on average and 1.2 mm for 95 % of the
-vertices that they move, and the worst of both (before repair, at strength 1); after repair *gap*,
-the widest gap of closed lids, *cut*, the deepest cut of lids into an eye (0.05 mm count as none),
-and *lips*, the gap of the lips where the jaw opens and the mouth closes; *misses*, the targets that
-the head does not reach. CPU seconds are of the whole head. With --only registration, expressions
-are left out.
+vertices that they move; *worst mean* and *worst 95 %*, the largest of these two errors (before
+repair, at strength 1); after repair *gap*, the widest gap of closed lids, *cut*, the deepest cut of
+lids into an eye (0.05 mm count as none), and *lips*, the gap of the lips where the jaw opens and
+the mouth closes; *misses*, the targets that the head does not reach. CPU seconds are of the whole
+head. With --only registration, expressions are left out.
 """
 
 from __future__ import annotations
@@ -182,7 +183,7 @@ def contacts(template, source: Source, target: Surface) -> list[float]:
 
 
 def told(name: str, values: list[float], seconds: float) -> bool:
-    """Print the row of a head; whether it reaches all targets."""
+    """Print the row of a head. Returns whether the head reaches all targets."""
     missed, cells = [], []
     for column, value, limit in zip(COLUMNS, values, LIMITS, strict=False):
         share = column == "rows"

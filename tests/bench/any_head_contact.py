@@ -114,7 +114,7 @@ class Made:
 
 
 def repaired(head: Standing, template, source: TemplateFace, strength: float = 1.0) -> Made:
-    """The template's expressions on a head that stands, before and after repair.
+    """The template's expressions on a head from stand() (upright, in cm), before and after repair.
 
     Args:
         template: the DNA file.

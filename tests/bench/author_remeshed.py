@@ -29,7 +29,7 @@ from risorius_people.source import Source, fetch
 
 
 def old_head(source):
-    """Positions [V, 3] in cm, polygons and the ARKit units' displacements of the base head."""
+    """The base head: positions [V, 3] in cm, polygons, displacements of ARKit's expressions."""
     _, parts, body = blend_shape_face.assemble(source, print, MAN)
     part = next(p for p in parts if p.name == "head_lod1_mesh")
     count = len(body.positions)
@@ -64,7 +64,7 @@ def remeshed(positions, faces, voxel):
 
 
 def carried(points, positions, faces, units):
-    """For each point, the nearest point on the old surface, and the units' displacements there."""
+    """Name -> displacements, copied for each point from the nearest place on the old surface."""
     triangles = np.array([[f[0], f[i], f[i + 1]] for f in faces for i in range(1, len(f) - 1)])
     tree = BVHTree.FromPolygons(positions.tolist(), triangles.tolist())
     corners, shares, apart = [], [], []

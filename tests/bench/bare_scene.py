@@ -42,7 +42,10 @@ class Bare:
         self._switch(False)
 
     def end(self):
-        """Enable these modifiers, so that the add-on does not assume that a user disabled them."""
+        """Enable the modifiers that begin() disabled.
+
+        Otherwise the add-on would assume that a user disabled them.
+        """
         self._switch(True)
 
     def _switch(self, on):

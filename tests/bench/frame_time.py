@@ -10,9 +10,10 @@ at every frame, by an NLA strip with a second strip in Add mode above it. Each r
 `scene.frame_set` with the whole dependency graph, without drawing.
 
     add-on, AUTO / LIVE / KEYS   the add-on in the shape modes Direct, Live, Shape Keys
-    floor of AUTO / LIVE         a bare handler alternates between two poses of the add-on
+    floor of AUTO / LIVE         without the add-on, a handler writes two recorded poses in turn
     plain way                    a handler evaluates the same rig natively and writes all bones and
-                                 all shape key values to the originals, in bulk; no drivers
+                                 all shape key values to the original (not evaluated) objects, in
+                                 bulk; no drivers
     plain way, loops             the same, with one assignment per bone and shape key
     curves only                  no handler follows the controls
 
@@ -131,7 +132,7 @@ def step(frames):
 
 
 def own_time(package, frames):
-    """Stage -> median ms over one pass, from the timings of the add-on's overlay."""
+    """Stage of the add-on's work on a frame -> median ms over all frames, as its overlay shows."""
     timing = sys.modules[f"{package}.scene.frame.timing"]
     stages = []
     for frame in range(2, frames + 1):

@@ -9,7 +9,7 @@ vertices furthest from their targets and takes the drag that reduces the error m
 Events: presses and releases of the mouse button, two for a click and two for a drag. The number
 after a + counts events of keys (Ctrl for a single slider, Tab for the next slider). Opening the
 tool or the sidebar tab is not counted. Regions of sliders are closed at the beginning of a pose
-and opened by a click; a last line gives the ratio with all regions open.
+and opened by a click; the line "all regions open" gives the ratio without these clicks.
 
 Pixels: the path of the pointer. Sliders are 75 or 150 pixels wide, in rows of 22 pixels below the
 headings of their regions. The head has 1.25 pixels per mm, the complete board is 285 pixels high,
@@ -292,7 +292,10 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(raw controls, key events) of drags of a vertex: with all sliders, or with one of three."""
+    """(raw controls, key events) of drags of a vertex: with all sliders, then with one slider,
+
+    for each of the three sliders that alone bring the vertex nearest to its target.
+    """
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(
         face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))

@@ -5,9 +5,9 @@
 
 Writes frames.npz for `risorius bench FACE.dna --frames`, and a clip of each kind for Blender:
 `active_20` (speech.rzc) is speech from the voice; `active_60` (acted.rzc) adds the demo's acting, a
-smile and idle life; `active_260` (captured.rzc) also adds the noise of a capture to every control.
-The same controls are active together as in the acting of a face, unlike in random frames. All clips
-have 60 frames a second. Prints the number of controls that are not 0.
+smile and idle movement; `active_260` (captured.rzc) also adds the noise of a capture to every
+control. The same controls are active together as in the acting of a face, unlike in random frames.
+All clips have 60 frames a second. Prints the number of controls that are not 0.
 """
 
 from __future__ import annotations

@@ -36,9 +36,9 @@ namespace {
 using namespace risorius;
 using bench::Frames;
 
-// A row of the table. name: the benchmark; base: the benchmark to which it is compared; read: the
-// benchmark that only reads the same columns; asked: the target as text. With a read, the target is
-// at most kReads times the read's time plus kBeside us.
+// A row of the table. name: the benchmark; base: the benchmark to which it is compared; read: a
+// benchmark that only reads the same columns, or ""; asked: the target as text. If `read` is given,
+// the target is a time of at most kReads times the time of `read`, plus kBeside us for other work.
 struct Line {
   std::string name, base, read, asked;
   double bytes = 0;  // size of the active columns
@@ -240,14 +240,15 @@ class Suite {
   }
 
  private:
-  // Adds a row of the table. Out: its name
+  // Adds a row of the table. Out: the row's name
   const std::string& row(const std::string& name, const std::string& base = "",
                          const std::string& asked = "", const std::string& read = "",
                          double bytes = 0) {
     lines_.push_back({name, base, read, asked, bytes});
     return lines_.back().name;
   }
-  // Adds the benchmarks of a face, of the sparse matrix, and of the read of the active columns.
+  // Adds benchmarks of a face, of the face as one sparse matrix (CSR; LOD 0 has it already), and of
+  // reading the active columns only.
   void add_ours(const std::string& what, const std::shared_ptr<rig::Rig>& rig, const Frames& frames,
                 std::uint32_t lod, const std::string& asked, const std::string& level = "") {
     const std::string base = "csr" + level + ", " + frames.name;

@@ -6,10 +6,10 @@
 Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
 installed. FULL.dna is a file of real size (tests/fullscale/generate.py); the .blend file for
 opening and saving contains ten characters of SAMPLE.dna. The floor is the time in the same scene
-with the add-on disabled; both are measured alternately, three times each. For frames and slider
-steps, a bare handler writes two poses alternately: vertex positions recorded from the add-on, or
-with --mode LIVE its bones and shape keys. For undo, the same handler runs after a change of a
-property. Files and edit mode need no handler. Times are medians in ms.
+with the add-on disabled; floor and add-on are measured alternately, three times each. For frames
+and slider steps, a bare handler writes two poses alternately: vertex positions recorded from the
+add-on, or with --mode LIVE its bones and shape keys. For undo, the same handler runs after a change
+of a property. Files and edit mode need no handler. Times are medians in ms.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def measure_slider(path, package, rounds, mode):
 
 
 def measure_undo(drag, steps=8):
-    """Median ms of an undo and of a redo, including the scene's evaluation, over steps - 1 each."""
+    """Median ms of steps - 1 undos and of steps - 1 redos, with the scene's evaluation."""
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="start")
     for step in range(steps):

@@ -142,7 +142,8 @@ TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   EXPECT_EQ(read.error().where, "head.names");
 }
 
-// Whatever the sizes of the pieces, the encoder gives the same bytes as encode().
+// The encoder gets the frames in pieces of growing size. It must give the same bytes as encode(),
+// which gets the whole clip.
 TEST(ClipEncoder, TakesFramesAsTheyCome) {
   Clip clip = make_full_clip(250);
   clip.events.clear();

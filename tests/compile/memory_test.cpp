@@ -12,8 +12,8 @@ namespace {
 
 using namespace testing_support;
 
-// Limits of heap memory: twice the limits of the budget, for vectors that double and for auxiliary
-// lists.
+// Limit of heap memory: kTimesTheFace times the face's size, plus kBeside bytes. kBeside is twice
+// the constant in compile::budget_for(), for vectors that double and for auxiliary lists.
 constexpr std::size_t kTimesTheFace = 64, kBeside = 2u << 20;
 
 struct Taken {

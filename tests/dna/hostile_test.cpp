@@ -37,8 +37,9 @@ Bytes golden(const std::string& name) {
   return bytes;
 }
 
-// Checks one promise of support/promises.h for a variant of a golden file; all of them would take
-// too long. It is the promise about reading, and in every third turn one of the other promises.
+// Checks a variant of a golden file against one promise of support/promises.h, because all promises
+// would take too long. It is the promise about reading, but in every third turn, if the variant can
+// be read, one of the other promises.
 std::string one_promise(const Bytes& bytes, std::size_t turn) {
   const auto dna = promises::parse(bytes);
   if (!dna || turn % 3 != 0) return promises::reading(bytes, dna);

@@ -17,7 +17,7 @@ TEST(Regroup, TakesOutWhatIsSmallAndForeign) {
   EXPECT_EQ(out.report.changes.translation_mm.joint, "joint3");
   EXPECT_EQ(out.report.changes.translation_mm.expression, "raw1");
   EXPECT_EQ(out.report.changes.rotation_degrees.value, 0.0);
-  // Joint 5 keeps a small value, because the column belongs to its region.
+  // Joint 5 keeps its small value, because control 0 belongs to the region of joint 5.
   EXPECT_EQ(joints_of(out.dna, {1, 0}, 0)[45], 0.049f);
 }
 

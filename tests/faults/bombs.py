@@ -49,7 +49,7 @@ def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
 
 
 def fbx_curve(path: Path) -> None:
-    """An FBX with an animated curve of eight million equal keys."""
+    """An FBX with an animation curve of eight million equal keyframes."""
     curve = fbx_files.curve(1, np.zeros(8 * MiB), np.zeros(8 * MiB, "<f4"))
     tracks = [("Model/LimbNode", "jawOpen", "jawOpen", {"jawOpen": curve}, 0)]
     path.write_bytes(fbx_files.animation(tracks))

@@ -180,7 +180,7 @@ def _signalled(
 
 
 def _interrupted(done: Done) -> list[str]:
-    """Sentences on faults in the end of an interrupted command.
+    """Sentences about faults in the way in which an interrupted command ended.
 
     A command that has already printed its result may end by the signal, because Python ignores its
     handler while it exits.

@@ -138,7 +138,10 @@ class Room:
 def begin(
     arguments: Sequence[str], limit: Callable[[], None] | None = None
 ) -> subprocess.Popen[str]:
-    """Start a command, and wait until it can be interrupted. limit: called in its process."""
+    """Start a command, and wait until it can be interrupted.
+
+    limit: called in the child process before the command starts; None: nothing is called.
+    """
     process = subprocess.Popen(
         [sys.executable, "-c", READY, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
@@ -177,7 +180,7 @@ def measured(arguments: Sequence[str], folder: Path) -> Done:
 
 
 def complaints(done: Done, codes: Sequence[int]) -> list[str]:
-    """Sentences on faults in a command's end: exit code, traceback, no sentence, many lines."""
+    """Sentences about a wrong end of a command: exit code, traceback, no or too much text."""
     lines = done.err.strip().splitlines()
     out = []
     if done.code not in codes:

@@ -364,7 +364,10 @@ def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]
 def part_targets(
     name: str, lod: int, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """Shapes of a mesh: all channels for the head, 100 random ones for others; none from LOD 2."""
+    """Shapes of a mesh at LOD 0 or 1: all channels for the head, 100 random ones for others.
+
+    Coarser LODs and meshes of less than 300 vertices have no shapes.
+    """
     if lod > 1 or len(points) < 300:
         return []
     if name == "head":

@@ -10,8 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 4) return 0;
   const auto dna = promises::parse({data + 4, size - 4});
   if (!dna) return 0;
-  // Only a number in the file states how many correctives there are, but the rig has lists of all
-  // controls for each LOD and frame.
+  // The file states the number of correctives without a list of them, but the rig has lists of all
+  // controls for each LOD, and promises::evaluation() for each of at most kFrames frames.
   constexpr std::size_t kFrames = 64;
   const std::size_t lods = dna->descriptor.lod_count;
   bound.allow(16 * (lods + kFrames) * dna->behavior.psd_count);

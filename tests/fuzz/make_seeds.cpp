@@ -68,10 +68,12 @@ class Seeds {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
 
-  /// Adds a seed for the target with a deliberate fault: one run with it must find the fault.
+  /// Adds a seed for the fuzz target `greedy`, which has a deliberate fault. One run with this seed
+  /// must find the fault.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
 
-  /// Adds rows, and packed buffers of each mode, in the form that packed_fuzz reads.
+  /// Adds rows to be packed, and packed buffers of each meshopt mode, in the form that packed_fuzz
+  /// reads.
   void add_packed() {
     namespace author = risorius::author;
     using Mode = author::PackedMode;
@@ -130,7 +132,7 @@ class Seeds {
   void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file,
            std::size_t largest = kLargestSeed) {
     bytes.insert(bytes.end(), file.begin(), file.end());
-    // Blocks of rigs may be larger, because they are padded.
+    // Seeds with the block of a rig may be four times as large, because blocks are padded.
     if (bytes.size() > (target == "rig" ? 4 : 1) * (largest + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);

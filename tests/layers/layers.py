@@ -158,7 +158,7 @@ def uses(part: str, files: Mapping[str, str]) -> dict[str, list[Use]]:
 
 
 def violations(part: str, files: Mapping[str, str]) -> list[str]:
-    """A sentence for each file, import or folder of a part that contradicts the plan."""
+    """A sentence for each file, import or folder of a part that contradicts rooms.toml."""
     plan = ROOMS[part]
     used = uses(part, files)
     found = [
@@ -223,7 +223,7 @@ def _disordered(rooms: Mapping[str, list[str]]) -> list[str]:
 
 
 def _stale(used: Mapping[str, list[Use]], rooms: Mapping[str, list[str]]) -> list[str]:
-    """A sentence for each use that the plan allows but no file needs; the plan must be exact."""
+    """A sentence for each import that rooms.toml allows but that no file needs."""
     needed = {
         (room_of(path, rooms), room)
         for path, targets in used.items()

@@ -27,8 +27,8 @@ REGISTRATION = "registration.py"
 WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
 CACHES = {"cache", "lru_cache"}
-# These objects change when they are read, or are made to be changed; not even a constant may be
-# one.
+# Types and functions whose objects change when they are read, or are made to be changed. Not even a
+# name in UPPER_CASE may have such a value.
 ALWAYS_MUTABLE = {
     "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
     "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",
@@ -38,7 +38,8 @@ FIXED = {
     "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
     "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
 }  # fmt: skip
-# Classes whose objects a constant may be. A Lock is in the same state after each `with`.
+# Mutable classes whose objects are allowed as values of names in UPPER_CASE. A Lock is in the same
+# state after each `with`.
 VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
 CHANGES = {
     "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",

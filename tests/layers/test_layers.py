@@ -16,7 +16,7 @@ def files_of(part):
 
 
 def planted(part, path, text):
-    """Sentences of the check after a file or lines are added to a part, except on folder sizes."""
+    """Sentences of the check after text is added to a part, without those about folder sizes."""
     files = dict(files_of(part))
     files[path] = files.get(path, "") + "\n" + text + "\n"
     return [line for line in violations(part, files) if "are the most" not in line]

@@ -7,7 +7,8 @@
 A mutant is killed by the first test that fails or takes much longer than without the mutant.
 tests.toml lists the tests of each file, the fastest first. A mutant that does not build is replaced
 by another one. Results are stored in build/mutants, so that an interrupted run continues.
---survivors tests the surviving mutants again with the present tests.
+--survivors tests the surviving mutants again with the present tests. --programs runs only the
+GoogleTest programs.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ SOURCES = {
 SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
 WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
 MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
-# Without debug symbols and with low optimisation, because each mutant is compiled and linked.
+# Options of CMake. They omit debug symbols and lower optimisation, because each mutant is compiled
+# and linked.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -119,7 +121,7 @@ class Copy:
         self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Copy changed files and build. Equal files keep their times, so that Ninja skips them."""
+        """Copy changed files and build. Unchanged copies keep their times, so Ninja skips them."""
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
@@ -185,7 +187,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; otherwise it proves nothing."""
+        """Whether the failed test passes without the mutant; if not, its failure proves nothing."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)

@@ -116,8 +116,8 @@ TEST(EvaluateJoints, NanStaysInTheGroupsThatHaveItAsAColumn) {
 
 // ---- correctives
 
-// Control 2 is a corrective of controls 0 and 1. In: columns, values  the factor and the value of
-// each entry
+// Control 2 is a corrective of controls 0 and 1. In: columns, values  for each entry of the
+// corrective, the control that is its factor, and the factor's weight
 Rig corrective_rig(std::vector<std::uint16_t> columns, std::vector<float> values) {
   dna::Dna dna = make_face(2, 1, 1);
   dna.behavior.psds.rows = std::vector<std::uint16_t>(columns.size(), 2);

@@ -85,7 +85,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       outputs[r] = static_cast<std::uint16_t>(static_cast<std::size_t>(first) + r);
     }
     std::vector<float> values(inputs.size() * outputs.size());
-    // In each face a third of the columns has only zeros; it is a different third.
+    // A third of the columns has only zeros, in faces with successive seeds not the same third.
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = (i % inputs.size() + seed) % 3 == 0 ? 0.0f : value(random);
     }

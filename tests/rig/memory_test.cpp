@@ -27,9 +27,9 @@ Copy copy(std::span<const std::uint8_t> block) {
   return {owner, {owner.get(), block.size()}};
 }
 
-// Limits of heap memory, as a factor of the block and a constant. They are far below the limit for
-// forged blocks, because compile makes only rigs whose scratch memory is as long as lists in their
-// blocks.
+// Limit of heap memory: kTimesTheBlock times the block's size, plus kBeside bytes. The limit is far
+// below the limit for forged blocks, because compile makes only rigs whose scratch memory is as
+// long as lists in their blocks.
 constexpr std::size_t kTimesTheBlock = 4, kBeside = 16 * 1024;
 
 class RigMemory : public testing::TestWithParam<Bomb> {};

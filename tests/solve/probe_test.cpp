@@ -95,7 +95,8 @@ TEST(Probe, DerivativesCountCorrectives) {
   ASSERT_EQ(found.blocks[0].controls, (std::vector<std::uint32_t>{0, 1}));
   for (std::size_t c = 0; c < 2; ++c) {
     for (std::size_t p = 0; p < 2; ++p) {
-      // The expected derivative is the same difference quotient of positions computed by hand.
+      // The expected derivative is a difference quotient with the step of the tested code, of
+      // positions computed by hand.
       const auto there = expected(p, 0.5 + (c == 0 ? kStep : 0), 0.25 + (c == 1 ? kStep : 0));
       const auto here = expected(p, 0.5, 0.25);
       for (std::size_t k = 0; k < 3; ++k) {

@@ -139,8 +139,8 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   return "";
 }
 
-/// Checks encoding of any bytes as float32 curves. It must preserve all bits, and the result must
-/// not exceed the float32 values by more than one byte. Out: the broken promise, or "" if none
+/// Checks encoding of any bytes as float32 curves. Encoding must preserve all bits, and its result
+/// may be at most one byte longer than the float32 values. Out: the broken promise, or "" if none
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

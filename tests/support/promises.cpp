@@ -110,8 +110,9 @@ float largest_joint_value(const Dna& dna) {
   return most;
 }
 
-// Whether weights are at most 10 and there are at most four layers. Four layers that each multiply
-// by 10 and sum 100 terms stay far below the largest float.
+// Whether the weights, biases and activation parameters of the networks are at most 10, and all
+// networks together have at most four layers. Even with 100 terms in each sum, the results of four
+// such layers stay far below the largest float.
 bool has_moderate_networks(const Dna& dna) {
   float most = 0;
   std::size_t layers = 0;
@@ -323,7 +324,7 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
 
 // Compares the poses of scalar kernels `a` with the poses of `b`. SSE4 must give the same bits.
 // Other sets are compared only if the controls are equal, because a control that differs in its
-// last bits may select another row of a table.
+// last bits may select another row of a table. In: tame  false: only the bits of SSE4 are compared
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";
@@ -483,8 +484,8 @@ std::string compare_filtered(const Dna& full, const ParseOptions& o, const Resul
     return broken("a filtered load fails as the filter does", expected.error());
   }
   if (!filtered) return broken("a part of a file that is good is good", filtered.error());
-  // They are compared as JSON, because writing a file renumbers the controls if some are not
-  // loaded.
+  // The two faces are compared as JSON and not as files, because writing a file renumbers the
+  // controls if some are not loaded.
   const Result<std::string> a = dna::to_json(*expected), b = dna::to_json(*filtered);
   if (!a) return broken("what was filtered is whole", a.error());
   if (!b) return broken("what was loaded filtered is whole", b.error());

@@ -38,8 +38,8 @@ VERSIONS = {
     "native/python/risorius/base/version.py": r'^__version__ = "([^"]+)"',
     "addon/risorius/blender_manifest.toml": r'^version = "([^"]+)"',
 }
-# Largest size in bytes of a zip for one platform. It contains three wheels of 4 MB each, the sample
-# face of 8 MB, and small files.
+# Largest size in bytes of a zip for one platform. The zip contains three wheels of 4 MB each, the
+# sample face of 8 MB, and small files.
 LARGEST = 24 << 20
 
 
@@ -74,7 +74,7 @@ def troubles(version: str, project: Path = PROJECT) -> list[str]:
 
 
 def section(version: str, project: Path = PROJECT) -> str:
-    """The section of CHANGELOG.md on a version without its heading; "" if there is none.
+    """The section of CHANGELOG.md about a version, without the heading; "" if there is none.
 
     Args:
         version: version such as 1.2.3.

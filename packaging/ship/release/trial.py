@@ -58,7 +58,7 @@ def window():
 
 
 def show_tab():
-    """Open the sidebar with the Risorius tab. Call it inside the override of window()."""
+    """Open the sidebar with the Risorius tab. Needs the override of window()."""
     bpy.context.space_data.show_region_ui = True
     sidebar = next(r for r in bpy.context.area.regions if r.type == "UI")
     with suppress(AttributeError, TypeError):  # raised until the sidebar is first drawn

@@ -31,8 +31,9 @@ from risorius.web import page as pages
 ROOT = Path(__file__).resolve().parents[3]
 GOLDEN = ROOT / "tests" / "data" / "golden"
 POSES = 12
-# Largest deviation of a vertex of a turned head, as a fraction of the head's size. It is not 0,
-# because a page rounds weights to 1/1024, and shapes to 1/16384 of the head's size.
+# Largest allowed distance between a vertex on the page and the same vertex computed with NumPy,
+# while a clip turns the head; a fraction of the head's size. It is not 0, because a page rounds
+# weights to 1/1024, and shapes to 1/16384 of the head's size.
 TURNED = 2e-4
 MOST_BYTES = 4_000_000  # largest size of the sample person's page
 EVALUATE = """(rows => {

@@ -10,7 +10,7 @@ from risorius import Clip, ClipError, ClipReader, ClipWriter, Event
 
 
 def make_clip(frames=1300, times=True):
-    """Random bits with NaN, -0 and denormals; two curves are constant, one equals another."""
+    """A clip of random bits with NaN, -0 and denormals. Two curves are constant, two are equal."""
     rng = np.random.default_rng(1)
     bits = rng.integers(0, 2**32, (7, frames), np.uint64).astype(np.uint32)
     bits[3] = 0x7FC12345

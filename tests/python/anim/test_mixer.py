@@ -305,7 +305,8 @@ def test_firing_again_makes_no_step_and_never_goes_beyond_one():
         mixer.fire("two", when)
     curve = mixer.evaluate_batch(times)[:, 0]
     assert curve.max() <= 1.0
-    # The slope of x * x * (3 - 2 * x) is at most 1.5 / attack, and at most sixteen attacks overlap.
+    # A step in time raises x by step / attack (0.3 s); the slope of x * x * (3 - 2 * x) is at most
+    # 1.5, the weight 0.8, and at most sixteen attacks overlap.
     assert np.abs(np.diff(curve)).max() < 16 * 0.8 * 1.5 / 0.3 * (times[1] - times[0])
 
 

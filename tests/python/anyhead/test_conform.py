@@ -282,7 +282,7 @@ def test_lids_close_on_an_eye_that_is_wider_open(shape, left):
     wide[:, 1] += 0.05 * (points[:, 1] > 0) * np.cos(points[:, 0])
     other = conform(face, {SKIN: wide})
     assert np.abs(skin_points(other) - wide).max() < 1e-5
-    # With the rotation of the original face's upper lid, it would stop above the lower lid.
+    # If the upper lid rotated as in the original face, it would stop above the lower lid.
     was = copy.copy(other)
     was.joint_groups = face.joint_groups
     if shape:

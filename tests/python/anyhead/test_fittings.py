@@ -89,7 +89,10 @@ def test_no_mesh_is_refused():
 
 @pytest.fixture(scope="module")
 def larger(head, template):
-    """(Parts of a skin of 1.5 times the size, completed; the function that moves points.)"""
+    """(parts of a head that is 1.5 times as large, function that maps points to this head).
+
+    Only the skin is given; the other parts come from the template.
+    """
     move = lambda points: 1.5 * np.asarray(points) + [0, 10, 3]  # noqa: E731
     found = sort_parts([part("skin", move(head.points), head.faces)])
     return complete(found, template, move(template.meshes[0].positions)), move
@@ -127,7 +130,7 @@ def test_a_painted_eye_gets_no_eyeball(template):
 
 
 def test_eyes_that_are_shut_get_no_eyeballs(head, template):
-    """The head's eyes are shut at rest, by adding the displacement of a blink."""
+    """The neutral head has shut eyes, because the displacements of a blink are added to it."""
     shut = mask(short=0.0)
     points = shut.points + shut.ways["eyeBlinkL"] + shut.ways["eyeBlinkR"]
     fitted = complete(sort_parts([part("skin", points, shut.faces)]), template, points)

@@ -146,9 +146,9 @@ def test_a_wrong_table_is_one_sentence(tmp_path, table, sentence):
     assert sentence in done.stderr
 
 
-# A sheet of 40 x 40 mm is 1 mm above a ball of 40 mm, at two LODs, with lashes above it. Controls
-# a, b and d push the middle of the sheet down softly, by less than 1 mm each; control c pushes a
-# place far away.
+# A sheet of 40 x 40 mm with SIDE x SIDE vertices is 1 mm above a ball with a diameter of 40 mm, at
+# two LODs, with lashes above the sheet. Controls a, b and d push the middle of the sheet down
+# softly, by less than 1 mm each; control c pushes a place 14 mm from the middle.
 SIDE = 41
 BALL = np.array([0.0, -21.0, 0.0])
 RADIUS = 20.0
@@ -289,8 +289,8 @@ def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
 
 
 def test_what_has_a_corrective_is_as_somebody_wanted_it(face):
-    # The sculpt of a and b goes deeper into the ball. The search does not change it, and repairs
-    # the pairs of d.
+    # The face has a sculpt for the pair (a, b), which pushes the sheet deeper into the ball. The
+    # search does not change this pair, and repairs the pairs (a, d) and (b, d).
     sculpt = push(sheet(SIDE)[0], 0.5, 9.0) / 10
     found = find_correctives(add_correctives(face, 0, [((0, 1), sculpt)]))
     assert {one.controls for one in found.correctives} == {(0, 3), (1, 3)}
@@ -412,8 +412,8 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # 2 and 3 move no common vertices, so that triples with both are not tried; 0 and 2 do, and
-    # their pair has no fault.
+    # The controls 2 and 3 have no pair, because they move no common vertices; so triples with both
+    # are not tried. The controls 0 and 2 move common vertices, and their pair has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 

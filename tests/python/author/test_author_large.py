@@ -37,7 +37,7 @@ def face():
 
 @pytest.fixture
 def few(monkeypatch):
-    """Meshes of more than 200 vertices are large, and a block has about 100."""
+    """Lower the limits, so that 200 vertices make a mesh large and a block has about 100."""
     for module in (blocks, meshes, sparse, wanted_module):
         monkeypatch.setattr(module, "LARGE", 200)
     monkeypatch.setattr(blocks, "_BLOCK", 100)

@@ -95,7 +95,7 @@ def test_odd_names_are_one_sentence(names, words):
 
 @pytest.fixture(scope="module")
 def authored(tmp_path_factory):
-    """(folder, output of --names, output) of `author` for an egg with other shapes than ARKit's."""
+    """(folder, output of `author --names`, output of `author`) for an egg with foreign shapes."""
     folder = tmp_path_factory.mktemp("names") / "egg"
     path = face_shapes.write_all(folder, joints=8, more="rounds = 2\n[lods]\ncount = 1\n")
     positions, faces = face_shapes.head()

@@ -101,7 +101,7 @@ def test_a_packed_head_is_its_plain_twin(tmp_path):
 
 @pytest.mark.parametrize("bits", [12, 23])
 def test_floats_and_corners_in_a_row_are_unpacked(tmp_path, bits):
-    """A reader unpacks the exponential filter, the mode INDICES, and two accessors in one view."""
+    """Unpacked are the exponential filter, mode INDICES, and two accessors of a buffer view."""
     positions, moved = face_shapes.head()[0] / 100, face_shapes.expressions(face_shapes.head()[0])
     jaw = moved["jawOpen"] / 100
     glb = Glb()
@@ -272,7 +272,8 @@ def test_a_head_that_draco_packed(tmp_path):
 def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_path):
     """One odd value at a time is put at each place of the JSON.
 
-    Reading succeeds or raises an error that names the file, without warnings or gigabytes.
+    Reading succeeds or raises an error that names the file. It gives no warnings and does not use
+    gigabytes of memory.
     """
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261128)

@@ -62,7 +62,7 @@ class Raw:
 
 @pytest.fixture
 def raw_values(monkeypatch):
-    """Let fbx_files write a Raw as its bytes."""
+    """Let fbx_files write an object of the class Raw as the bytes in it."""
     plain = fbx_files.value
     monkeypatch.setattr(fbx_files, "value", lambda v: v.data if isinstance(v, Raw) else plain(v))
 

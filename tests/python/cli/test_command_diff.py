@@ -153,8 +153,8 @@ def every_change(dna):
 
 
 RIGS = {"full": full, "tiny": lambda: risorius.load(GOLDEN / "tiny_v28.dna")}
-# Largest number of changes of each field. The small golden file has the fields of `full` in more
-# structs, so that four changes are enough.
+# Rig -> largest number of tested changes of each field. Every change of `full` is tested. The small
+# golden file has the same fields, so four changes of each are enough.
 MOST = {"full": sys.maxsize, "tiny": 4}
 
 

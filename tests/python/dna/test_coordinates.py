@@ -142,7 +142,10 @@ def test_faces_turn_with_handedness_and_winding(name):
 
 
 def raw_controls(dna, rng):
-    """Random raw controls; quaternions are at rest, because their axes depend on the system."""
+    """Random raw controls. Those of quaternions give the identity, because a quaternion's axes
+
+    depend on the coordinate system.
+    """
     raw = rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
     for i, name in enumerate(dna.raw_control_names):
         part = name.rpartition(".")[2]

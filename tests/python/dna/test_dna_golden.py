@@ -71,7 +71,7 @@ def comparable(view, dna):
 
 
 def is_digest_of(digest, values):
-    """Whether a digest fits a list: its count, its first values, and its checksum in some type."""
+    """Whether a digest fits a list: count, first values, and the CRC of one of four data types."""
     found = np.asarray(values).ravel()
     sums = {zlib.crc32(found.astype(kind).tobytes()) for kind in ("<f4", "<u2", "<u4", "u1")}
     head = np.float32(digest["head"])

@@ -48,7 +48,7 @@ def toml_of(table):
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face whose head is 1.5 m high, with the controls of ARKit's and VRM's units."""
+    """The path of a face with a head joint, and with raw controls that ARKit's shapes use."""
     dna = risorius.load(GOLDEN / "medium.dna")
     names = [c for row in arkit.mapping().values() for c in row]
     dna.raw_control_names = list(dict.fromkeys(names))[: len(dna.raw_control_names)]

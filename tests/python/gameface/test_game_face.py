@@ -40,13 +40,13 @@ SAMPLE = PROJECT / "build" / "sample" / "man.dna"
 
 
 def controls():
-    """Names of the 69 raw controls that ARKit's units use."""
+    """Names of the 69 raw controls that ARKit's shapes use."""
     return list(dict.fromkeys(c for row in arkit.mapping().values() for c in row))
 
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """The path of a face with most of the controls of ARKit's units; some are missing."""
+    """The path of a face with most of the controls that ARKit's shapes use; some are missing."""
     dna = risorius.load(GOLDEN / "medium.dna")
     count = len(dna.raw_control_names)
     dna.raw_control_names = controls()[:count]

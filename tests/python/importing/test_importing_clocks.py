@@ -58,7 +58,7 @@ SPELLINGS = [
     ("timestamp (nanosec)", 33333333), ("time (min)", 1 / 1800), ("Time (millisec)", 33.333),
     ("time_millis", 33.333), ("timestamp_ms", 33.333), ("time in seconds", 1 / 30),
     ("elapsed (Sec.)", 1 / 30), ("time (h)", 1 / 108000),
-    # These columns have no unit, but steps that are too large for seconds.
+    # These names of columns contain no unit, but the time steps are too large for seconds.
     ("timestamp", 33), ("time", 33333.0), ("t", 33333333),
 ]  # fmt: skip
 

@@ -17,7 +17,10 @@ VRM_1 = ["aa", "ih", "ou", "ee", "oh", "blinkLeft", "blinkRight", "happy", "look
 
 
 def table(names, moving=None):
-    """CSV text: a frame at rest, then frames in which one name is 1: each in `moving`, or each."""
+    """CSV text with a column for each name. In the first frame all values are 0.
+
+    A further frame for each name in `moving` (None: all names) has the value 1 for it alone.
+    """
     rows = [["0"] * len(names)]
     for i, name in enumerate(names):
         if moving is None or name in moving:

@@ -117,7 +117,8 @@ def test_smoothing_keeps_a_peaks_height_and_time():
     assert kept.max() > 0.97
     soft = only(process.gaussian(clip(blink), 0.05))
     assert int(np.argmax(soft)) == 60
-    # The squared widths of successive Gaussians add up: the blink's 0.05 s and the filter's 0.05 s.
+    # The squared widths of successive Gaussians add up. Blink and filter are both 0.05 s wide, so
+    # the blink becomes sqrt(2) times as wide, and its height falls by this factor.
     assert soft.max() == pytest.approx(1 / np.sqrt(2), abs=0.01)
 
 

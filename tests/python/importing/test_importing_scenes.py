@@ -15,7 +15,7 @@ from risorius import importing
 
 DATA = PROJECT / "tests" / "data" / "importing"
 RIG = "CTRL_expressions."
-# The keys that make_blender_files.py sets: frame -> value, with linear interpolation.
+# The keyframes that make_blender_files.py sets: frame -> value, with linear interpolation.
 KEYS = {
     "jawOpen": {1: 0.0, 11: 1.0, 31: 0.25},
     "eyeBlinkLeft": {1: 1.0, 31: 0.0},

@@ -161,7 +161,7 @@ def test_every_layer_is_counted_anew():
         _native.keep_parts(dna, joints=[True, False, True], correctives=[True, True])
     with pytest.raises(risorius.DnaError, match="one value for each"):
         _native.keep_parts(dna, joints=[True, True], correctives=[True, True])
-    # Networks and setups move two of the three joints, so that these joints must stay.
+    # Networks, twist setups and swing setups move two of the three joints, which must stay.
     with pytest.raises(ArgumentError, match="must stay were expected"):
         lighten(dna, joints=1)
 

@@ -76,7 +76,7 @@ def test_frames_of_live_link_face_arrive_with_their_times():
 
 
 def test_every_curve_of_a_packet_has_its_name():
-    # Checks the order of values in a packet; the first 52 are ARKit units.
+    # Checks the order of values in a packet; the first 52 are ARKit's blend shapes.
     units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
@@ -433,7 +433,11 @@ def test_subjects_that_stream_keep_their_places():
 
 
 def flood(receiver, seconds, at, steps=lambda n: ()):
-    """Send 6 packets per second for each of 32 invented subjects, and packets of steps(n)."""
+    """Give a receiver 6 packets per second for each of 32 invented subjects.
+
+    After round n of these packets come the packets (step, sender) of steps(n). at(k) is the
+    address of subject k.
+    """
     for n in range(round(6 * seconds)):
         for k in range(32):
             address = at(k)
@@ -701,7 +705,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
     assert got["CTRL_expressions.eyeLookLeftL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookDownL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookRightL"] == got["CTRL_expressions.eyeLookUpL"] == 0.0
-    # If a frame contains look units, angles of the eyes are ignored.
+    # If a frame contains values of ARKit's eyeLook shapes, angles of the eye bones are ignored.
     got = shaper.apply(frame_of(eyeL__yaw=turn, eyeLookOutLeft=0.1))
     assert dict(zip(got.names, got.values, strict=True)) == {
         "CTRL_expressions.eyeLookLeftL": np.float32(0.1)

@@ -35,9 +35,9 @@ class TestKeyEdits:
         assert list(np.flatnonzero(mask)) == [4]
 
     def test_a_key_that_moved_along_with_its_basis_is_not(self) -> None:
-        """A key that only follows an edit of its basis counts as unedited, despite rounding.
+        """A shape key that only follows an edit of its basis counts as unedited, despite rounding.
 
-        Blender adds the basis's offset to each key in float32, in any order of sums.
+        Blender adds the basis's offset to each shape key in float32, in any order of sums.
         """
         imported = _basis(20000)
         deltas = RANDOM.normal(0, 0.02, imported.shape).astype(np.float32)

@@ -573,7 +573,7 @@ def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
 
 
 def _along(keys: Any, frames: Any) -> Any:
-    """Values of a Bezier curve at frames; its handles are at a third of the keys' distance."""
+    """Values of a Bezier curve at frames; its handles are at a third of the keyframes' distance."""
     place = np.clip(np.searchsorted(keys.co[:, 0], frames, "right") - 1, 0, len(keys.co) - 2)
     first, after = keys.co[place], keys.co[place + 1]
     t = (frames - first[:, 0]) / (after[:, 0] - first[:, 0])

@@ -17,7 +17,7 @@ GIRL = (0.056, (-0.1, -0.09, -0.2), (0.1, 0.14, 0.13))  # a child whose mesh end
 
 
 def edges(plan):
-    """Lower and upper edge of the picture, as heights above the eyes at the eyes' distance."""
+    """Heights of the picture's lower and upper edge above the eyes, in m, in the eyes' plane."""
     x, y, z = plan.camera
     away, whole = math.hypot(x, y), math.dist(plan.camera[:2], plan.target[:2])
     middle = z + (plan.target[2] - z) * away / whole

@@ -200,9 +200,10 @@ def _moves(dna, joints):
 
 
 def _rows():
-    """Controls of each ARKit unit by arkit.toml: unit -> {control: value}.
+    """Controls of each ARKit shape by arkit.toml: name of the shape -> {control: value}.
 
-    If a control is a share of another control, the other control is added with the value 1.
+    If the value of a control is a fraction of another control, as mouthLipsTogether is of jawOpen,
+    the other control is added with the value 1.
     """
     whole = shares()
     return {
@@ -212,10 +213,10 @@ def _rows():
 
 
 def _wanted(data, body, unit, row):
-    """The displacement that an ARKit unit should give, float64[V, 3], in the data's unit.
+    """The displacement that an ARKit shape (`unit`) should give, float64[V, 3], in decimetres.
 
-    A unit that is a share of the open jaw is taken together with the open jaw. For eyes and lids,
-    which have other tests, it is the displacement of the person's own controls.
+    mouthClose, which depends on the open jaw, is added to jawOpen. Eyes and lids have other tests;
+    for them the displacement of the person's own controls is returned.
     """
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
@@ -235,7 +236,7 @@ def _wanted(data, body, unit, row):
 
 @pytest.mark.parametrize("lod", [0, 1])
 def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
-    """Each vertex deviates by at most 0.1 % of the head's height from the unit in the data."""
+    """Each vertex deviates by at most 0.1 % of the head's height from ARKit's shape in the data."""
     data, dna, parts, positions, _, body = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
@@ -322,7 +323,7 @@ def test_extra_lips_of_a_capture_stay_shut_under_an_open_jaw(sample):
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
 def test_extra_the_packed_face_gives_back_its_units(sample, packed):
-    """The extension's man reproduces ARKit units within 0.8 mm.
+    """The extension's man reproduces ARKit's shapes within 0.8 mm.
 
     This includes lips that stay closed while the jaw opens, where five controls and five
     correctives rotate the same joints.
@@ -577,7 +578,7 @@ def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
 
 
 def test_a_displacement_is_carried_by_the_change_of_form():
-    """On a stretched and sheared sheet, a carried motion along an edge remains along this edge."""
+    """A motion along an edge, transferred to a stretched and sheared sheet, is along this edge."""
     side = 12
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)

@@ -130,7 +130,7 @@ def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
 
 @pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
 def test_hairs_of_a_card_fade_out_to_its_sides(who):
-    """Otherwise a card with even hairs, or hairs cut off at its sides, looks like a rectangle."""
+    """A card must have fewer hairs towards its sides, or else it looks like a rectangle."""
     cover = paint_strands(people.PEOPLE[who])[..., 3]
     curly = who in ("fighter", "woman")
     for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
@@ -166,7 +166,10 @@ def test_an_eased_guide_goes_to_and_fro_no_more_and_keeps_its_ends():
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
-    """Hair of 5 mm rotates with the skin; hair of 20 mm moves like hair of 8 mm."""
+    """Hair of 5 mm length rotates with the skin; 20 mm long hair moves only as far as 8 mm long.
+
+    Lengths in the code are in centimetres.
+    """
     grid = np.array([[x, 0.0, z] for x in range(5) for z in range(5)], float)
     faces = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5] for i, j in np.ndindex(4, 4)]
     head = polygon_mesh(grid, np.tile([0.0, 1.0, 0.0], (25, 1)), faces, grid[:, [0, 2]] / 4, faces)
@@ -240,8 +243,8 @@ def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, 
     kept = cut_clear(_lying(stage, [-0.055, 0.14], 1), stage, head, 1.0, faces)
     assert len(kept) == 1  # a hair with its root at the slope has no room
     np.testing.assert_array_equal(kept.points[0, 0], toward.points[0, 0])
-    # The hair is shortened twice to three quarters; after the first time it would end in the slope,
-    # at x = 0.17.
+    # The hair is shortened twice, each time to three quarters of its length; after the first time
+    # it would end in the slope, at x = 0.17.
     np.testing.assert_allclose(
         kept.points[0, -1] - kept.points[0, 0], 0.75**2 * np.array([0.3, 0.03, 0]), atol=1e-12
     )

@@ -58,8 +58,8 @@ def test_the_face_gets_the_texture_and_nothing_lies_on_another(islands):
         own = [f for f in islands.faces if label[f[0]] == number]
         count += raster.Raster(Polygons(own, own, out, len(out)), out, 256).covered
     assert count.max() == 1
-    # The face is rotated upright: the point with the largest u is the lowest. Its centre gets more
-    # texels than its rim.
+    # The face's UV island is rotated upright: the point with the largest u in the mesh is the
+    # lowest point in the texture. The island's centre gets more texels than its rim.
     rows = face.reshape(9, 9, 2)
     assert (np.diff(rows[..., 1], axis=1) < 0).all()
     widths = np.diff(rows[:, 0, 0])

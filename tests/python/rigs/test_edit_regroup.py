@@ -35,7 +35,7 @@ def control_count(dna):
 
 
 def turned(dna):
-    """Indices of joints whose rotation layer jbmd declares to be a quaternion."""
+    """Indices of joints whose rotation is a quaternion, as the layer jbmd declares."""
     flags = np.asarray(dna.joint_behavior_metadata.joint_representations).reshape(-1, 3)[:, 1]
     return {int(j) for j in np.flatnonzero(flags == 1) if j < len(dna.joint_names)}
 

@@ -33,7 +33,7 @@ FILTERED = [
     (name, tag, lods_of(about)) for name, tag, about in EVALUATIONS if lods_of(about) is not None
 ]
 # Interpolation multiplies the float32 error by the condition number of its matrix, so that solvers
-# above WELL_CONDITIONED are not compared. An arc near 0 has an error of sqrt(8 eps) = 1e-3.
+# above WELL_CONDITIONED are not compared. ARC is the error of an arc cosine near 0: sqrt(8 eps).
 WELL_CONDITIONED = 1e3
 ARC = 1e-3
 

@@ -56,7 +56,10 @@ def random_psds(rng, raw, count):
 
 
 def random_face(seed, width):
-    """A face with joint groups that have `width` or LANES + 1 rows and columns."""
+    """A face with joint groups around the SIMD width.
+
+    Their sizes (rows, columns) are combinations of `width` and LANES + 1, and (70, 3).
+    """
     rng = np.random.default_rng(seed)
     raw, psds, joints, lods = 12, 9, 60, 3
     dna = risorius.Dna()

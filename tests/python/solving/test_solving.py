@@ -125,7 +125,10 @@ PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
 
 @pytest.mark.parametrize("method", ["least_squares", "transpose"])
 def test_partners_change_alike_and_as_little_as_they_can(face, method):
-    """Both partners change by one number, which the pseudo-inverse of their joint column gives."""
+    """Both partners change by the same number.
+
+    The pseudo-inverse of the Jacobian with one column for both partners gives this number.
+    """
     surface = face[1]
     vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
     here = surface.positions(begin, 0, vertices).astype(float)
@@ -166,7 +169,10 @@ def test_partners_keep_the_limits_of_both(face):
 
 @pytest.mark.parametrize("eases", [(1, 0.01), (0.01, 1)])
 def test_partners_change_as_readily_as_the_readier_one(face, eases):
-    """Both partners use the larger of their two `ease` values, because the pair moves as one."""
+    """Both partners use the larger of their two `ease` values (how readily a control changes).
+
+    The reason is that the pair moves as one.
+    """
     surface, vertex = face[1], 14 * 5 + 6
     axis = np.array([0, 0.6, 0.8])
     target = surface.positions(raw(), 0, [vertex]) + 0.1 * axis
@@ -346,7 +352,7 @@ def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
     assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
     # A small step equals a least squares solution that weights the square of each control's change
-    # by 1 / ease².
+    # by 1 / ease², so a control with a large `ease` changes most.
     small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
     free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
     step = risorius.solve_drag(surface, raw(), points, [small], **free).raw

@@ -180,7 +180,7 @@ def papagayo_pgo() -> str:
 
 
 def papagayo_pgo_json() -> str:
-    """WORDS in version 2, the JSON of Papagayo-NG."""
+    """WORDS in Papagayo's version 2, the JSON of Papagayo-NG."""
     words = [
         {
             "id": i, "text": text, "start_frame": first, "end_frame": last, "tags": [],

@@ -311,7 +311,7 @@ def with_defaults(view, dna):
 
 
 def stride(keys, values):
-    """Values per joint in layer `ext` of ML: 10 if rotations are quaternions, otherwise 9."""
+    """Values per joint in machineLearnedBehaviorExt: 10 if rotations are quaternions, else 9."""
     quaternions = any(k == 1 and v == 1 for k, v in zip(keys, values, strict=True))
     return 10 if quaternions else 9
 

@@ -26,7 +26,7 @@ def bump(positions, x, y, size):
 
 
 def expressions(positions):
-    """ARKit unit -> displacement in cm, float64[V, 3]."""
+    """Name of an ARKit shape -> displacement in cm, float64[V, 3]."""
     out = {}
     for side, sign in (("Left", 1), ("Right", -1)):
         pull = bump(positions, sign * 3, -5, 4)[:, None]

@@ -13,7 +13,7 @@ from risorius.gameface.targets import find_targets
 
 
 def units_of(take):
-    """ARKit unit -> value in each frame of a Live Link Face recording."""
+    """For each frame of a Live Link Face recording: name of an ARKit shape -> value."""
     clip = importing.read(take).clip
     lower = {name.lower(): row for name, row in zip(clip.names, clip.curves, strict=True)}
     rows = {unit: lower[unit.lower()] for unit in arkit.mapping()}

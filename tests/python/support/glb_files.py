@@ -14,7 +14,7 @@ MESHOPT = "EXT_meshopt_compression"
 
 
 class Glb:
-    """A GLB to which views and accessors are added one after the other."""
+    """A GLB to which buffer views and accessors are added one after the other."""
 
     def __init__(self):
         self.binary = b""
@@ -24,7 +24,7 @@ class Glb:
         }  # fmt: skip
 
     def packed(self, data, stride, mode="ATTRIBUTES", filter_name="NONE", seen=True):
-        """Add a view compressed by meshoptimizer, like gltfpack; its fallback buffer has no data.
+        """Add a buffer view that meshoptimizer compresses; its fallback buffer has no data.
 
         `filter_name` names the filter that was already applied to the data. seen: state a
         byteStride.

@@ -122,8 +122,8 @@ def _behavior(dna, positions, skin, moved, raw):
     rng = np.random.default_rng(1)
     nearest = [int(np.linalg.norm(positions - place, axis=1).argmin()) for place in skin]
     shifts = [moved[name][nearest] for name in names]
-    # Each corrective moves the joints by a smaller fraction of a control's shift; the last one
-    # moves them by the whole shift of the first control.
+    # A corrective moves the joints by a fraction of a control's shift, 0.2 for the first one and
+    # less for each further one. The last one moves them by the whole shift of the first control.
     shifts += [0.2 / (i + 1) * shifts[i % len(names)] for i in range(len(on) - 1)] + [shifts[0]]
     values = np.concatenate(shifts, axis=1).reshape(len(skin), len(shifts), 3).transpose(0, 2, 1)
     columns = [*range(len(names)), *range(raw, raw + len(on))]

@@ -356,7 +356,10 @@ def twist_swing_rotations(dna, c):
 
 
 def ml_values(dna, c, lod):
-    """Joint -> ML (translation, quaternion, scale, Euler angles or None) in the DNA's axes."""
+    """Joint -> (translation, quaternion, scale, Euler angles or None) that networks give it.
+
+    The values are in the DNA's axes.
+    """
     joints, stride = dna.machine_learned_behavior_ext.joints, ml_stride(dna)
     settings = dict(
         zip(joints.parameter_keys.tolist(), joints.parameter_values.tolist(), strict=True)

@@ -28,8 +28,8 @@ def mask(short=0.3, apart=0.2, *, painted=False):
     """Make the skin and its expressions.
 
     Args:
-        short: a blink moves the upper lid by (1.9 - short) times half the height of the eye
-            opening.
+        short: how much a blink falls short of closing the lids: it moves the upper lid by
+            (1.9 - short) times half the height of the eye opening, whereas 2 would close it.
         apart: distance in cm between lips that should meet.
         painted: True: the skin has no eye openings.
     """
