@@ -29,7 +29,7 @@ _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 
 
 @dataclass
 class LevelMeshes:
-    """Triangles of each coarser LOD, as indices of layouts of the finest meshes.
+    """Triangles of each coarser LOD; a corner is the index of a vertex layout of the LOD 0 mesh.
 
     Attributes:
         count: number of LODs, including LODs of the source.
@@ -62,8 +62,8 @@ def level_meshes(
         wanted: mesh of the source -> its displacements.
         options: the budgets.
         levels: largest number of LODs.
-        attributes: mesh of the source -> attributes for the simplification; missing ones are added.
-            None: they are forgotten.
+        attributes: mesh of the source -> vertex attributes for the simplification. Attributes of
+            other meshes are computed and added. None: an empty dictionary.
         go_on: called before each mesh; raises an error to stop.
     """
     known = {} if attributes is None else attributes
@@ -85,7 +85,7 @@ def level_meshes(
             if not budget:
                 continue
             go_on()
-            # A large mesh is simplified from level to level, because that takes less time.
+            # A large mesh is made from the next finer LOD, because that is faster than from LOD 0.
             finer = None if wanted[m].small else out.triangles.get((lod - 1, m))
             features = known_attributes(known, m, wanted[m])
             triangles = patiently(partial(fewer_triangles, mesh, features, budget, finer), go_on)

@@ -111,12 +111,12 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def inherited(work: Work, rows: SparseWeights, lod: int) -> SparseWeights:
-    """Weights of a level, with the weights of joints that the level lacks on their heirs.
+    """Weights at a LOD: weights on joints that the LOD lacks move to the joints that replace them.
 
     Args:
         work: the face.
-        rows: weights of the finest level.
-        lod: the level.
+        rows: weights at LOD 0.
+        lod: index of the LOD.
     """
     before = len(work.source.joint_names)
     there = {*range(before), *(before + work.new[lod]).tolist()}

@@ -38,7 +38,7 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    # Vertices of each LOD; empty: 0.6 times the LOD before, and at most 60,000.
+    # Vertices of each LOD; empty: 0.6 times the number of the finer LOD, at most 60,000.
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:

@@ -114,7 +114,8 @@ class Made:
                 self._add(lod, coarse, name, wanted[m], None)
 
     def _triangles(self, lod: int, m: int, name: str) -> Ints:
-        """int64[n, 3]: triangles of a coarse mesh as layout indices of the fine; n = 0: none."""
+        """int64[n, 3]: triangles of a coarse mesh, as indices of the fine mesh's vertex layouts;
+        n is 0 if there are none."""
         none = np.zeros((0, 3), np.int64)
         if self.like is not None:
             return self.like.triangles.get(level_name(name, lod), none)

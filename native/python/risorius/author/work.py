@@ -134,7 +134,8 @@ def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
         go_on: called before each mesh and each block of a large mesh; raises an error to stop.
 
     Raises:
-        ArgumentError: the face has no meshes or joints, nothing moves, or it cannot be used.
+        ArgumentError: the face has no meshes or joints, no control moves it, a control scales a
+            joint, or require_sizes() rejects the meshes.
         BudgetError: the tables would be too large for the size of the face.
     """
     if not dna.meshes or not dna.joint_names:

@@ -14,8 +14,8 @@ import numpy.typing as npt
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
 # Smaller values of the other control (such as jawOpen) count as LEAST in the division; otherwise
-# noise of a face at rest would make the fraction jump between 0 and 1. The error is at most a
-# quarter of LEAST, 0.2 mm between the lips.
+# noise of a face at rest would make the fraction jump between 0 and 1. The error of the control's
+# value is at most LEAST / 4, which is 0.2 mm between the lips.
 LEAST = 0.02
 
 

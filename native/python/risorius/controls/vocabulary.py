@@ -223,7 +223,8 @@ def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if "*" not in name:
         yield name, value
         return
-    # eyeClosed* becomes eyeClosedLeft, Eye_Blink_* becomes Eye_Blink_L, lipFunneler*B lipFunnelerLB
+    # EyeClosed* becomes EyeClosedLeft, Eye_Blink_* becomes Eye_Blink_L, and lipFunneler*B becomes
+    # lipFunnelerLB.
     is_word = name[0].isupper() and "_" not in name and name.endswith("*")
     for side in "LR":
         yield name.replace("*", _WORDS[side] if is_word else side), _on_side(value, side)

@@ -400,7 +400,7 @@ def _products(
     """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
     For each joint with children that no pose moves, a shift of the joint and its descendants by
-    CARRIED_MM is added as a pose, because otherwise all resting joints would seem to be
+    CARRIED_MM is added as a pose, because otherwise all joints that no pose moves would seem to be
     interchangeable.
     """
     count = len(dna.joint_names)

@@ -24,7 +24,8 @@ MOST_GAIN = 1.6
 """Largest gain; a control that would need more did not reach its extreme in the take."""
 SHORTEST = 2.0
 """Seconds: shorter takes are refused."""
-# largest gain of lids, higher because everybody can shut the eyes: a low peak is a weak capture
+# largest gain of lids; above MOST_GAIN, because everybody can shut the eyes, so that a low peak is
+# a weak capture
 _LID_GAIN = 2.0
 _LEAST_RANGE = 0.15  # ranges below it count as hardly moving
 _LEAST_OVER_NOISE = 8.0  # smallest range in standard deviations of the noise

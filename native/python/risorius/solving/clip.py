@@ -96,10 +96,10 @@ class _Frame:
         self.matrix = np.zeros((0, 0))
 
     def linearise(self, raw: Doubles, within: float) -> bool:
-        """Computes derivatives at a pose, unless they exist for a pose within a distance.
+        """Computes derivatives at the pose `raw`, unless they exist for a pose near it.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest distance of a
-            control."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest difference of
+            a control's value between two poses that count as near."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
