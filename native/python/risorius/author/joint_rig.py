@@ -335,9 +335,10 @@ def _combine(
 
 
 def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
-    """The face with joint groups by region, or by drivers if these are much smaller.
+    """The face with joint groups by region, or with joint groups by the controls that drive the
+    joints if these groups have far fewer coefficients.
 
-    Groups by drivers are smaller if many correctives each move a few joints of a region.
+    They have fewer if many correctives each move a few joints of a region.
 
     Args:
         dna: a face; it is not changed.

@@ -21,7 +21,7 @@ from .work import Work, listed_meshes
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
 _LOOKED_AT = 2000  # number of checked vertices of the fine skin
 # Limits of a LOD: root mean square and largest distance of its skin from the finest skin, as
-# fractions of the skin's size.
+# fractions of the longest side of the skin's bounding box.
 _RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
 _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees

@@ -607,7 +607,7 @@ def _is_letter(curve: str) -> bool:
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """Names of the mappings that know any of `names`; empty unless all are single letters."""
+    """Names of the mappings that know any of `names`; empty unless all names are letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []
