@@ -110,7 +110,12 @@ class _Merging:
         self.costs[joint] = np.where(self.there, error, np.inf)
 
     def cheapest(self, pairs: Ints) -> list[int]:
-        """The joint with the smallest cost, together with its mirrored joint."""
+        """The joint and its mirrored joint with the smallest sum of their costs; one index if the
+        joint has no mirrored joint.
+
+        Args:
+            pairs: int64[J], the mirrored joint; a joint without one names itself.
+        """
         own = self.costs.min(axis=1)
         score = np.where(pairs == np.arange(len(pairs)), own, own + own[pairs])
         first = int(np.where(self.there & self.can_leave, score, np.inf).argmin())
@@ -190,7 +195,7 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each LOD. A LOD that is made has at most LARGE vertices.
+    """The number of vertices of each LOD; at most LARGE for a new LOD without a given budget.
 
     Args:
         options: budgets, if given.

@@ -119,8 +119,8 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives, inactive ones of which only one control is 0, and ones that nothing
-    reads.
+    """Active correctives, inactive ones of which exactly one control is not above 0, and ones that
+    nothing reads or that depend on themselves.
 
     Args:
         dna: the face.

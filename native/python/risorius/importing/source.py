@@ -189,7 +189,7 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
 
 def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
-    """Indices of the frames whose time is later than all earlier ones; drops are noted.
+    """Indices of the frames whose time is later than all earlier times.
 
     Args:
         times: float64[frames], seconds.

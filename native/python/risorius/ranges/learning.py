@@ -125,7 +125,7 @@ def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
 
 
 def _without_spikes(curve: Doubles, rate: float) -> Doubles:
-    """The median over _SPIKE seconds around each frame, at least 3 frames."""
+    """The median over _SPIKE seconds around each frame, at least 3 and at most 9 frames."""
     half = min(max(1, round(0.5 * _SPIKE * rate)), _WIDEST)
     padded = np.pad(curve, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)

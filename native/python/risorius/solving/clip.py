@@ -309,9 +309,9 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
 def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
     """float64[F - 2, used]: price of a sudden change of each control, at each frame.
 
-    The price is 1 / d^2, where d is the typical second difference of the control's curve without
-    noise. Near a frame whose own second difference is clearly above the noise, d is that local
-    value. A blink therefore stays sharp while a slow jaw is smoothed.
+    The price is job.smooth / d^2, where d is the typical second difference of the control's curve
+    without noise. Near a frame whose own second difference is clearly above the noise, d is that
+    local value. A blink therefore stays sharp while a slow jaw is smoothed.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))
