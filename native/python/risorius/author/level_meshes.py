@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the triangles of coarser levels of detail, and stops before the skin looks broken."""
+"""Makes the triangles of coarser LODs, and stops at the first LOD whose skin would look broken."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def inherited(work: Work, rows: SparseWeights, lod: int) -> SparseWeights:
 
 
 def _heir(work: Work, joint: int, there: set[int]) -> int:
-    """The joint of a level that takes a joint's vertices; itself if the level has it."""
+    """The joint of a LOD that takes a joint's vertices; the joint itself if the LOD has it."""
     while joint not in there and joint in work.heirs:
         joint = work.heirs[joint]
     return joint

@@ -63,7 +63,7 @@ def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
 
     Args:
         options: budgets, if given.
-        levels: number of levels.
+        levels: number of LODs.
         joints: number of new joints of LOD 0.
     """
     if options.joints:
@@ -199,7 +199,7 @@ def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) ->
 
     Args:
         options: budgets, if given.
-        levels: number of levels.
+        levels: number of LODs.
         existing: numbers of vertices of the source's LODs.
     """
     out = list(existing)

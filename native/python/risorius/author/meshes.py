@@ -163,7 +163,7 @@ class Made:
         return level_weights(self.ways, self.options.fit, lod, mesh, wanted, start)
 
     def _add_finest(self, lod: int, m: int, name: str, wanted: Wanted) -> None:
-        """Add a mesh of the finest level. Coarser levels start with its weights."""
+        """Add a mesh of LOD 0. The fits of coarser LODs start with its weights."""
         self._listed(lod, name)
         mesh, start = wanted.mesh, self.weights[m]
         small = self.fewer.meshes.get(m) if self.fewer is not None else None
@@ -178,7 +178,7 @@ class Made:
         self._finished(lod, mesh, name, wanted, self.weights[m])
 
     def _add_large(self, lod: int, m: int, name: str, wanted: Wanted, start: Doubles) -> None:
-        """Add a large mesh of the finest level with the weights of its simplified mesh."""
+        """Add a large mesh of LOD 0 with the weights that were fitted to its simplified mesh."""
         assert self.fewer is not None
         small = self.fewer.meshes[m]
         own = self.fewer.wanted[m].at(np.arange(len(small.kept)))
@@ -194,7 +194,7 @@ class Made:
     def _add_coarse(
         self, lod: int, mesh: Mesh, name: str, wanted: Wanted, m: int, kept: Ints
     ) -> None:
-        """Add a simplified mesh of the finest level.
+        """Add the mesh of a coarser LOD that was simplified from a mesh of LOD 0.
 
         Args:
             lod: index of the LOD.

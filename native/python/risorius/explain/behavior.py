@@ -90,8 +90,7 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads are at rest at this
-    LOD.
+    """Controls that something reads at a LOD; correctives that nothing reads stay 0 at this LOD.
 
     Args:
         dna: the face.
@@ -248,7 +247,7 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twist and swing setups that are not at rest: their angles in degrees, and their joints.
+    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints.
 
     Args:
         dna: the face.

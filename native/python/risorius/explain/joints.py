@@ -242,7 +242,7 @@ def _moved(
 def explain_joints(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """Each joint that is not at rest; the joint that moves most is first.
+    """Each joint that differs from its neutral pose; the joint that moves most is first.
 
     Movement is the length of a vector of nine elements: translations, angles in radians times the
     bone length, and changes of scale times the bone length. The bone length is bone_length(), the

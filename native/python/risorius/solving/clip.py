@@ -146,9 +146,9 @@ def solve_clip(
             is the first mesh of the LOD. In the file's unit and axes, without motion of the head.
         rate: frames per second.
         start: time of the first frame in seconds.
-        neutral: float[V, 3], the moving mesh at rest, as a mapping like frames: its displacements
-            are then used instead of its shape, for another face with the same topology. None: the
-            face's own neutral.
+        neutral: float[V, 3], the moving mesh with a neutral face, as a mapping like frames: its
+            displacements are then used instead of its shape, for another face with the same
+            topology. None: the face's own neutral.
         sparse: factor of the price of a control's value; 0 means no price, 1 is the default.
         smooth: factor of the price of a sudden change; 0 means no price, 1 is the default.
         limits: the controls that may change, and their ranges; None: all except rotation
