@@ -157,7 +157,8 @@ class Made:
         self.names.append(name)
 
     def _fitted(self, lod: int, mesh: Mesh, name: str, wanted: Doubles, start: Doubles) -> Doubles:
-        """float64[V, joints]: the weights of the reference, or weights fitted from a start."""
+        """float64[V, joints]: the weights of the reference; without a reference, weights whose fit
+        starts with `start`."""
         if self.like is not None:
             return self.like.weights[name]
         return level_weights(self.ways, self.options.fit, lod, mesh, wanted, start)

@@ -221,8 +221,9 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """Of the joints that no expression moves, the one with the largest sum over the vertices of
-    its weight times the vertex' motion.
+    """The joint that carries most of the face's motion, of the joints that no expression moves.
+
+    It has the largest sum of skin weight times largest displacement over all vertices.
     """
     dna = work.source
     share = np.zeros(len(dna.joint_names))
@@ -236,7 +237,8 @@ def _head(work: Work) -> int:
 
 
 def needs_joints(work: Work, wanted: Wanted) -> bool:
-    """Whether blend shapes contribute to a mesh's motion; existing joints alone move an eyeball.
+    """Whether blend shapes contribute to a mesh's motion; False for an eyeball, which existing
+    joints alone move.
 
     Args:
         work: the face.

@@ -175,7 +175,8 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
-    """The networks' rotation convention or None, and the matrix to the face's axes."""
+    """The networks' rotation convention or None, and the matrix from the networks' axes to the
+    face's axes."""
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws bar charts of the LODs: joints by region, and numbers of evaluated parts."""
+"""Draws bar charts of the LODs: joints by region; coefficients, blend shapes, animated maps."""
 
 from __future__ import annotations
 
