@@ -141,7 +141,8 @@ def lighten(rig: JointRig, source: Dna) -> None:
 
 
 def _take_errors(rig: JointRig, found: Lightened) -> None:
-    """Raise the stored largest errors of a rig to the lengths of its removed deltas."""
+    """Raise stored largest errors of a rig to the lengths of its removed deltas if these are
+    longer."""
     dna, channels = rig.dna, channels_of(rig.dna)
     for errors in rig.errors:
         for row, column in enumerate(rig.columns):
@@ -543,7 +544,7 @@ def _add_behavior(
     """Add a joint group of the new joints, and divide it into dense groups by region."""
     dna = work.dna
     before = len(work.source.joint_names)
-    # Transform the motions relative to the parents into the parents' neutral frames.
+    # Express the motions, which are relative to the parents, in the parents' neutral frames.
     frames = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     whole = np.zeros((*motions.shape[:2], 4, 4))
     whole[..., :3, :], whole[..., 3, 3] = motions, 1

@@ -24,7 +24,7 @@ from .geometry.skeleton import Doubles, Ints
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
-# Parts of the names of small meshes (clear films, lashes, mouth), which coarse LODs leave out.
+# Substrings of the names of small meshes that coarse LODs leave out: clear films, lashes, tongue.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
@@ -38,7 +38,7 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    # Vertices of each LOD; empty: 0.6 times the number of the finer LOD, at most 60,000.
+    # Vertices of each LOD; empty: 0.6 times the vertices of the finer LOD, at most 60,000.
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:

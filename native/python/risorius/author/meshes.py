@@ -342,7 +342,7 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
 
 
 def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
-    """Add the errors of a block of vertices to the errors of a mesh."""
+    """Merge the errors of a block of vertices into the errors of the mesh."""
     worse = part.joints_largest > whole.joints_largest
     whole.worst_vertex[worse] = vertices[part.worst_vertex[worse]]
     share = part.vertices / whole.vertices

@@ -50,15 +50,15 @@ class RigOptions:
     # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
-    # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
+    # Substrings of the names of meshes that keep weights and blend shapes, such as eyeballs, which
     # turn with their own joint.
     kept: tuple[str, ...] = ()
     # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
     # total time.
     between: bool = True
     # Joints are fitted to meshes of about this number of vertices together: larger meshes are
-    # simplified for the fit. Then weights are carried to all vertices, and blend shapes are made
-    # for the errors there.
+    # simplified for the fit. Then weights are transferred to all vertices, and blend shapes are
+    # made for the errors there.
     fit_vertices: int = LARGE
 
 
@@ -252,8 +252,8 @@ def needs_joints(work: Work, wanted: Wanted) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish these joints. But vertices must keep following the same one,
-    because an animator may rotate the neck.
+    The fit cannot distinguish these joints. But a vertex must keep following the same
+    joint, because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])

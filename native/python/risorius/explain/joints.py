@@ -247,9 +247,9 @@ def explain_joints(
 
     Movement is the length of a vector of nine elements: translations, angles in radians times the
     bone length, and changes of scale times the bone length. The bone length is bone_length(), the
-    same for all joints. A control's share is the part of its contribution in the direction of the
-    joint's whole movement. The shares of a joint sum to 1; a control that works against the
-    movement has a negative share.
+    same for all joints. A control's share is the component of its contribution along the joint's
+    movement, divided by the length of the movement. The shares of a joint sum to 1; a control that
+    works against the movement has a negative share.
 
     Args:
         dna: the face.

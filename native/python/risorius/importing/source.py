@@ -21,7 +21,8 @@ Doubles = npt.NDArray[np.float64]
 
 # Larger than any recorded take; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Frames per second: times that are further apart are times of keyframes, not of captured frames.
+# Lowest rate of captured frames in frames per second. Times that are further apart are times of
+# keyframes.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
 # largest fraction of frames that may be dropped because their time does not ascend

@@ -378,7 +378,7 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Reads Papagayo's text file: voices, their phrases, the words of these, and their phonemes.
+    """Reads Papagayo's text file: voices, phrases of a voice, words of a phrase, their phonemes.
 
     Args:
         text: content of the file.

@@ -6,7 +6,7 @@ A flood of forged senders must not displace a phone. Therefore:
     a sender that has never streamed gives its place to any newcomer
     the first sender of an address, once it has streamed, gives its place only to a wanted one
     any other sender gives its place if its address has at least two more senders than the
-    newcomer's address, or as many and the sender does not stream at present
+    newcomer's address, or at least as many and the sender does not stream at present
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
         clip: raw controls as captured, without gain, smoothing or rescaling.
         performance: whether the take shows acting instead of one extreme after another; a control
             is then used only if several peaks end at nearly the same height.
-        most_gain: largest gain, 1 to 4; lids get at least 2.
+        most_gain: largest gain, 1 to 4; the largest gain of lids is at least 2.
 
     Returns:
         The ranges of all controls in the clip's order, without angles of the head.
@@ -169,7 +169,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # The extreme is rounded down, so that it maps to 1 and not slightly below.
+    # The extreme is rounded down, so that the measured value maps to 1 and not slightly below.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

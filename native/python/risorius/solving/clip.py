@@ -61,7 +61,7 @@ class SolvedClip(NamedTuple):
 
 @dataclass
 class _Job:
-    """The input of a solve, equal for all frames, and its progress."""
+    """The input of a solve, equal for all frames, and the progress of the solve."""
 
     surface: Surface
     points: npt.NDArray[np.int64]  # [P, 2]: mesh and vertex of each compared point

@@ -55,6 +55,7 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
 
 
 def _apart(skeleton: Skeleton, body: Body, names: Sequence[str]) -> Doubles:
-    """float64[3], from the mean of the face's joints `names` to the mean of these body bones."""
+    """float64[3], from the mean of the face's joints `names` to the mean of the body's
+    bones of the same names."""
     here = skeleton.places[[skeleton.bones[n] for n in names]].mean(axis=0)
     return np.asarray(body.places[[body.bones[n] for n in names]].mean(axis=0) - here)
