@@ -300,7 +300,8 @@ def carried_shift(work: Work) -> float:
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
-    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards.
+    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards by
+    CARRIED_MM.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.

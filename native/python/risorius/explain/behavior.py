@@ -55,7 +55,7 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that are not at rest, and the GUI controls that set them.
+    """Raw controls that differ from their rest value, and the GUI controls that set them.
 
     Args:
         dna: the face.
