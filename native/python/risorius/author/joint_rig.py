@@ -51,7 +51,7 @@ from .work import (
     resting,
 )
 
-# Progress at the ends of the preparation, of the fit and of the meshes.
+# Finished fraction at the ends of the preparation, of the fit and of the meshes.
 _BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
 _SOLVED = 0.6  # of the progress of correctives, at the end of their solution
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
@@ -141,7 +141,8 @@ def lighten(rig: JointRig, source: Dna) -> None:
 
 
 def _take_errors(rig: JointRig, found: Lightened) -> None:
-    """Raise the stored errors of a rig to the errors that its removed deltas cause."""
+    """Raise stored largest errors of a rig to the lengths of its removed deltas if these are
+    longer."""
     dna, channels = rig.dna, channels_of(rig.dna)
     for errors in rig.errors:
         for row, column in enumerate(rig.columns):
@@ -165,7 +166,8 @@ def height_mm(dna: Dna) -> float:
 
 
 def _height(dna: Dna) -> float:
-    """The height of the tallest mesh of LOD 0; the largest extent if all meshes are flat."""
+    """The height of the tallest mesh of LOD 0 in the file's unit; the largest extent if all are
+    flat."""
     sizes = [
         np.ptp(np.asarray(dna.meshes[m].positions, np.float64), axis=0)
         for m in listed_meshes(dna, 0)
@@ -261,17 +263,18 @@ def _made(
 
 
 def _take_chosen(work: Work, other: Work) -> None:
-    """Take joints of levels and parents that were chosen for the face with simplified meshes."""
+    """Copy to `work` the parents, heirs and joints of each LOD that were chosen in `other`, the
+    face with simplified meshes."""
     work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
     work.mirrored, work.heirs = other.mirrored, other.heirs
 
 
 def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
-    """As _asking(), with a share that grows with each call towards _BEGUN.
+    """As _asking(), but the reported fraction grows with each call and approaches _BEGUN.
 
     Args:
-        progress: gets the share.
-        least: after this number of calls the share is half of _BEGUN.
+        progress: gets the finished fraction.
+        least: number of calls after which the fraction is half of _BEGUN.
     """
     calls = itertools.count(1)
 
@@ -283,7 +286,8 @@ def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
 
 
 def _asking(progress: Progress | None, share: float) -> Callable[[], None]:
-    """A function that tells a share of the work and raises DnaError if it was stopped."""
+    """A function that passes the finished fraction `share` to `progress`, and raises DnaError if
+    `progress` returns False."""
 
     def ask() -> None:
         if progress is not None and progress(share) is False:
@@ -332,9 +336,10 @@ def _combine(
 
 
 def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
-    """The face with joint groups by region, or by drivers if these are much smaller.
+    """The face with joint groups by region, or with joint groups by the controls that drive the
+    joints if these groups have far fewer coefficients.
 
-    Groups by drivers are smaller if many correctives each move a few joints of a region.
+    They have fewer if many correctives each move a few joints of a region.
 
     Args:
         dna: a face; it is not changed.
@@ -496,7 +501,8 @@ def _add_joints(work: Work, fit: Joints, names: list[str]) -> dict[str, list[str
 
 
 def _beside_parents(work: Work, fit: Joints) -> Doubles:
-    """float64[C, new joints, 3, 4]: motion of each new joint relative to its parent's motion."""
+    """float64[C, new joints, 3, 4]: motion of each new joint relative to its parent's motion, in
+    each of C expressions."""
     own = joint_motions(fit)[:, len(given(work)) :]
     parents = work.motions[:, work.parents]
     turns = np.swapaxes(parents[..., :3], -1, -2)
@@ -514,7 +520,8 @@ def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Do
 
 
 def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
-    """float64[C, new joints]: largest displacement of a vertex by each joint alone, mm."""
+    """float64[C, new joints]: largest displacement of a vertex by each joint alone, in mm, in each
+    of C expressions."""
     positions = joined_positions(work, meshes)
     moves = motions - np.eye(3, 4)
     out = np.zeros(motions.shape[:2])
@@ -537,7 +544,7 @@ def _add_behavior(
     """Add a joint group of the new joints, and divide it into dense groups by region."""
     dna = work.dna
     before = len(work.source.joint_names)
-    # Transform the motions relative to the parents into the parents' neutral frames.
+    # Express the motions, which are relative to the parents, in the parents' neutral frames.
     frames = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     whole = np.zeros((*motions.shape[:2], 4, 4))
     whole[..., :3, :], whole[..., 3, 3] = motions, 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the triangles of coarser levels of detail, and stops before the skin looks broken."""
+"""Makes the triangles of coarser LODs, and stops at the first LOD whose skin would look broken."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .work import Work, listed_meshes
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
 _LOOKED_AT = 2000  # number of checked vertices of the fine skin
 # Limits of a LOD: root mean square and largest distance of its skin from the finest skin, as
-# fractions of the skin's size.
+# fractions of the longest side of the skin's bounding box.
 _RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # largest fraction of slivers; a sliver is 30 times as long as high
 _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 degrees
@@ -29,7 +29,7 @@ _FOLDS, _FOLDED = 0.03, -0.5  # largest fraction of folded edges; cosine of 120 
 
 @dataclass
 class LevelMeshes:
-    """Triangles of each coarser LOD, as indices of layouts of the finest meshes.
+    """Triangles of each coarser LOD; a corner is the index of a vertex layout of the LOD 0 mesh.
 
     Attributes:
         count: number of LODs, including LODs of the source.
@@ -62,8 +62,8 @@ def level_meshes(
         wanted: mesh of the source -> its displacements.
         options: the budgets.
         levels: largest number of LODs.
-        attributes: mesh of the source -> attributes for the simplification; missing ones are added.
-            None: they are forgotten.
+        attributes: mesh of the source -> vertex attributes for the simplification. Attributes of
+            other meshes are computed and added. None: an empty dictionary.
         go_on: called before each mesh; raises an error to stop.
     """
     known = {} if attributes is None else attributes
@@ -85,7 +85,7 @@ def level_meshes(
             if not budget:
                 continue
             go_on()
-            # A large mesh is simplified from level to level, because that takes less time.
+            # A large mesh is made from the next finer LOD, because that is faster than from LOD 0.
             finer = None if wanted[m].small else out.triangles.get((lod - 1, m))
             features = known_attributes(known, m, wanted[m])
             triangles = patiently(partial(fewer_triangles, mesh, features, budget, finer), go_on)

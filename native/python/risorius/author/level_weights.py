@@ -111,12 +111,12 @@ def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def inherited(work: Work, rows: SparseWeights, lod: int) -> SparseWeights:
-    """Weights of a level, with the weights of joints that the level lacks on their heirs.
+    """Weights at a LOD: weights on joints that the LOD lacks move to the joints that replace them.
 
     Args:
         work: the face.
-        rows: weights of the finest level.
-        lod: the level.
+        rows: weights at LOD 0.
+        lod: index of the LOD.
     """
     before = len(work.source.joint_names)
     there = {*range(before), *(before + work.new[lod]).tolist()}
@@ -125,7 +125,7 @@ def inherited(work: Work, rows: SparseWeights, lod: int) -> SparseWeights:
 
 
 def _heir(work: Work, joint: int, there: set[int]) -> int:
-    """The joint of a level that takes a joint's vertices; itself if the level has it."""
+    """The joint of a LOD that takes a joint's vertices; the joint itself if the LOD has it."""
     while joint not in there and joint in work.heirs:
         joint = work.heirs[joint]
     return joint

@@ -24,7 +24,7 @@ from .geometry.skeleton import Doubles, Ints
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the level before
 _LEAST_JOINTS = 4
-# Parts of the names of small meshes (clear films, lashes, mouth), which coarse LODs leave out.
+# Substrings of the names of small meshes that coarse LODs leave out: clear films, lashes, tongue.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
@@ -38,7 +38,7 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    # Vertices of each LOD; empty: 0.6 times the LOD before, and at most 60,000.
+    # Vertices of each LOD; empty: 0.6 times the vertices of the finer LOD, at most 60,000.
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:
@@ -63,7 +63,7 @@ def joint_budgets(options: LodOptions, levels: int, joints: int) -> list[int]:
 
     Args:
         options: budgets, if given.
-        levels: number of levels.
+        levels: number of LODs.
         joints: number of new joints of LOD 0.
     """
     if options.joints:
@@ -110,7 +110,12 @@ class _Merging:
         self.costs[joint] = np.where(self.there, error, np.inf)
 
     def cheapest(self, pairs: Ints) -> list[int]:
-        """The joint with the smallest cost, together with its mirrored joint."""
+        """The joint and its mirrored joint with the smallest sum of their costs; one index if the
+        joint has no mirrored joint.
+
+        Args:
+            pairs: int64[J], the mirrored joint; a joint without one names itself.
+        """
         own = self.costs.min(axis=1)
         score = np.where(pairs == np.arange(len(pairs)), own, own + own[pairs])
         first = int(np.where(self.there & self.can_leave, score, np.inf).argmin())
@@ -190,11 +195,11 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each LOD. A LOD that is made has at most LARGE vertices.
+    """The number of vertices of each LOD; at most LARGE for a new LOD without a given budget.
 
     Args:
         options: budgets, if given.
-        levels: number of levels.
+        levels: number of LODs.
         existing: numbers of vertices of the source's LODs.
     """
     out = list(existing)

@@ -114,7 +114,8 @@ class Made:
                 self._add(lod, coarse, name, wanted[m], None)
 
     def _triangles(self, lod: int, m: int, name: str) -> Ints:
-        """int64[n, 3]: triangles of a coarse mesh as layout indices of the fine; n = 0: none."""
+        """int64[n, 3]: triangles of a coarse mesh, as indices of the fine mesh's vertex layouts;
+        n is 0 if there are none."""
         none = np.zeros((0, 3), np.int64)
         if self.like is not None:
             return self.like.triangles.get(level_name(name, lod), none)
@@ -156,13 +157,14 @@ class Made:
         self.names.append(name)
 
     def _fitted(self, lod: int, mesh: Mesh, name: str, wanted: Doubles, start: Doubles) -> Doubles:
-        """float64[V, joints]: the weights of the reference, or weights fitted from a start."""
+        """float64[V, joints]: the weights of the reference; without a reference, weights whose fit
+        starts with `start`."""
         if self.like is not None:
             return self.like.weights[name]
         return level_weights(self.ways, self.options.fit, lod, mesh, wanted, start)
 
     def _add_finest(self, lod: int, m: int, name: str, wanted: Wanted) -> None:
-        """Add a mesh of the finest level. Coarser levels start with its weights."""
+        """Add a mesh of LOD 0. The fits of coarser LODs start with its weights."""
         self._listed(lod, name)
         mesh, start = wanted.mesh, self.weights[m]
         small = self.fewer.meshes.get(m) if self.fewer is not None else None
@@ -177,7 +179,7 @@ class Made:
         self._finished(lod, mesh, name, wanted, self.weights[m])
 
     def _add_large(self, lod: int, m: int, name: str, wanted: Wanted, start: Doubles) -> None:
-        """Add a large mesh of the finest level with the weights of its simplified mesh."""
+        """Add a large mesh of LOD 0 with the weights that were fitted to its simplified mesh."""
         assert self.fewer is not None
         small = self.fewer.meshes[m]
         own = self.fewer.wanted[m].at(np.arange(len(small.kept)))
@@ -193,7 +195,7 @@ class Made:
     def _add_coarse(
         self, lod: int, mesh: Mesh, name: str, wanted: Wanted, m: int, kept: Ints
     ) -> None:
-        """Add a simplified mesh of the finest level.
+        """Add the mesh of a coarser LOD that was simplified from a mesh of LOD 0.
 
         Args:
             lod: index of the LOD.
@@ -340,7 +342,7 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
 
 
 def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
-    """Add the errors of a block of vertices to the errors of a mesh."""
+    """Merge the errors of a block of vertices into the errors of the mesh."""
     worse = part.joints_largest > whole.joints_largest
     whole.worst_vertex[worse] = vertices[part.worst_vertex[worse]]
     share = part.vertices / whole.vertices

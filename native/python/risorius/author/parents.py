@@ -136,7 +136,8 @@ def _split(
     shares: dict[int, Doubles],
     split: list[tuple[int, int]],
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
-    """Add second joints, and divide the weights of the first joints between both."""
+    """Add second joints, and divide the weights of each first joint between it and its
+    second joints."""
     first, before = len(given(work)), len(work.source.joint_names)
     count = len(fit.joints)
     still, own = resting(work), carriers(work)

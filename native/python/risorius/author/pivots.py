@@ -24,7 +24,7 @@ _LEAST_TURN = 0.05  # radians; the hinge of a jaw that turns less cannot be foun
 
 @dataclass(frozen=True)
 class Pivot:
-    """A point, and the rows of the expressions that turn about the point."""
+    """A point, and the indices of the expressions that turn vertices about the point."""
 
     position: Doubles  # float64[3]
     expressions: tuple[int, ...]

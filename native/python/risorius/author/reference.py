@@ -44,7 +44,7 @@ class Reference:
     pivots: list[int | None]  # new joint -> index of its pivot
     levels: list[list[int]]  # level -> its new joints
     weights: dict[str, Doubles] = field(default_factory=dict)  # mesh -> [V, joints]
-    # Coarse mesh -> triangles [n, 3] as layout indices of the fine mesh.
+    # Coarse mesh -> triangles [n, 3] as indices of the fine mesh's vertex layouts.
     triangles: dict[str, Ints] = field(default_factory=dict)
 
     def check(self, work: Work) -> None:

@@ -50,15 +50,15 @@ class RigOptions:
     # distance in mm.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
-    # Parts of the names of meshes that keep their weights and blend shapes, such as eyeballs, which
+    # Substrings of the names of meshes that keep weights and blend shapes, such as eyeballs, which
     # turn with their own joint.
     kept: tuple[str, ...] = ()
     # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
     # total time.
     between: bool = True
     # Joints are fitted to meshes of about this number of vertices together: larger meshes are
-    # simplified for the fit. Then weights are carried to all vertices, and blend shapes are made
-    # for the errors there.
+    # simplified for the fit. Then weights are transferred to all vertices, and blend shapes are
+    # made for the errors there.
     fit_vertices: int = LARGE
 
 
@@ -134,7 +134,8 @@ def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
         go_on: called before each mesh and each block of a large mesh; raises an error to stop.
 
     Raises:
-        ArgumentError: the face has no meshes or joints, nothing moves, or it cannot be used.
+        ArgumentError: the face has no meshes or joints, no control moves it, a control scales a
+            joint, or require_sizes() rejects the meshes.
         BudgetError: the tables would be too large for the size of the face.
     """
     if not dna.meshes or not dna.joint_names:
@@ -220,8 +221,9 @@ def _column_name(dna: Dna, column: int) -> str:
 
 
 def _head(work: Work) -> int:
-    """Of the joints that no expression moves, the one with the largest sum over the vertices of
-    its weight times the vertex' motion.
+    """The joint that carries most of the face's motion, of the joints that no expression moves.
+
+    It has the largest sum of skin weight times largest displacement over all vertices.
     """
     dna = work.source
     share = np.zeros(len(dna.joint_names))
@@ -235,7 +237,8 @@ def _head(work: Work) -> int:
 
 
 def needs_joints(work: Work, wanted: Wanted) -> bool:
-    """Whether blend shapes contribute to a mesh's motion; existing joints alone move an eyeball.
+    """Whether blend shapes contribute to a mesh's motion; False for an eyeball, which existing
+    joints alone move.
 
     Args:
         work: the face.
@@ -249,8 +252,8 @@ def needs_joints(work: Work, wanted: Wanted) -> bool:
 def resting(work: Work) -> Ints:
     """The joints of the source that no expression moves, such as spine, neck and head.
 
-    The fit cannot distinguish these joints. But vertices must keep following the same one,
-    because an animator may rotate the neck.
+    The fit cannot distinguish these joints. But a vertex must keep following the same
+    joint, because an animator may rotate the neck.
     """
     moving = set(given(work)[1:].tolist())
     return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
@@ -297,7 +300,8 @@ def carried_shift(work: Work) -> float:
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
-    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards.
+    """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards by
+    CARRIED_MM.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.

@@ -40,7 +40,8 @@ _CHUNK_BYTES = 8 << 20
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character, and unique names of its joints, blend shapes, maps and controls."""
+    """A compiled character, and unique names of its joints, blend shapes, animated maps
+    and controls."""
 
     name: str
     rig: risorius.Rig

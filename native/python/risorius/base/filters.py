@@ -41,7 +41,8 @@ def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) ->
 class OneEuro:
     """The one-euro filter for live values: a low pass whose cutoff grows with speed.
 
-    `cutoff` suppresses slow noise; `beta` lets fast motion pass with little delay.
+    A low `cutoff` suppresses noise of slow motion; a high `beta` lets fast motion pass with little
+    delay.
     From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
 
     Attributes:

@@ -97,7 +97,7 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
 
 
 def require_regular(path: str | os.PathLike[str]) -> None:
-    """Raise an error if a path that was found in a folder or file is not a regular file.
+    """Raise an error if a path that was found in a folder or file is a pipe, a socket or a device.
 
     Raises:
         ReadingError: the path is a pipe, a socket or a device.

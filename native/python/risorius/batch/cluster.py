@@ -23,8 +23,8 @@ class Cluster:
 
     Every worker must find the files under the same paths and have this version of Risorius. If a
     worker dies, another worker runs its job; Dask gives the job up after more than
-    `distributed.scheduler.allowed-failures` (3) dead workers. Dask also counts the death against
-    other jobs of that worker. So each job that Dask gave up is tried once more, alone.
+    `distributed.scheduler.allowed-failures` (default 3) dead workers. Dask also counts the death
+    against other jobs of that worker. So each job that Dask gave up is tried once more, alone.
 
     Args:
         address: e.g. tcp://10.0.0.5:8786.

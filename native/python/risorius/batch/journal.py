@@ -31,8 +31,8 @@ class Journal:
     """A file of JSON lines next to the outputs.
 
     A job counts as finished if its inputs have not changed and its files still have the recorded
-    size and time. The measured facts of a job are read from the file when needed, because the
-    control ranges of thousands of jobs would take too much memory.
+    size and modification time. The measured facts of a job are read from the file when needed,
+    because the control ranges of thousands of jobs would take too much memory.
     """
 
     def __init__(self, path: Path) -> None:

@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Args: arguments  words of the command line; None: the words with which the program was started.
     """
     for stream in (sys.stdout, sys.stderr):
-        # Characters that the terminal's encoding lacks are printed as escapes, not as an error.
+        # Prints characters that the terminal's encoding lacks as escapes, without an exception.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     # The calculation modules check the range of values themselves; NumPy's warnings would name a

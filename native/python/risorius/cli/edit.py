@@ -153,8 +153,8 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 def parse_threshold(text: str) -> float | list[float]:
     """Parse --threshold: the largest effect of a joint matrix coefficient that counts as small.
 
-    One number holds for all kinds of joint attributes. Three numbers hold for translation in mm,
-    rotation in degrees and scale in per cent.
+    Three numbers hold for translation in mm, rotation in degrees and scale in per cent. One number
+    holds for all three.
 
     Raises:
         CommandLineError: not one or three finite numbers of 0 or more.

@@ -79,7 +79,7 @@ def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
         clip: clip of raw controls, after the mapping.
         source: None to change nothing, "self" for the ranges of the clip itself, or a file of
             ranges.
-        report: report that receives a note.
+        report: report that receives a note on the scaling.
 
     Raises:
         AnimationFileError: the file of ranges, or the clip with "self", is unusable.

@@ -14,8 +14,8 @@ import numpy.typing as npt
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
 # Smaller values of the other control (such as jawOpen) count as LEAST in the division; otherwise
-# noise of a face at rest would make the fraction jump between 0 and 1. The error is at most a
-# quarter of LEAST, 0.2 mm between the lips.
+# noise of a face at rest would make the fraction jump between 0 and 1. The error of the control's
+# value is at most LEAST / 4, which is 0.2 mm between the lips.
 LEAST = 0.02
 
 
@@ -23,7 +23,7 @@ def share_of(part: Numbers, whole: Numbers) -> Numbers:
     """The share `part` / `whole`, 0 to 1; 0 if both are 0.
 
     Args:
-        part: amounts, in any shape.
+        part: values of the control, in any shape.
         whole: values of the other control in the same shape; values below LEAST count as LEAST.
     """
     return np.clip(part / np.maximum(whole, LEAST), 0.0, 1.0)
@@ -33,7 +33,7 @@ def part_of(share: Numbers, whole: Numbers) -> Numbers:
     """The inverse of share_of, except for shares that it clamped.
 
     Args:
-        share: shares, in any shape.
+        share: fractions from 0 to 1, in any shape.
         whole: values of the other control, in the same shape.
     """
     return share * np.maximum(whole, LEAST)

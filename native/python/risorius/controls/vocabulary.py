@@ -117,8 +117,8 @@ class Vocabulary:
         """A name in the vocabulary's spelling, or None if the vocabulary lacks it.
 
         Args:
-            name: name with any text before its last dot, and with the vocabulary's prefixes and
-                suffixes.
+            name: a name; it may have any text before its last dot, and the vocabulary's prefixes
+                and suffixes.
             loosely: True: ignore differences in spelling, if the vocabulary allows this.
         """
         for candidate in self._candidates(name):
@@ -167,7 +167,7 @@ def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
     """The meaning of a name, or None if no vocabulary contains it.
 
     Args:
-        name: name of a shape or a curve, with any text before its last dot.
+        name: name of a shape or a curve; it may have any text before its last dot.
         order: names of vocabularies, as returned by `leading`; the first that contains the name
             decides. None: ARKit in any spelling, then the exact spelling of any vocabulary, then
             any spelling.
@@ -223,7 +223,8 @@ def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if "*" not in name:
         yield name, value
         return
-    # eyeClosed* becomes eyeClosedLeft, Eye_Blink_* becomes Eye_Blink_L, lipFunneler*B lipFunnelerLB
+    # EyeClosed* becomes EyeClosedLeft, Eye_Blink_* becomes Eye_Blink_L, and lipFunneler*B becomes
+    # lipFunnelerLB.
     is_word = name[0].isupper() and "_" not in name and name.endswith("*")
     for side in "LR":
         yield name.replace("*", _WORDS[side] if is_word else side), _on_side(value, side)

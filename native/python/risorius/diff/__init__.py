@@ -98,8 +98,8 @@ def _in_system(
 
 
 def _same_bytes(a: risorius.Dna, b: risorius.Dna) -> bool:
-    """Whether the DNA files of both faces have equal bytes; if not, a module may have missed one
-    difference or more."""
+    """Whether the DNA files of both faces have equal bytes. If they differ although no module of
+    layers/ reports a difference, a module has missed one."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return a.to_bytes() == b.to_bytes()

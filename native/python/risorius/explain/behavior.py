@@ -55,7 +55,7 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that are not at rest, and the GUI controls that set them.
+    """Raw controls that differ from their rest value, and the GUI controls that set them.
 
     Args:
         dna: the face.
@@ -90,8 +90,7 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads are at rest at this
-    LOD.
+    """Controls that something reads at a LOD; correctives that nothing reads stay 0 at this LOD.
 
     Args:
         dna: the face.
@@ -119,8 +118,8 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives, inactive ones of which only one control is 0, and ones that nothing
-    reads.
+    """Active correctives, inactive ones of which exactly one control is not above 0, and ones that
+    nothing reads or that depend on themselves.
 
     Args:
         dna: the face.
@@ -248,7 +247,7 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twist and swing setups that are not at rest: their angles in degrees, and their joints.
+    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints.
 
     Args:
         dna: the face.

@@ -112,7 +112,7 @@ def _product(
     rows: dict[int, int],
     controls: Doubles,
 ) -> dict[Key, Doubles]:
-    """Contributions of the columns of one joint, whose quaternions are multiplied in this order."""
+    """Contributions of the columns of one joint, whose quaternions are multiplied in `order`."""
     total, before = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     out: dict[Key, Doubles] = {}
     for column in order.tolist():
@@ -153,7 +153,8 @@ _BY_NETWORKS = "networks"
 def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
     """Contributions of networks to joints.
 
-    A converted rotation or a quaternion is one contribution.
+    A quaternion, or a rotation that is converted from the networks' axes to the face's axes, is one
+    contribution.
     """
     joints = dna.machine_learned_behavior_ext.joints
     settings = {
@@ -174,7 +175,8 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
-    """The networks' rotation convention or None, and the matrix to the face's axes."""
+    """The networks' rotation convention or None, and the matrix from the networks' axes to the
+    face's axes."""
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))
@@ -185,7 +187,7 @@ def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | N
 
 
 def _number(word: str) -> int:
-    """The number of a direction; "#7" is a direction that the format does not define."""
+    """The number of a direction from its name. "#7" gives 7, which the format does not define."""
     return _WORDS.index(word) if word in _WORDS else int(word.removeprefix("#"))
 
 
@@ -241,13 +243,13 @@ def _moved(
 def explain_joints(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """Each joint that is not at rest; the joint that moves most is first.
+    """Each joint that differs from its neutral pose; the joint that moves most is first.
 
     Movement is the length of a vector of nine elements: translations, angles in radians times the
-    bone length, and changes of scale times the bone length. The bone length is the median of the
-    file. A control's share is the part of its contribution in the direction of the joint's whole
-    movement. The shares of a joint sum to 1; a control that works against the movement has a
-    negative share.
+    bone length, and changes of scale times the bone length. The bone length is bone_length(), the
+    same for all joints. A control's share is the component of its contribution along the joint's
+    movement, divided by the length of the movement. The shares of a joint sum to 1; a control that
+    works against the movement has a negative share.
 
     Args:
         dna: the face.

@@ -46,7 +46,7 @@ class Made:
 
     Attributes:
         files: file name -> bytes, the .glb first.
-        notes: sentences about parts that are missing, approximated, or reduced to meet the size.
+        notes: sentences about parts that are missing, approximated, or reduced for the size limit.
         groups: one line of text per group of targets.
     """
 

@@ -12,8 +12,8 @@ Doubles = npt.NDArray[np.float64]
 
 _STEEP = 1.3  # exponent of the random weights: low weights are more frequent
 _ONE_SIDED = 0.25  # share of the poses with one side weaker than the other
-# Unit without its side -> share of the poses in which it is on. A pose has at most
-# one active unit of each row.
+# Rows of units that exclude each other: unit without its side -> fraction of the poses in
+# which it is active.
 _PAIRS = (
     {"eyeBlink": 0.75},
     {"eyeLookDown": 0.55, "eyeLookUp": 0.2},
@@ -45,7 +45,7 @@ def typical(names: Sequence[str], count: int, seed: int = 1) -> Doubles:
     """Random poses: float64[count, names], weights from 0 to 1.
 
     Args:
-        names: ARKit units; units that the tables above lack stay 0.
+        names: ARKit units; units for which this file has no rule stay 0.
         count: number of poses.
         seed: seed of the random numbers; equal seeds give equal poses.
     """

@@ -82,7 +82,7 @@ class Materials:
             if normal is not None:
                 material["normalTexture"] = {"index": normal}
             roughness = self._picture(named.get("roughness", ""), "roughness", longest // 2, glb)
-            # glTF reads roughness from green; blue, the metalness, is multiplied by 0
+            # glTF reads roughness from the green channel; metalness, in blue, is multiplied by 0
             if roughness is not None:
                 surface["metallicRoughnessTexture"] = {"index": roughness}
                 surface["roughnessFactor"] = 1.0

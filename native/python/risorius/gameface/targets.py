@@ -135,7 +135,7 @@ class _Finder:
 
 
 def _whole_of(unit: str) -> str:
-    """The ARKit unit that `unit` partly undoes, as mouthClose does jawOpen; "" for none."""
+    """The ARKit unit that `unit` partly undoes, as mouthClose undoes jawOpen; "" for none."""
     shares = arkit.shares()
     whole = {shares[control] for control in arkit.mapping()[unit] if control in shares}
     return next((u for u, row in arkit.mapping().items() if whole & row.keys()), "")

@@ -206,7 +206,8 @@ class _Writer:
     def _first_person(self, part: Part) -> str:
         """Whether the avatar's wearer sees a mesh: VRM's "thirdPersonOnly", "auto" or "both".
 
-        A mesh is hidden if all its vertices follow the head; "auto" hides only such vertices.
+        The wearer must not see vertices that follow the head. "thirdPersonOnly": all vertices
+        follow it, "auto": some, "both": none.
         """
         own = self.skeleton
         is_head = np.zeros(max(len(own.names), INFLUENCES), np.bool_)

@@ -475,13 +475,13 @@ def _auto(
 ) -> tuple[Doubles, Doubles]:
     """Sets the slopes of keyframes with automatic tangents.
 
-    The line through the two neighbouring keyframes has this slope; it is 0 at a clamped extreme.
+    The slope is that of the line through the two neighbouring keyframes, or 0 at a clamped extreme.
 
     Args:
         times, values: float64[keys], seconds and values of the keys.
         flags: int64[keys], KeyAttrFlags.
-        leave, arrive: float64[keys], slopes after and before each keyframe; they stay for other
-            tangents.
+        leave, arrive: float64[keys], slopes after and before each keyframe; keyframes with other
+            tangents keep them.
     """
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():

@@ -559,7 +559,8 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
         rig_names: raw controls of the rig, or its GUI controls if mapping.is_gui.
 
     Returns:
-        One sentence per missing control; empty if the rig has all.
+        One sentence per control that the rig lacks, and per pattern in `mapping.controls` that
+        matches no control of the rig; empty if there are none.
     """
     known = set(rig_names)
     out = []
@@ -607,7 +608,7 @@ def _is_letter(curve: str) -> bool:
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """Names of the mappings that know any of `names`; empty unless all are single letters."""
+    """Names of the mappings that know any of `names`; empty unless all are one character long."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

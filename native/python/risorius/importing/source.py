@@ -21,7 +21,8 @@ Doubles = npt.NDArray[np.float64]
 
 # Larger than any recorded take; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Frames per second: times that are further apart are times of keyframes, not of captured frames.
+# Lowest rate of captured frames in frames per second. Times that are further apart are times of
+# keyframes.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
 # largest fraction of frames that may be dropped because their time does not ascend
@@ -189,7 +190,7 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
 
 def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
-    """Indices of the frames whose time is later than all earlier ones; drops are noted.
+    """Indices of the frames whose time is later than all earlier times.
 
     Args:
         times: float64[frames], seconds.

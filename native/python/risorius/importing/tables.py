@@ -41,7 +41,7 @@ LIVE_LINK_FACE = (
     *"HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll".split(),
     *"RightEyeYaw RightEyePitch RightEyeRoll".split(),
 )
-# Columns with the number of blend shapes, which are not curves.
+# Names of columns that contain the number of blend shapes; these columns are not curves.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
 # A table with a row per time and name is converted to a column per name only if this gives at most

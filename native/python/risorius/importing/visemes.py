@@ -30,9 +30,9 @@ BLEND = 0.12
 DAT_RATE = 24.0
 # seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
-# Limit of the transitions into the time of each mouth shape. 1: a transition ends in the middle of
-# the shape's time at the latest; 0: it may last until the other end of that time. Viewers notice if
-# the mouth never closes for an M, but not if a D is shortened.
+# Limit of a transition's reach into the time of each mouth shape. 1: a transition reaches at most
+# to the middle of the shape's time; 0: it may reach to the other end of that time. Viewers notice
+# if the mouth never closes for an M, but not if a D is shortened.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
@@ -378,7 +378,7 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Reads Papagayo's text file: voices, their phrases, the words of these, and their phonemes.
+    """Reads Papagayo's text file: voices, phrases of a voice, words of a phrase, their phonemes.
 
     Args:
         text: content of the file.

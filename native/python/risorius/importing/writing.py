@@ -128,8 +128,8 @@ def mapping_with(base: str, rows: Mapping[str, Mapping[str, float]]) -> str:
     """A mapping as TOML, with additional rows; load_mapping reads it.
 
     Args:
-        base: name of a built-in mapping, path of another, or "" for none. Comments of a file are
-            lost.
+        base: name of a built-in mapping, path of a mapping file, or "" for none. Comments of the
+            file are lost.
         rows: curve -> {control, or @expression: weight}; an empty row ignores the curve.
 
     Raises:

@@ -17,7 +17,7 @@ from ..rigs.joint_controls import joint_controls
 from .simplex import shares
 
 _HEIRS = 5  # joints that may take over the vertices of a removed joint
-# Joints that stay because users and programs rotate them or attach objects to them.
+# Names of joints that stay, because users and programs rotate them or attach objects to them.
 _NEEDED = re.compile(
     r"root|pelvis|hips|spine.*|neck.*|head|facial_c_(facialroot|jaw|neck.*root)|jaw"
     r"|facial_[lr]_eye|(eye_?[lr]|[lr]_?eye)"

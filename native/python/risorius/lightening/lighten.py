@@ -400,7 +400,7 @@ def _products(
     """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
 
     For each joint with children that no pose moves, a shift of the joint and its descendants by
-    CARRIED_MM is added as a pose, because otherwise all resting joints would seem to be
+    CARRIED_MM is added as a pose, because otherwise all joints that no pose moves would seem to be
     interchangeable.
     """
     count = len(dna.joint_names)
@@ -423,8 +423,8 @@ def _products(
 
 
 def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[tuple[Pose, Pose]]:
-    """Pairs of a source pose and the same pose of the face without the correctives `leaving`; the
-    latter's input is renumbered, -1 for a removed corrective."""
+    """Pairs of a source pose and the same pose of the face without the correctives `leaving`. The
+    input of the second pose is renumbered, -1 for a removed corrective."""
     raw, rows = len(source.raw_control_names), np.ones(source.psd_count, bool)
     rows[list(leaving)] = False
     place: Ints = np.where(rows, np.cumsum(rows) - 1, -1)

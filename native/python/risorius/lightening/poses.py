@@ -145,7 +145,9 @@ def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
 def motion_rows(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
 ) -> Iterator[Doubles]:
-    """The motions of joints in poses minus the identity, so 0 at rest; a block of poses at a time.
+    """The motions of joints in poses minus the identity, a block of poses at a time.
+
+    They are 0 in the neutral pose.
 
     Args:
         dna: the face.

@@ -106,7 +106,8 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 
 
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
-    """Adds a channel for each input as the first rows, so that all LODs with channels use them."""
+    """Adds a channel for each input. The new channels are the first rows, so that all LODs with
+    channels use them."""
     if not inputs:
         return {}
     first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names

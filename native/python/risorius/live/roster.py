@@ -3,9 +3,10 @@
 
 A flood of forged senders must not displace a phone. Therefore:
     a wanted sender (named or recorded) always gets a place and keeps it
-    the first sender of each address keeps its place once it has streamed, even while silent
-    an address with at least two more senders than the newcomer's address gives up one of them
-    any other sender is displaced by a newcomer while it is silent
+    a sender that has never streamed gives its place to any newcomer
+    the first sender of an address, once it has streamed, gives its place only to a wanted one
+    any other sender gives its place if its address has at least two more senders than the
+    newcomer's address, or at least as many and the sender does not stream at present
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Roster(Generic[Key, Item]):
         return (place.item for place in self._places.values())
 
     def hear(self, key: Key, now: float) -> Item | None:
-        """Notes a message of a sender, and returns its record; None for an unknown sender.
+        """Counts a message of a sender, and returns its record; None for an unknown sender.
 
         Args:
             key: key of the sender.

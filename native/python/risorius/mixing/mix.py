@@ -132,8 +132,8 @@ class Places:
         face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
-        # Size and position of a region are measured at its rim, so that the region fits the regions
-        # beside it.
+        # The position of a region is measured at its rim, so that the region fits the regions
+        # beside it. The small second term gives regions without a rim a position too.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
         # Neck and skull surround the face, so their scale is measured at their border to the face.

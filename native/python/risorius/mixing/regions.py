@@ -35,7 +35,8 @@ _NECK = re.compile(r"neck|spine|clavicle")
 # region of vertices that no control moves: forehead above the brows, ears, back of the head
 REST = "skull"
 REGIONS = (*_CONTROLS, REST)
-# fraction of a control's largest displacement; vertices that move less belong to the skull
+# fraction of a control's largest displacement; vertices that move less belong more to the skull
+# than to the control's region
 _LEAST = 0.15
 _REACH = 0.03  # distance over which masks are smoothed, as a fraction of the mesh's size
 _MOST_ROUNDS = 60

@@ -24,7 +24,8 @@ MOST_GAIN = 1.6
 """Largest gain; a control that would need more did not reach its extreme in the take."""
 SHORTEST = 2.0
 """Seconds: shorter takes are refused."""
-# largest gain of lids, higher because everybody can shut the eyes: a low peak is a weak capture
+# largest gain of lids; above MOST_GAIN, because everybody can shut the eyes, so that a low peak is
+# a weak capture
 _LID_GAIN = 2.0
 _LEAST_RANGE = 0.15  # ranges below it count as hardly moving
 _LEAST_OVER_NOISE = 8.0  # smallest range in standard deviations of the noise
@@ -66,7 +67,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
         clip: raw controls as captured, without gain, smoothing or rescaling.
         performance: whether the take shows acting instead of one extreme after another; a control
             is then used only if several peaks end at nearly the same height.
-        most_gain: largest gain, 1 to 4; lids get at least 2.
+        most_gain: largest gain, 1 to 4; the largest gain of lids is at least 2.
 
     Returns:
         The ranges of all controls in the clip's order, without angles of the head.
@@ -124,7 +125,7 @@ def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
 
 
 def _without_spikes(curve: Doubles, rate: float) -> Doubles:
-    """The median over _SPIKE seconds around each frame, at least 3 frames."""
+    """The median over _SPIKE seconds around each frame, at least 3 and at most 9 frames."""
     half = min(max(1, round(0.5 * _SPIKE * rate)), _WIDEST)
     padded = np.pad(curve, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
@@ -168,7 +169,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # The extreme is rounded down, so that it maps to 1 and not slightly below.
+    # The extreme is rounded down, so that the measured value maps to 1 and not slightly below.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

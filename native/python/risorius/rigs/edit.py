@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rebuilds the joint groups of a face densely, optionally without small coefficients."""
+"""Rebuilds the joint groups of a face as dense groups, optionally without small coefficients."""
 
 from __future__ import annotations
 

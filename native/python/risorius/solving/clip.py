@@ -61,7 +61,7 @@ class SolvedClip(NamedTuple):
 
 @dataclass
 class _Job:
-    """The input of a solve, equal for all frames, and its progress."""
+    """The input of a solve, equal for all frames, and the progress of the solve."""
 
     surface: Surface
     points: npt.NDArray[np.int64]  # [P, 2]: mesh and vertex of each compared point
@@ -96,10 +96,10 @@ class _Frame:
         self.matrix = np.zeros((0, 0))
 
     def linearise(self, raw: Doubles, within: float) -> bool:
-        """Computes derivatives at a pose, unless they exist for a pose within a distance.
+        """Computes derivatives at the pose `raw`, unless they exist for a pose near it.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest distance of a
-            control."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest difference of
+            a control's value between two poses that count as near."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -146,9 +146,9 @@ def solve_clip(
             is the first mesh of the LOD. In the file's unit and axes, without motion of the head.
         rate: frames per second.
         start: time of the first frame in seconds.
-        neutral: float[V, 3], the moving mesh at rest, as a mapping like frames: its displacements
-            are then used instead of its shape, for another face with the same topology. None: the
-            face's own neutral.
+        neutral: float[V, 3], the moving mesh with a neutral face, as a mapping like frames: its
+            displacements are then used instead of its shape, for another face with the same
+            topology. None: the face's own neutral.
         sparse: factor of the price of a control's value; 0 means no price, 1 is the default.
         smooth: factor of the price of a sudden change; 0 means no price, 1 is the default.
         limits: the controls that may change, and their ranges; None: all except rotation
@@ -309,9 +309,9 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
 def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
     """float64[F - 2, used]: price of a sudden change of each control, at each frame.
 
-    The price is 1 / d^2, where d is the typical second difference of the control's curve without
-    noise. Near a frame whose own second difference is clearly above the noise, d is that local
-    value. A blink therefore stays sharp while a slow jaw is smoothed.
+    The price is job.smooth / d^2, where d is the typical second difference of the control's curve
+    without noise. Near a frame whose own second difference is clearly above the noise, d is that
+    local value. A blink therefore stays sharp while a slow jaw is smoothed.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))

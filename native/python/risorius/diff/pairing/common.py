@@ -161,8 +161,7 @@ def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None
 def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.LodMapping) -> None:
     """Report the elements that each LOD lists, if they differ.
 
-    If the lists are equal but the two files store them, or share them between LODs, differently,
-    this is reported.
+    Also reports equal lists that the two files store, or share between LODs, in different ways.
 
     Args:
         place: where the difference is reported.

@@ -23,9 +23,9 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     """Move the joints of a face onto a body; also returns float64[3], the face's motion in metres.
 
     The midpoint of the face's eyes is moved to the midpoint of the body's eye bones. If the face or
-    the body has no eye bones, the head joint is moved to the head bone. The head joints also decide
-    the depth if the body's eye bones are more than 3 cm deeper in the head than the face's, or less
-    deep. The face's root is replaced by the node above the body's neck.
+    the body has no eye bones, the head joint is moved to the head bone. The motion in depth is also
+    the head joint's if the depths of the eyes in both heads differ by more than 3 cm. The face's
+    root is replaced by the node above the body's neck.
 
     Args:
         skeleton: joints of the face alone.
@@ -55,6 +55,7 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
 
 
 def _apart(skeleton: Skeleton, body: Body, names: Sequence[str]) -> Doubles:
-    """float64[3], from the mean of the face's joints `names` to the mean of these body bones."""
+    """float64[3], from the mean of the face's joints `names` to the mean of the body's
+    bones of the same names."""
     here = skeleton.places[[skeleton.bones[n] for n in names]].mean(axis=0)
     return np.asarray(body.places[[body.bones[n] for n in names]].mean(axis=0) - here)

@@ -76,7 +76,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # A take of 2 s without frame numbers above 29 has 30 frames per second, not 60.
+    # A take of 2 s or more without frame numbers above 29 has 30 frames per second, not 60.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None

@@ -18,7 +18,8 @@ from .regions import REGIONS, regions_of
 
 @dataclass(frozen=True)
 class Lod:
-    """One LOD: joints per region, and how many coefficients, blend shapes and maps it evaluates."""
+    """One LOD: joints per region, and how many coefficients, blend shapes and animated maps it
+    evaluates."""
 
     joints: dict[str, int]
     coefficients: int

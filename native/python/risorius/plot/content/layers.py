@@ -33,7 +33,8 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of the file. `key` is a layer's four-letter code in the file's index, else ""."""
+    """A layer of the file, or other bytes of it. `key` is the layer's four-letter code in the
+    file's index, "" if it has none."""
 
     key: str
     title: str

@@ -142,7 +142,7 @@ def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[n
         shade = colors[cells.groups, channel] if len(cells.groups) else np.zeros(0)
         picture[:, channel] = np.bincount(flat, shade, minlength=size) / np.maximum(count, 1)
     area = np.outer(_spread(cells.shape[0], high), _spread(cells.shape[1], wide)).ravel()
-    # At least 0.3 opaque, so that a single coefficient among fifty zeros is visible.
+    # A filled pixel is at least 0.3 opaque, so that one coefficient among fifty zeros is visible.
     fill = np.sqrt(np.minimum(1, count / area))
     picture[:, 3] = np.where(count > 0, 0.3 + 0.7 * fill, 0)
     return np.asarray(np.rint(picture * 255), np.uint8).reshape(high, wide, 4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws bar charts of the LODs: joints by region, and numbers of evaluated parts."""
+"""Draws bar charts of the LODs: joints by region; coefficients, blend shapes, animated maps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from .paper import ACCENT, MUTED, RULE, Canvas, compact, heading
 
 
 def draw(canvas: Canvas, facts: Facts) -> None:
-    """Draws a chart of joints, and small charts of coefficients, blend shapes and maps, per LOD.
+    """Draws a chart of joints, and small charts of coefficients, blend shapes and animated
+    maps, per LOD.
 
     Args:
         canvas: receives the drawing.

@@ -107,7 +107,8 @@ def _draw_row_owners(axes: Axes, facts: Facts, rows: int) -> None:
         lines.append([(0, 9 * first), (axes.get_xlim()[1], 9 * first)])
     patches = PatchCollection(stripes, facecolor=colors, edgecolor="none", clip_on=False)
     axes.add_collection(patches, autolim=False)
-    # If joint groups interleave, a hundred lines and more would hide the coefficients.
+    # More than 100 lines are not drawn, because they would hide the coefficients. There is
+    # a line wherever the joint group of the rows changes.
     if len(lines) <= 100:
         axes.add_collection(LineCollection(lines, colors=MUTED, linewidths=0.35), autolim=False)
     axes.tick_params(axis="y", pad=9)

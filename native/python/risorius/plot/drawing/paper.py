@@ -57,7 +57,7 @@ def settings() -> Iterator[None]:
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
-        # Matplotlib draws a box for a letter that the font lacks; it should not warn as well.
+        # Matplotlib draws a box for a letter that the font lacks; the warning about it is hidden.
         warnings.filterwarnings("ignore", "Glyph")
         log.setLevel(logging.ERROR)
         try:

@@ -44,7 +44,7 @@ def triangles_of(mesh: risorius.Mesh) -> Ints:
 
 
 def corners_of(mesh: risorius.Mesh) -> Ints:
-    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of layouts."""
+    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of vertex layouts."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.face_layouts, np.int64)
     if len(offsets) < 2:

@@ -45,7 +45,7 @@ def rotations(dna: risorius.Dna) -> Floats:
 
 
 def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
-    """float64[count, 3]: finite values, 0 for missing rows."""
+    """float64[count, 3]: the values; 0 for missing rows and for values that are not finite."""
     rows = np.zeros((count, 3))
     given = np.asarray(values, float).reshape(-1, 3)[:count]
     rows[: len(given)] = np.nan_to_num(given, posinf=0.0, neginf=0.0)
