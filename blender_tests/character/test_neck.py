@@ -363,7 +363,13 @@ def test_keys_of_a_joints_own_bone_fire_them(face):
 
 
 def _follow(rig, bone, by="parent"):
-    """Make the head's joint follow an object that follows a bone of the same armature."""
+    """Make the head's joint follow an object that the same armature moves.
+
+    Args:
+        rig: the deforming armature.
+        bone: name of the object's parent bone, or for a driver the index of a blend shape channel.
+        by: "parent" or "driver".
+    """
     target = bpy.data.objects.new("target", None)
     bpy.context.scene.collection.objects.link(target)
     if by == "parent":

@@ -91,7 +91,7 @@ def _paste_blenders(rig):
 
 
 def _asset(rig, operator):
-    """Call an operator like Blender's asset shelf."""
+    """Call an operator on an asset, with the properties that Blender's asset shelf would set."""
     bpy.ops.risorius.make_pose_assets()
     place = {"asset_library_type": "LOCAL", "relative_asset_identifier": "Action/Face Joy"}
     return operator("EXEC_DEFAULT", **place)

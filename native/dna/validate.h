@@ -32,7 +32,7 @@ struct Known {
   bool vertex_indices = false;
 };
 
-/// Like validate, but returns every error.
+/// Makes the checks of validate, and returns all errors and oddities, not only the first error.
 std::vector<Finding> find_all(const Dna& dna, Known known = {});
 
 /// The validate() above without the checks that `known` makes unnecessary.

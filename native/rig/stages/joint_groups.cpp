@@ -60,7 +60,7 @@ constexpr std::uint32_t kFewOfMany = 6;
 // to 295 columns of 80 rows. With float16, which halves the bytes of columns but not of sums,
 // listing is faster from 64 columns on. With AVX-512, which keeps the sums of a group in registers,
 // the quotient is 0.86 for one or two columns per group, 1.0 for 5, and 1.1 to 1.3 for 13 to 50.
-// In: seen  the frame before added the columns of the same controls
+// In: seen  whether the same controls were active in the previous frame, which added columns
 Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool seen, const Workspace& work) noexcept {
   const bool may_read_all = !rig.control_reads.empty();

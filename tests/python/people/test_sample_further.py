@@ -21,7 +21,9 @@ def man():
 
 @pytest.fixture(scope="module")
 def motions(man):
-    """Names of controls, and the motion of the vertices by each, float64[controls, V, 3]."""
+    """Names of controls, and the motion that each gives to vertices of the head's skin, teeth,
+    tongue and eyes, float64[controls, V, 3].
+    """
     kept = [v for name, v in man.groups.items() if name == "body" or "teeth" in name]
     kept += [v for name, v in man.groups.items() if "tongue" in name or "eye" in name]
     some = np.unique(np.concatenate(kept))

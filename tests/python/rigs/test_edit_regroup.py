@@ -55,9 +55,10 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, [x, y, z]), ...]}: factors of each joint's quaternion, in their order.
+    """{joint: [(control, x, y, z), ...]}: rotations whose product is the joint's quaternion.
 
-    The angles have the file's unit.
+    They are listed in the order of multiplication. x, y and z are the Euler angles if the control
+    is 1, in the file's unit.
     """
     out = {}
     for group in dna.joint_groups:

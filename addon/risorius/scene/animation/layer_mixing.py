@@ -277,7 +277,7 @@ def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
             continue
         if not fired:
             stack.problems["Reactions"] = told(
-                "only the first {count} reactions are shown", count=_MOST_FIRED
+                "only the first {count} reactions move the face", count=_MOST_FIRED
             )
 
 

@@ -93,7 +93,11 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
 
 
 def known(rig: ArmatureObject) -> Plan | None:
-    """The plan with which a face was last shown, or None. Args: rig  deforming armature."""
+    """The plan with which a face was last shown; None if it is unknown or hold_ordinary is active.
+
+    Args:
+        rig: deforming armature.
+    """
     kept = _kept.get(rig.session_uid)
     return kept.plan if kept is not None and rig.session_uid not in _ordinary else None
 
@@ -158,7 +162,8 @@ class _Edits:
     """The datablocks that an update reports as edited.
 
     Attributes:
-        told: number of the last write that the graph reported before.
+        told: number of the add-on's last write to a mesh that an earlier update of the same
+            dependency graph reported.
         meshes: session uids of characters' mesh objects that anyone but this add-on edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object outside all characters was edited.

@@ -26,7 +26,7 @@ TARGETS = (
 )
 RANGES = (
     ("EXTEND", "Extend", "Extend the scene to the end of the animation"),
-    ("FIT", "Fit", "Fit the scene to the animation"),
+    ("FIT", "Fit", "Set the start and end of the scene to those of the animation"),
     ("KEEP", "Keep", "Keep the range of the scene"),
 )
 _REPORT = "risorius_report"  # property of an action: the report of its import

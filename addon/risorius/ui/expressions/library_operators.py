@@ -160,7 +160,8 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
 
     label: bpy.props.StringProperty(
         name="Name",
-        description="Name of the expression; empty: the name in the panel, or else a number",
+        description="Name of the expression; empty: the field Name of the panel Expressions; if "
+        "that is empty too, the word Expression, with a number if needed",
         options={"SKIP_SAVE"},
     )
     group: bpy.props.StringProperty(

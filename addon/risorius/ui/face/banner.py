@@ -73,7 +73,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
 
 
 def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """Modes that change the view of the face, or link sliders."""
+    """Modes that change the view of the face, or link its left and right sliders."""
     look = look_masks.of(rig)
     if look.solo:
         swapped = as_seen(context)

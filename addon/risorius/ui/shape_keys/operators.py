@@ -229,7 +229,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Load assignments of shape keys from a file of this list or of the command risorius author"""
+    """Load the assignments from a file that Save Names or the command risorius author wrote"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"

@@ -91,8 +91,8 @@ def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
 
     Returns:
         A JointControl for each joint that has all four controls, in the order of the controls; and
-        a sentence for each rotation that a solver reads but whose control or joint is missing or
-        repeated.
+        a sentence for each rotation that an RBF solver, twist or swing reads, if one of its
+        controls or its joint is missing, or if one of its controls exists twice.
     """
     read = _read_by_solvers(dna)
     named: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))

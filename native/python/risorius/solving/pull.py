@@ -178,7 +178,9 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> Unkn
 def least_squares(
     drag: Drag, begin: Doubles, start: Doubles, smallest: float, rounds: int
 ) -> Doubles:
-    """Minimises distances and change by Gauss-Newton with halved steps.
+    """Minimises distances and change by Gauss-Newton.
+
+    If a step does not reduce the sum of both, half and then a quarter of the step is tried.
 
     Args:
         drag: equations of the drag.

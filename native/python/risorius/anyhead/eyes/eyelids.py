@@ -378,7 +378,14 @@ class Eyelids:
         return lacks
 
     def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """The points, moved out of the eye on rays from its centre."""
+        """The points, moved away from the eye's centre until the lids are clear of the eye.
+
+        Neighbours of such points are moved too, with a smooth fall-off.
+
+        Args:
+            points: float64[n, 3], the vertices of the lids in a pose.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
+        """
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]

@@ -56,7 +56,7 @@ class _Guess:
 
     @property
     def by(self) -> str:
-        """The source of the meaning, see Assignment.by."""
+        """The source of the meaning: a vocabulary, WORDS, PERSON (the user), or ""."""
         return {0: PERSON, 3: WORDS}.get(self.rank, self.vocabulary)
 
     @property
