@@ -51,7 +51,7 @@ Status check_options(const dna::Dna& dna, const RegroupOptions& o) {
        {o.threshold.translation_mm, o.threshold.rotation_degrees, o.threshold.scale}) {
     if (!(std::isfinite(v) && v >= 0.0)) {
       return fail(ErrorCode::kInvalidArgument, "threshold",
-                  "a number of 0 or more was expected, found " + std::to_string(v));
+                  "a number from 0 was expected, found " + std::to_string(v));
     }
   }
   if (!(o.foreign_share >= 0.0 && o.foreign_share <= 1.0)) {
