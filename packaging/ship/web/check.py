@@ -106,7 +106,7 @@ def poses(rig: risorius.Rig) -> list[tuple[int, list[float]]]:
 
 
 async def same_numbers(one: Browser, path: Path, page: Path, places: int = 0) -> str:
-    """Compare the page's outputs bit by bit with those of the package (scalar code, without SIMD).
+    """Check that the page computes the same bits as the Python package without SIMD.
 
     Args:
         one: the browser.

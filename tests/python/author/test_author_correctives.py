@@ -533,7 +533,7 @@ def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
-    """Equations that are summed from moments equal those of a matrix with 3 rows per vertex."""
+    """The normal equations from moments equal the ones from a matrix with 3 rows per vertex."""
     random = np.random.default_rng(7)
     joints, vertices = 9, 200
     turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]

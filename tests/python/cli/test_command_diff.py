@@ -119,9 +119,10 @@ for kind in ("twist", "swing"):
 
 
 def words_for(name):
-    """The pattern for a property: that of the longest entry of WORDS with which its name begins.
+    """The pattern that a difference of a property must match.
 
-    If there is none, the pattern is the last word of the name.
+    WORDS maps beginnings of property names to patterns; the longest matching beginning counts.
+    Without a match, the pattern is the last word of the name.
     """
     fitting = [key for key in WORDS if name == key or (name.startswith(key) and key in name)]
     if fitting:

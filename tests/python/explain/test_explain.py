@@ -94,7 +94,7 @@ def test_extra_full_scale():
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 def test_what_fires_is_what_the_oracle_says(file):
-    """Active correctives and maps equal those of an evaluator that shares no code with Risorius."""
+    """explain() lists the active correctives and maps that the tests' own evaluator computes."""
     dna = risorius.load(file)
     rig = risorius.Rig(dna)
     raw = some_controls(dna, rig, 1)

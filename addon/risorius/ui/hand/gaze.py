@@ -41,7 +41,7 @@ def proposed(context: Context) -> str:
 
 
 class RISORIUS_OT_gaze_target(FaceOperator, Operator):
-    """Choose what the target of the eyes follows: the head, nothing, or an object"""
+    """Choose what the target of the eyes follows: the head, the world or an object"""
 
     bl_idname = "risorius.gaze_target"
     bl_label = "Eyes Follow"
