@@ -244,6 +244,24 @@ def test_a_face_without_eyes_and_lips_stays_as_it_is(head, skin):
     assert out.report.rows == {}
 
 
+def test_lips_of_long_triangles_that_touch_have_no_gap():
+    """Only inner points of the sides lie on the line between the lips in most columns."""
+    x = np.arange(-3.2, 3.21, 0.8)
+    rows = [np.stack([x + shift, np.full(9, y), np.full(9, 8.0)], axis=1)
+            for y, shift in ((0, 0), (0.7, 0.4), (0, 0.3), (-0.7, -0.1))]  # fmt: skip
+    right = np.arange(8)
+    strips = [np.stack([[a, a + 1, b], [a + 1, b + 1, b]])[:, ::order].transpose(2, 0, 1)
+              for a, b, order in ((right, right + 9, 1), (right + 18, right + 27, -1))]  # fmt: skip
+    skin = Surface(np.concatenate(rows), np.concatenate(strips).reshape(-1, 3))
+    low = np.repeat([0.0, 1.0], 18)[:, None]
+    ways = {"jawOpen": low * [0, -1, 0], "mouthFunnelUL": np.full((36, 3), 0.2)}
+    lips = Lips(skin, ways, np.array([[-HALF, 0, 8], [HALF, 0, 8]]))
+    assert lips.found
+    assert np.abs(lips.rest.gap).max() < 0.01
+    apart = skin.points + 0.1 * low * [0, -1, 0]
+    assert lips.meeting(apart).gap == pytest.approx(0.1, abs=0.01)
+
+
 def test_lips_that_a_triangle_connects_are_counted_as_welded(head, skin):
     corners = np.stack([Corners.points[f"mouth_corner_{side}"] for side in "RL"])
     assert Lips(skin, head.ways, corners).welded() == 0
