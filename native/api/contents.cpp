@@ -53,7 +53,8 @@ risorius_status refuse_index(const char* argument, std::uint32_t found, std::siz
   });
 }
 
-// Null, with an error set, if the mesh does not exist.
+// Null, with an error set, if the face is null or the mesh does not exist. A mesh that was not read
+// is empty.
 const dna::Mesh* mesh_of(const risorius_face* face, std::uint32_t index) {
   if (face == nullptr) return (void)refuse("face", "a face was expected, found NULL"), nullptr;
   const std::size_t count = face->face->dna.definition.mesh_names.size();

@@ -13,7 +13,7 @@ namespace risorius::api {
 
 struct Face {
   rig::Rig rig;
-  dna::Dna dna;                  // without behavior
+  dna::Dna dna;                  // only descriptor, definition and geometry
   std::vector<bool> gui_writes;  // [raw controls]: whether the GUI table has a row for it
 };
 

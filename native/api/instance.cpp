@@ -34,8 +34,8 @@ struct risorius_instance {
   rig::Workspace work;
   rig::Pose pose;                       // settled
   std::optional<rig::Instance> latent;  // with a pose of its own
-  // Points to the pose of the most recent evaluation: `pose` after a settled evaluation, the pose
-  // inside `latent` after a latent one. Null before the first: values are then read from `pose`.
+  // The pose inside `latent` after its first evaluation. Null before, and always for a settled
+  // instance: values are then read from `pose`.
   const rig::Pose* evaluated = nullptr;
 };
 

@@ -238,9 +238,14 @@ RISORIUS_API risorius_status risorius_evaluate(risorius_instance* instance);
 
 /* Values of an instance: controls as set, all others from the last evaluation. Joints are deltas
  * added to neutral, float[joints, stride] (quaternions: multiplied with neutral); a scale of 0
- * means no scaling. Items that the LOD does not use are 0. In:  list   RISORIUS_RAW_CONTROLS to
- * RISORIUS_MAPS Out: count  number of floats; may be NULL Returns NULL and an error: unknown list.
- * An empty list is no error; do not read the pointer. */
+ * means no scaling. Items that the LOD does not use are 0.
+ *
+ * In:  list   RISORIUS_RAW_CONTROLS to RISORIUS_MAPS
+ *
+ * Out: count  number of floats; may be NULL
+ *
+ * The result is NULL, with an error, if the instance is NULL or the list is another one. An empty
+ * list is no error, but its pointer must not be read. */
 RISORIUS_API const float* risorius_values(const risorius_instance* instance, risorius_list list,
                                           uint32_t* count);
 

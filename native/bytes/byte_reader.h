@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A checked big-endian reader over a Source. Every error of a parser is made here or passes through
-// fail() here, so that it has an offset and a field.
+// A checked big-endian reader over a Source. Every error of a parser that reads bytes is made here
+// or passes through fail_at() here, so that it has an offset and a field.
 #pragma once
 
 #include <bit>
@@ -61,7 +61,8 @@ class ByteReader {
   std::uint16_t u16() { return number<std::uint16_t>(); }
   std::uint32_t u32() { return number<std::uint32_t>(); }
   float f32() { return std::bit_cast<float>(u32()); }
-  /// Reads the count of a list. It fails unless count * element_size bytes are left.
+  /// Reads the count of a list. It fails unless count * element_size bytes are left and the count
+  /// is within set_max_count().
   std::uint32_t count(std::uint32_t element_size) {
     if (ready_ - at_ >= 4) {
       const std::uint32_t n = load<std::uint32_t>(at_);
@@ -72,8 +73,8 @@ class ByteReader {
     }
     return count_slowly(element_size);
   }
-  /// The number at offset, if it lies between the present position and end(). Does not move the
-  /// position.
+  /// The number at offset, without moving the position. Nullopt if its two bytes do not lie between
+  /// the present position and end(), if they cannot be read, or after a failure.
   std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
   /// Reads a count, then that number of bytes of text.
   std::string str();

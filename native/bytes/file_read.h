@@ -23,13 +23,14 @@ enum class ReadBy {
   kCopy,
   /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short,
   /// the process crashes; if the file is written to, the bytes change. So use kMap only for files
-  /// that are replaced as a whole (write_file_atomically). Systems without maps make a copy.
+  /// that are replaced as a whole (write_file_atomically). The file is copied if it is empty, or if
+  /// the system has no maps or refuses one.
   kMap,
 };
 
 /// Reads a whole file.
-/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that becomes shorter
-///        while it is read)
+/// Fails: kIoOpen (the system's reason; a folder or another file that is not plain), kIoRead (the
+///        system's reason; a file that becomes shorter while it is read)
 core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
 }  // namespace risorius::bytes

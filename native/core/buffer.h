@@ -14,8 +14,8 @@
 namespace risorius::core {
 
 /// An array whose new elements have no defined value, so that its memory is only written when the
-/// array is filled. It becomes an Array without a copy. Growth uses std::realloc, which moves pages
-/// instead of bytes.
+/// array is filled. It becomes an Array without a copy. Growth uses std::realloc, which can move
+/// large arrays by pages without copying their bytes.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));

@@ -32,15 +32,15 @@ namespace detail {
 void drop_layer(std::string_view id, Dna& dna);
 
 /// Removes the unread controls from the control space and renumbers the others, so that the Dna can
-/// be written as a complete file. Everything that an unread control drives is removed, because it
-/// would remain 0: columns of joint groups, entries of channels and maps, and correctives with such
-/// a factor.
+/// be written as a complete file. Everything that an unread control drives is removed, because the
+/// control would remain 0: columns of joint groups, entries of channels and maps, and correctives
+/// with such a factor.
 /// Out: number of removed columns, entries and correctives
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-/// As forget_unread_controls, for any controls. The caller must then correct the numbers of raw,
-/// corrective, network and pose controls.
+/// As forget_unread_controls, for any controls. The caller must then correct the fields from which
+/// the sizes of the control space are computed, such as psd_count.
 /// In: keep  [controls] whether each control remains; true for all raw controls
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes a removed control)
 core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);

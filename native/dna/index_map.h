@@ -11,7 +11,8 @@
 
 namespace risorius::dna::detail {
 
-/// Maps old indices to new ones; removed elements map to kDropped.
+/// Maps the old indices of the elements that stay to their new indices. Call keeps() first:
+/// operator[] has no meaning for a removed element.
 class IndexMap {
  public:
   static constexpr std::uint32_t kDropped = 0xFFFFFFFF;

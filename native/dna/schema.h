@@ -9,6 +9,7 @@
 //                                   which elements a LOD needs, or is null
 //   faces(mesh), skin(mesh), targets(mesh)   lists that Dna keeps flat, or that a LOD may drop
 //   setups(name, list, twist)       lists of describe_setup
+//   matrix(name, joint group)       the values of a joint group; a reader may leave out rows
 #pragma once
 
 #include <type_traits>

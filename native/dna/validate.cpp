@@ -29,7 +29,7 @@ T largest(const Array<T>& values) {
   return top;
 }
 
-// Collects errors and oddities of a Dna, at most one finding for each list.
+// Collects errors and oddities of a Dna. Each check of a list gives at most one finding.
 class Checker {
  public:
   explicit Checker(detail::Known known) : known_(known) {}

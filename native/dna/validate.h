@@ -32,7 +32,9 @@ struct Known {
   bool vertex_indices = false;
 };
 
-/// Makes the checks of validate, and returns all errors and oddities, not only the first error.
+/// Makes the checks of validate, and returns the errors and oddities, not only the first error: at
+/// most 1,000, and for several equal faults in one list only the first with the number of the
+/// others.
 std::vector<Finding> find_all(const Dna& dna, Known known = {});
 
 /// The validate() above without the checks that `known` makes unnecessary.

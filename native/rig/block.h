@@ -30,7 +30,8 @@ struct LateValues {
 /// In:    data     the result of compile(); it is not checked
 ///        kernels  used in every evaluation; they must outlive the rig
 ///        late     writes joint_values if `data` does not have them
-/// Fails: kLimitExceeded (an array with more elements than an index can address)
+/// Fails: kLimitExceeded (an array with more elements than an index can address, or networks that
+///        need more scratch memory than detail::scratch_fits allows)
 core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
                            const LateValues& late = {});
 

@@ -37,7 +37,7 @@ inline PoseView view(Pose& pose) {
 
 /// The order in which an evaluation visits the columns of the joint groups.
 enum class Traversal : std::uint8_t {
-  kCounted,  // the order that costs least in the frame, by counted bytes
+  kCounted,  // chooses one of the others in each frame, by counted bytes and columns
   kListed,   // only active controls, whose columns are first listed by group
   kAdded,    // only active controls, in the order of memory; a batch of frames lists them instead
   kWhole     // all columns, in the order of group_columns, if all coefficients are finite
@@ -90,14 +90,15 @@ struct alignas(128) Workspace {
   // The traversal of the frame in which moves and blocks were computed; after kAdded, columns and
   // ends are not valid.
   Traversal listed = Traversal::kListed;
-  std::size_t whole_frames = 0;            // evaluations that read all columns
-  std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
-  std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
-  std::vector<std::uint8_t> moves;         // [groups]: 1 if a group has active columns
-  std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
-  core::AlignedVector<float> rows;         // the rows of all groups
-  core::AlignedVector<float> sums;         // the same, added column by column; 0 between calls
-  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
+  std::size_t whole_frames = 0;  // evaluations that read all columns
+  std::size_t added_frames = 0;  // evaluations that added columns in the order of memory
+  std::vector<std::uint32_t>
+      column_ends;                     // [groups]: end of its columns in columns or group_columns
+  std::vector<std::uint8_t> moves;     // [groups]: 1 if a group has active columns
+  std::vector<simd::Column> columns;   // the columns of active controls, as in group_columns
+  core::AlignedVector<float> rows;     // the rows of all groups
+  core::AlignedVector<float> sums;     // the same, added column by column; 0 between calls
+  std::vector<simd::Rows> group_rows;  // [LODs, groups]: the sums of each group
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count entries are valid

@@ -21,7 +21,7 @@ inline constexpr std::size_t kMostBlockFrames = 4096;
 inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
 
 /// How a block describes a curve: all zeros, one constant value, a repetition of an earlier curve,
-/// or a coded chunk. Neighbouring constant curves share an entry.
+/// or a coded chunk. Neighbouring curves with the same constant value share an entry.
 enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
 
 /// Curves [controls, frames]; the rows begin `stride` values apart.
@@ -42,7 +42,7 @@ void encode_curves(const BlockCurves& curves, Bytes& out);
 class EncodedCurves {
  public:
   /// Reads the table of parts. bytes must outlive the result.
-  /// Fails: kInvalidValue, kTruncated; the error's offset counts from the first of the bytes
+  /// Fails: kInvalidValue, kInvalidLength; the error's offset counts from the first of the bytes
   static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
 
   EncodedCurves(EncodedCurves&&) noexcept;
@@ -54,7 +54,8 @@ class EncodedCurves {
   /// Fails: kInvalidValue. In: controls of this block
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
-  /// Whether a control has one value in the whole block. Out: value  this value; set only if true
+  /// Whether the block describes the curve of a control as one constant value. False for all
+  /// controls of a kStoredBlock. Out: value  this value; set only if true
   bool is_resting(std::size_t control, float& value) const {
     if (parts_[control].kind != Part::kConstant) return false;
     value = std::bit_cast<float>(parts_[control].bits);

@@ -11,9 +11,9 @@
 
 namespace risorius::clip {
 
-/// Writes each block of frames to PATH.part as soon as the block is full. close() renames this file
-/// to PATH when its bytes are on the disk. A writer that is not closed leaves the .part file, which
-/// Reader opens with Ends::kMayBeCut.
+/// Writes each block of frames to PATH.part as soon as the block is full, or to PATH.2.part and so
+/// on if this file exists. close() renames this file to PATH when its bytes are on the disk. A
+/// writer that is not closed leaves the .part file, which Reader opens with Ends::kMayBeCut.
 class FileWriter {
  public:
   /// Opens the .part file.
@@ -26,7 +26,7 @@ class FileWriter {
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { encoder_.add(std::move(event)); }
   /// Writes the remaining frames and the index, and renames the file to PATH, replacing an existing
-  /// file. Fails: kIoWrite. After a failure, here or in append, PATH is unchanged, the written
+  /// file. Fails: kIoWrite. After a failed write, here or in append, PATH is unchanged, the written
   /// bytes remain in part(), and every later call fails with the same error.
   core::Status close();
 

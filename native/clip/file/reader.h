@@ -29,7 +29,8 @@ enum class Ends { kMustBeWhole, kMayBeCut };
 class Reader {
  public:
   /// Reads the head and the index, but no curve.
-  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
+  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kInvalidCount,
+  ///        kInvalidLength, kLimitExceeded.
   static core::Result<Reader> open(std::unique_ptr<bytes::Source> source,
                                    Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
@@ -46,16 +47,16 @@ class Reader {
   core::Status may_read(std::uint64_t begin, std::uint64_t end,
                         std::span<const std::uint32_t> controls) const;
 
-  /// Writes the curves of controls to out [controls.size(), end - begin], and the times to
-  /// out_times [end - begin] unless it is null. The last block that was read stays in
-  /// memory for the next call.
+  /// Writes the curves of controls to out [controls.size(), end - begin], and the times in seconds
+  /// to out_times [end - begin], unless it is null or the clip has no times of its own. The last
+  /// block that was read stays in memory for the next call.
   /// In: begin <= end <= frame_count(), valid controls
-  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead
+  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kInvalidLength, kTruncated
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
                     float* out, double* out_times);
 
-  /// Writes the values of the controls that are constant in a block to `values` [controls], and
-  /// appends the numbers of the other controls to `moving`. Fails: as read.
+  /// Writes the values of the controls that a block describes as constant to `values` [controls],
+  /// and appends the numbers of the other controls to `moving`. Fails: as read.
   core::Status resting(std::size_t block, std::span<float> values,
                        std::vector<std::uint32_t>& moving);
 

@@ -92,9 +92,10 @@ class LayerCurves {
 
 /// A layer: its curves, their timing and their weight. Times are in seconds of the scene, clip
 /// times in seconds of the clip. Without a warp the clip's part [first, last] begins at start,
-/// lasts (last - first) * scale and is played repeat times; end is derived. With a warp the layer
-/// lasts from start to end; scale, repeat and reverse are ignored, and a descending warp plays
-/// backwards. A single frame is held from start to end, which by default is at all times.
+/// lasts (last - first) * scale and is played repeat times; end is derived. With a warp, start and
+/// end become its first and last scene time; first, last, scale, repeat and reverse are ignored,
+/// and a descending warp plays backwards. A single frame is held from start to end, which by
+/// default is at all times.
 struct Layer {
   static constexpr double kAlways = std::numeric_limits<double>::infinity();
 
@@ -145,9 +146,9 @@ struct Opposites {
 ///    first + o / scale, reversed last - o / scale, where o = (t - start) mod ((last - first) *
 ///    scale); at the end of a whole number of repeats it is the end of the clip, not its start.
 ///    Between frames v = a + (b - a) * part, and m = mask * w; see Blend.
-/// 3. Each reaction in the order of set_reactions, each part with envelope e:
-///    r = strength * e * weight; out += (peak - out) * r if out < peak = min(high, 1). That is
-///    1 - (1 - out) * (1 - r), also for a control that may be driven beyond 1.
+/// 3. Each fired reaction in the order of its storage place (not of set_reactions), each part with
+///    envelope e: r = strength * e * weight; out += (peak - out) * r if out < peak = min(high, 1).
+///    That is 1 - (1 - out) * (1 - r), also for a control that may be driven beyond 1.
 /// 4. Yields: all s are computed before any control is reduced. Then opposites:
 ///    c = min(a, b); if c > 0: a -= c, b -= c.
 /// 5. Clamped to the range; NaN becomes its lower end.

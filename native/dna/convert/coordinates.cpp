@@ -272,7 +272,8 @@ bool cuts_rotation(const JointGroup& g) {
   return false;
 }
 
-// The axes about which a joint rotates, and the groups that rotate it.
+// The axes about which a joint rotates, and its joint groups: whether any group rotates the joint
+// (driven), whether several do (split), and the last that does (group).
 struct Turns {
   bool driven = false, split = false;
   std::size_t group = 0;
@@ -388,7 +389,8 @@ void convert_control_rotations(const Conversion& c, Dna& dna) {
 }
 
 // Warns if correctives, joint groups, channels, maps or networks read single components of a
-// quaternion, because no change of basis preserves them.
+// quaternion, because no change of basis preserves them. Only the w is recognised, by its name (*.w
+// or *.qw).
 void warn_of_components(const Dna& dna, Warnings& warnings) {
   const auto check = [&](const char* where, const auto& controls) {
     for (const auto control : controls) {

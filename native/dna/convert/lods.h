@@ -28,21 +28,22 @@ struct LodSelection {
 /// keeps the numbers of channels, maps and networks). Joints that LOD 0 does not list are kept, as
 /// in the reference library, and so are the ancestors of every kept joint, so that no joint moves.
 /// A selection of all LODs changes nothing.
-/// Fails: kInvalidArgument (the file has none of the selected LODs), kInvalidIndex
+/// Fails: kInvalidArgument (the file has none of the selected LODs), kInvalidIndex, and as validate
 core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection);
 
-/// A copy without channels that no LOD uses or whose controls no loaded layer provides.
+/// A copy without the blend shape channels that no LOD lists, and without the channels driven by a
+/// network or pose control whose layer was not loaded. Fails: as validate
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna);
 
 /// A copy without some joints and correctives, with renumbered indices. A removed joint loses its
-/// rows of joint groups and its weights (the other joints of a vertex grow to the same sum). A
-/// removed corrective loses its columns, its entries of maps, and the channels that nothing else
-/// drives.
+/// rows of joint groups and its skin weights (the other weights of a vertex grow as in
+/// cut_influences). A removed corrective loses its columns, its entries of maps, and the channels
+/// that nothing else drives.
 /// In: joints       [joints] whether each is kept; a kept joint needs a kept parent
 ///     correctives  [correctives] whether each is kept. A corrective that a network, a pose or a
 ///                  setup reads must be kept; correctives with a removed factor are removed too
 /// Fails: kInvalidLength, kInvalidArgument (a joint without its parent, a removed corrective that
-///        is read), kInvalidIndex, and as validate
+///        is read, a file without LODs), kInvalidIndex, and as validate
 core::Result<Dna> keep_parts(const Dna& dna, const std::vector<bool>& joints,
                              const std::vector<bool>& correctives);
 
@@ -55,8 +56,8 @@ struct LodPlan {
   std::uint16_t root = 0;
 };
 
-/// The plan of a selection; nullopt if it keeps every LOD. In: definition  one that validate
-/// accepts
+/// The plan of a selection; nullopt if it keeps every LOD. Fails: kInvalidArgument (the file has
+/// none of the selected LODs). In: definition  one that validate accepts
 core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
                                                const Definition& definition,
                                                const LodSelection& selection);
@@ -69,11 +70,12 @@ void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehavio
                                 std::vector<bool>& keep);
 
 /// Reduces a joint group's lods and output_indices to the plan.
-/// Out: number of leading rows that the finest kept LOD uses; the caller cuts the values
+/// Out: the largest number of leading rows that a kept LOD uses; the caller cuts the values
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
 
-/// Renumbers a vertex's joints. Influences of dropped joints are removed, and the other weights
-/// grow to the same sum.
+/// Renumbers a vertex's joints. Influences of dropped joints are removed, and the other weights are
+/// divided by 1 - removed weight, so that a sum of 1 stays 1. A vertex that loses all its
+/// influences gets the weight 1 for plan.root.
 /// In: joints  [n] below the number of joints of the file
 /// Out: number of influences left; finite is set to false if a weight overflowed
 std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* joints,

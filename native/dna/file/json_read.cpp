@@ -366,7 +366,7 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   Result<Json> json = detail::parse_document(text, limits);
   if (!json) return std::move(json).propagate();
   Dna dna;
-  dna.descriptor.coordinate_system = {0, 0, 0};  // a file without this layer has these values
+  dna.descriptor.coordinate_system = {0, 0, 0};  // the values of a text without the layer desc
   Reader r(limits);
   r.object(*json, [&] { read_layers(r, dna); });
   if (r.failed()) return r.take_error();

@@ -456,8 +456,8 @@ std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   for (const Warning& w : dna->warnings) {
     findings.push_back({false, {ErrorCode::kInvalidValue, w.offset, w.where, w.message}});
   }
-  // If a layer could not be read it is empty, and errors about indices into it would only repeat
-  // that error.
+  // If a layer could not be read it is empty or incomplete, and errors about indices into it would
+  // only repeat that error.
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;

@@ -42,12 +42,15 @@ struct ParseOptions {
 /// 2.8; newer minors by the rules of 2.8).
 /// Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength,
 ///        kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead, kInvalidArgument (LODs that do not
-///        exist), each with the field and, except for the last, the byte offset
+///        exist), each with the field. The byte offset is missing in kInvalidArgument, and in
+///        errors of validate if LODs were selected, because indices then count only kept elements
 /// Cost: allocates at most a small constant times the file's size
 core::Result<Dna> parse(bytes::Source& source, const ParseOptions& options = {});
 
-/// All errors and oddities of a file, in the order of the file, each with field and byte offset. A
-/// layer that cannot be read does not hide errors of the others.
+/// Errors and oddities of a file, in the order of the file, each with the field and, if known, the
+/// byte offset (unknown ones are last). After a layer that cannot be read the other layers are read
+/// nevertheless; but then errors of indices and of lengths of lists are left out, because they
+/// might only follow from the missing layer.
 std::vector<Finding> check(bytes::Source& source, const Limits& limits = {});
 
 }  // namespace risorius::dna

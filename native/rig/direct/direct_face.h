@@ -19,7 +19,7 @@
 namespace risorius::rig {
 
 /// The parts of a face. The armature may have more bones than the rig moves. These other bones have
-/// the transforms of the last call of `keep`.
+/// the transforms of the last call of `keep`; before the first call they stay in their rest pose.
 struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
@@ -128,7 +128,8 @@ class DirectFace {
 /// threads.
 /// In:  faces    no face twice
 ///      frames   one for each face; their outputs may not overlap
-///      threads  number of threads; 0: one for each kWorthAThread vertices, at most one per core
+///      threads  number of threads, at most 64; 0: one for each 8,192 vertices of the targets, at
+///               most one per core
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads);
 

@@ -25,7 +25,7 @@ struct Skin {
     std::size_t influence = 0;
   };
   std::uint32_t vertex_count = 0, bone_count = 0;
-  std::vector<simd::SkinRun> runs;  // of each block, by ascending fours
+  std::vector<simd::SkinRun> runs;  // of each block, by ascending number of influences
   std::vector<Block> blocks;        // one for each block, and one behind the last
   // The vertices of each run, relative to the first vertex of their block.
   std::vector<std::uint16_t> vertices;

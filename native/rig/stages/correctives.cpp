@@ -159,8 +159,9 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
-// Calls touch(), unless the evaluation before had the same active controls. Then its lists are used
-// again; they list the columns in one run of memory, so that touch() is not needed.
+// Calls touch(), unless the cache is warm (work.warm) or the evaluation before had the same active
+// controls. In the second case its lists are used again; they list the columns in one run of
+// memory, so that touch() is not needed.
 // Out: whether the evaluation before had the same active controls
 bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
            Workspace& work) noexcept {

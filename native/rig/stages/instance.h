@@ -35,7 +35,7 @@ class Instance {
   bool at_rest_ = false;  // the pose belongs to the raw controls and would not change
   Workspace work_;
   Pose pose_;
-  std::vector<float> before_;  // the controls of the frame before
+  std::vector<float> before_;  // the controls when an evaluation begins: new raw ones, old others
 };
 
 }  // namespace risorius::rig
