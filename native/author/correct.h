@@ -38,7 +38,7 @@ struct SkinPose {
 
 /// The faults of a pose. To merge the faults of two poses, take the worse value of each entry.
 struct SkinFaults {
-  std::vector<float> depth;    // [V] mm inside a solid or the skin itself; 0: outside
+  std::vector<float> depth;    // [V] mm inside a solid or the skin itself; 0: outside or not shown
   std::vector<float> stretch;  // [F] area divided by the neutral area
   std::vector<float> fold;     // [inner edges] cosine between the normals of the two faces
 };
@@ -80,7 +80,8 @@ class SkinChecker {
   /// The nearest points of the neutral skin.
   /// In: points   in the skin's unit
   ///     normals  of the points: only triangles with a similar normal are searched, so that the
-  ///              upper lip is not mistaken for the lower one; empty: all triangles are searched
+  ///              upper lip is not mistaken for the lower one; all triangles are searched if none
+  ///              has a similar normal, or if `normals` is empty
   /// Fails: kInvalidValue (not finite), kInvalidLength (normals)
   core::Result<std::vector<Place>> nearest(const std::vector<Vector3>& points,
                                            const std::vector<Vector3>& normals = {}) const;

@@ -104,10 +104,10 @@ inline constexpr std::uint32_t kInTheMiddle = 0xffffffffu;
 
 /// Weights of another mesh, such as a coarser level of detail, on joints with given motions.
 /// In: joints   with their motions in each expression of the shapes
-///     options  influences, smoothness, threads
+///     options  influences, smoothness, symmetric and threads are used
 ///     start    initial weights, such as the finer mesh's; empty: all weight is on a joint that
 ///              does not move
-/// Out: a Fit with the given joints alone
+/// Out: a Fit with these joints; if all of them move, a joint without motion follows them
 /// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (start)
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,
                               const FitOptions& options, const StartWeights& start = {});

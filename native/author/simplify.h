@@ -31,8 +31,9 @@ struct Simplified {
 
 /// A surface with at most `triangles` triangles if possible. Edges are collapsed where that changes
 /// the surface least; corners are never moved. Seams and borders are preserved, so that the result
-/// may have more triangles. The common edge of two flat triangles is flipped if one of them is a
-/// sliver.
+/// may have more triangles. The common edge of two triangles that lie in nearly one plane is
+/// flipped if one of them is a sliver. A surface that already has at most `triangles` triangles is
+/// returned unchanged.
 /// Fails: kInvalidLength (attributes), kInvalidIndex (a triangle's corner),
 ///        kInvalidValue (a number that is not finite), kInvalidArgument (more than 32 attributes)
 /// Source: Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997), as

@@ -217,7 +217,7 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
   const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
-  } else {  // needs a new workspace, because a kept one has the controls of an earlier frame
+  } else {  // a new workspace, so that no value of an earlier frame takes part
     rig::Workspace work = rig::make_workspace(rig);
     rig::evaluate(rig, in.data(), lod, false, work, pose);
   }

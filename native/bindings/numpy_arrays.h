@@ -20,7 +20,7 @@ namespace py = pybind11;
 
 /// Raises an error as a Python exception.
 /// In: file  the file that the error is about, or ""
-///     type  the exception class; nullptr: the class that belongs to the error's code
+///     type  the exception class; nullptr: risorius.DnaError
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
 /// Makes an error class derived from risorius.base.errors.RisoriusError. The caller must never
 /// release it.

@@ -145,8 +145,8 @@ bool is_quaternion_w(std::string_view name) {
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// The initial values of controls: 1 for the w of each quaternion that solvers, setups and networks
-// read or write, 0 for all others.
+// The initial values of controls: 1 for raw controls named *.w or *.qw that solvers or twist and
+// swing setups read, and for controls of networks with such names; 0 for all others.
 void compile_initial_controls(const dna::Dna& dna, RigData& out) {
   out.initial_controls.assign(out.control_count, 0.0f);
   const auto& names = dna.definition.raw_control_names;

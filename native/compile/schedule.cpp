@@ -292,7 +292,8 @@ Early find_early(const Graph& g) {
 }
 
 // The watcher of each corrective: the factor whose value decides whether the corrective is
-// evaluated. kNone if a factor may change after the watchers are read.
+// evaluated. kNone if a factor may change after the watchers are read, if there is no factor, or if
+// the corrective writes a raw control.
 std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {

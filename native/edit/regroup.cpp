@@ -87,7 +87,8 @@ std::vector<std::vector<std::uint16_t>> list_regions(const detail::Regions& regi
 }
 
 // Finds regions by significant coefficients and removes the small coefficients foreign to them.
-// Repeats this until none is removed, so that a second regroup changes nothing.
+// Repeats this until none is removed, so that a second regroup changes nothing, but at most
+// kMostPasses times.
 detail::Regions settle(const dna::Dna& dna, const RegroupOptions& options,
                        std::vector<detail::Unit>& units, std::uint64_t& removed) {
   const detail::Effects effects(dna, options.threshold);

@@ -26,7 +26,7 @@ struct Unit {
   std::uint32_t joint = 0;
   // Whether the joint is a quaternion joint. None of its coefficients counts as small.
   bool is_quaternion = false;
-  std::uint32_t layer = 0;  // number of units in later groups that write the same rows
+  std::uint32_t layer = 0;  // number of later units that write the same rows
   std::uint32_t chain = 0;  // units of one chain have LODs that nest in each other
   std::uint32_t order = kAnyOrder;
   // Units of one bundle form a group without other units; 0: no bundle. If rotation rows of a
@@ -68,9 +68,9 @@ class Effects {
   bool nothing_is_small_;
 };
 
-/// [controls] true for correctives that are read by something other than joint groups, channels and
-/// maps. If no LOD used such a corrective, evaluation would leave it at 0, and its readers would
-/// change.
+/// [controls] true for correctives that other correctives, networks, solvers, their poses, or twist
+/// and swing setups read. If no LOD used such a corrective, evaluation would leave it at 0, and its
+/// readers would change.
 std::vector<bool> watched_correctives(const dna::Dna& dna);
 
 /// The value in Regions::of_joint for a joint that no unit moves; other values are region numbers.
@@ -90,10 +90,12 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);
 
-/// Removes rows that are all 0 from joints that have another row. Call it after find_layers.
+/// Removes rows that are all 0 from joints that have another row, unless the joint is a quaternion
+/// joint or several of its units write one row. Call it after find_layers.
 void remove_zero_rows(std::vector<Unit>& units);
 
-/// Fails: kLimitExceeded
+/// Builds the dense joint groups of all regions from the units. Fails: kLimitExceeded (a group that
+/// does not fit the format)
 core::Result<std::vector<dna::JointGroup>> build_groups(const dna::Dna& dna,
                                                         const std::vector<Unit>& units,
                                                         const Regions& regions);

@@ -50,7 +50,7 @@ class ClosestPoints {
   core::Result<std::vector<Hit>> nearest(const std::vector<Vector3>& queries,
                                          const std::vector<Vector3>& normals, Limits limits) const;
   /// The first point at which each ray meets the surface, from outside or inside. `distance` is in
-  /// the unit of the points.
+  /// the unit of the points. Of the limits, least_cosine is ignored.
   /// Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
   ///        direction)
   core::Result<std::vector<Hit>> first_hit(const std::vector<Vector3>& origins,

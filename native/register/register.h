@@ -50,8 +50,8 @@ struct RegisterOptions {
   std::vector<std::uint8_t> trusted;
   /// [template vertices] the mirror vertex, in the middle the vertex itself; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  /// Each vertex also gets its mirror vertex's match, reflected, with this factor of its weight; 0:
-  /// no symmetry.
+  /// In the coarse steps, each vertex also gets its mirror vertex's match, reflected, with this
+  /// factor of its weight; 0: no symmetry.
   double symmetry = 0.0;
   std::size_t nodes = 2000;  // number of nodes of the coarse steps
   double noise = 2.0;        // expected error of the points of pairs in mm
@@ -59,11 +59,11 @@ struct RegisterOptions {
 };
 
 struct Registered {
-  std::vector<Vector3> points;         // [template vertices] positions on the target
+  std::vector<Vector3> points;         // [template vertices] final positions, in the target's unit
   std::vector<std::int32_t> triangle;  // [template vertices] nearest target triangle; -1: none
   std::vector<Vector3> shares;         // barycentric coordinates in the triangle, sum 1
   std::vector<double> distance;        // from the triangle, in the target's unit
-  std::vector<std::uint8_t> trusted;   // not 0: the vertex has a counterpart on the target
+  std::vector<std::uint8_t> trusted;   // not 0: has a counterpart, within 0.5 mm of the target
 };
 
 /// Called with the share of the work that is done, 0 to 1; returning false stops the work.

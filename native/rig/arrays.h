@@ -100,9 +100,10 @@ struct QuaternionJoint {
   std::uint32_t first_row = 0;
 };
 
-/// A column that rotates joints by quaternions. The columns are ordered by group, and within a
-/// group as in the file. The rotations are multiplied in this order, each from the left, because
-/// quaternions do not commute.
+/// A column that rotates joints by quaternions. The columns are ordered by group as in the file,
+/// and within a group as the reference evaluator stores them, see quaternion_column_order() of the
+/// compiler. The rotations are multiplied in this order, each from the left, because quaternions do
+/// not commute.
 struct QuaternionColumn {
   std::uint32_t control = 0;
   std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
@@ -315,7 +316,7 @@ struct RigArrays {
   // [LODs, controls + 1]: one entry for each control; the last entry is for all controls together.
   // Empty if a coefficient is not finite, because columns of controls at 0 must not be read then.
   A<ControlReads> control_reads;
-  A<std::uint16_t> joints_written;  // joints that any group moves at any LOD, ascending
+  A<std::uint16_t> joints_written;  // joints that anything moves at any LOD, ascending
 
   // Joints that are rotated by quaternions, and the columns and terms of these rotations.
   A<QuaternionJoint> quaternion_joints;

@@ -92,13 +92,13 @@ struct alignas(128) Workspace {
   Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;  // evaluations that read all columns
   std::size_t added_frames = 0;  // evaluations that added columns in the order of memory
-  std::vector<std::uint32_t>
-      column_ends;                     // [groups]: end of its columns in columns or group_columns
-  std::vector<std::uint8_t> moves;     // [groups]: 1 if a group has active columns
-  std::vector<simd::Column> columns;   // the columns of active controls, as in group_columns
-  core::AlignedVector<float> rows;     // the rows of all groups
-  core::AlignedVector<float> sums;     // the same, added column by column; 0 between calls
-  std::vector<simd::Rows> group_rows;  // [LODs, groups]: the sums of each group
+  // [groups]: where the columns of the group end in columns, or in group_columns after kWhole.
+  std::vector<std::uint32_t> column_ends;
+  std::vector<std::uint8_t> moves;         // [groups]: 1 if a group has active columns
+  std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
+  core::AlignedVector<float> rows;         // the rows of all groups
+  core::AlignedVector<float> sums;         // the same, added column by column; 0 between calls
+  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count entries are valid

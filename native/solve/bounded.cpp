@@ -123,8 +123,9 @@ struct Descent {
     }
     return largest;
   }
-  /// A Newton step in the free coordinates: coordinates strictly between their bounds and different
-  /// from `rest`. The step is shortened so that no coordinate crosses a bound or its `rest` value.
+  /// A Newton step in the free coordinates: coordinates strictly between their bounds, except those
+  /// at `rest` with a sparse cost. The step is shortened so that no coordinate crosses a bound, or
+  /// its `rest` value if it has a sparse cost.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {

@@ -33,7 +33,8 @@ struct Quadratic {
 /// Minimises the function by coordinate descent, with Newton steps in the coordinates that are not
 /// at a bound.
 /// In:  x          [count], a start between the bounds
-///      tolerance  the descent ends when no coordinate changes by more
+///      tolerance  the descent ends when no coordinate changes by more in a pass over all, or after
+///                 60 rounds
 /// Out: x          the minimum
 void descend(const Quadratic& q, double tolerance, double* x);
 

@@ -28,8 +28,8 @@ constexpr std::size_t kRoundsOfMotions = 8;  // Gauss-Newton steps
 // other joints take over before more joints leave.
 constexpr double kThinning[] = {0.5, 1.0};
 /// In the last rounds, joints are placed at their pivots and momentum is 0, so that its overshoot
-/// is corrected. In earlier rounds a joint is in the middle of its vertices, because a rotation
-/// about a far pivot is solved less exactly.
+/// is corrected. In earlier rounds a joint is in the middle of its vertices (with `bound` only in
+/// the first half of the rounds), because a rotation about a far pivot is solved less exactly.
 constexpr std::size_t kLastRounds = 4;
 constexpr double kMomentum = 0.6;
 /// How many of the nearest joints a vertex tries when joints cannot move. The joints it needs may

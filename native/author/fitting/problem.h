@@ -86,7 +86,7 @@ void solve_weights(const Problem& problem, State& state);
 /// In: left  the residual of find_residual
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
 /// Removes each joint for good from the expressions in which it moves every vertex by less than
-/// `least`.
+/// `least`. Given joints stay; a joint and its mirror leave an expression together.
 void leave_expressions(const Problem& problem, State& state, double least);
 /// Computes the displacements that the joints do not reproduce.
 /// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
@@ -94,8 +94,9 @@ void find_residual(const Problem& problem, const State& state, std::vector<float
 /// Adds joints where the present ones leave the largest error, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);
-/// Moves the neutral position of each joint to the middle of its vertices, or to the pivot of the
-/// expressions in which it mostly moves. Given joints do not move.
+/// Moves the neutral position of each joint to the middle of its vertices, or, if
+/// problem.to_pivots, to the pivot of the expressions in which it mostly moves. Given joints do not
+/// move.
 void move_joints(const Problem& problem, State& state);
 
 void rest(Joint& joint, std::size_t expressions);

@@ -61,8 +61,10 @@ class Matcher {
   /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
   /// [V] matches with the closest points of the target.
-  /// In: farthest  mm, largest distance of a match
-  ///     robust    mm, distance at which the weight of a match is a quarter
+  /// In: farthest      mm, largest distance of a match
+  ///     least_cosine  between the normals of a vertex and of its triangle
+  ///     robust        mm, distance at which the weight of a match is a quarter
+  ///     along         weight of a match along the surface, against 1 across it
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

@@ -22,7 +22,8 @@ class Rims {
   explicit Rims(const Form& target, const std::vector<std::uint8_t>& borders);
 
   /// Matches border vertices of the template with borders of the target that have a similar length
-  /// and outward direction. Such a match has little weight along the border.
+  /// and outward direction. Such a match has little weight along the border and along the normal of
+  /// the surface.
   /// In: points, normals  [V] current vertices of the template
   ///     farthest         mm, largest distance of a match; a different outward direction adds to
   ///                      the distance

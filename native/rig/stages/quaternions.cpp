@@ -62,8 +62,8 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
                            rig.joint_stride);
 }
 
-// Rotates the quaternion joints: multiplies the rotations of the active columns in the order of the
-// file, each from the left.
+// Rotates the quaternion joints: multiplies the rotations of the active columns in the order of
+// quaternion_columns, each from the left.
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept {
   if (rig.quaternion_joints.empty()) return;

@@ -33,7 +33,8 @@ double rbf_kernel(std::uint32_t function, double distance, double radius) noexce
 ///      controls  float32[controls] of an evaluated pose
 ///      work      of make_workspace
 /// Out: distances, weights  [poses of the solver]: distances of rotations are in radians; weights
-///                          as the solver writes them, 0 if not above the threshold
+///                          without the factors of the input and output controls of a pose, 0 if
+///                          not above the threshold
 void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
                   double* distances, float* weights) noexcept;
 
