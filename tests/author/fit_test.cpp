@@ -417,7 +417,7 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   auto own = fit_joints(other, options);  // joints and weights fitted to this sheet
   ASSERT_TRUE(own);
   EXPECT_LT(largest_error(other, *there), 3.0 * largest_error(other, *own));
-  for (std::size_t j = 1; j < 9; ++j) {  // at the mean of its vertices, weighted by squared motion
+  for (std::size_t j = 1; j < 9; ++j) {  // at the mean of its vertices, weighted by squared weight
     Vector3 sum{};
     double total = 0.0;
     for (std::size_t v = 0; v < other.vertex_count(); ++v) {

@@ -48,7 +48,7 @@ TEST(Mirror, ThereIsNoneWhereAVertexHasNoOtherSide) {
 
 TEST(Mirror, ThereIsNoneWhereTwoVerticesHaveTheSameOtherSide) {
   Shapes shapes = kite(0);
-  shapes.neutral.push_back({1, 1.0001, 0.5});  // as near to the mirrored vertex 3 as vertex 1 is
+  shapes.neutral.push_back({1, 1.0001, 0.5});  // in reach of the mirrored vertex 3, like vertex 1
   shapes.edges.push_back({0, 4});
   shapes.edges.push_back({4, 2});
   EXPECT_TRUE(find_mirror(shapes).empty());

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Measures clips in .rzc files: clip_bench FILE.rzc ... [--dna FILE.dna] [options of the library]
 //   encode, decode     GB/s of curve data, one core, from memory to memory
-//   one frame          a random frame of all controls; its whole block is read and decoded
+//   one frame          a frame of all controls in another block than the frame before; its whole
+//                    block is read and decoded
 //   play               frame by frame; each block is read and decoded when it is reached; per frame
 //   play, decoded      like play, but all frames are in one decoded block
 //   evaluate           evaluation of the rig of --dna with these frames, for comparison; per frame

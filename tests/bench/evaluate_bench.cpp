@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Measures one evaluation: evaluate_bench FILE.dna [Google Benchmark's options]. A fraction of the
-// raw controls is active; the active controls change slightly from frame to frame.
+// raw controls is active; each frame has other active controls and other values.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

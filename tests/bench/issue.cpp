@@ -50,7 +50,8 @@ std::uint64_t four_bones(const Data& d, std::size_t i) {
   return four;
 }
 
-// Each of the following functions has as many independent sums as fit into the registers.
+// Each of the following functions has several independent sums in registers, so that no addition
+// waits for the one before.
 
 #ifdef RISORIUS_WIDE
 

@@ -460,8 +460,8 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
   // 60 and 100 are first, because in captured animations 60 to 100 raw controls move.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // For small faces only the rows with 20 and 60 controls are measured, with which other rows are
-    // compared.
+    // Rows with at least as many active controls as the face has are left out, except 20 and 60,
+    // with which other rows are compared.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr
                        : active == 20   ? files[0]

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // make_seeds FOLDER FILE.dna ...: writes the first inputs of each fuzz target to FOLDER/<target>:
-// generated faces of every version, and the given files if they are small.
+// generated faces of every version, clips and packed buffers, and the given files if they are
+// small.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -23,7 +24,7 @@ using risorius::promises::Bytes;
 namespace dna = risorius::dna;
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
+constexpr std::size_t kLargestSeed = 4400;  // bytes; larger seeds make every run slow
 constexpr std::size_t kLargestBomb = 8000;
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
@@ -148,8 +149,8 @@ Bytes written(const dna::Dna& face, std::uint16_t minor) {
   return *dna::write(face, {minor, false}, warnings);
 }
 
-// Adds seeds with a single layer, or with a layer and the layer that it extends, because small
-// inputs are tried most often.
+// Adds a seed for each layer: the layers desc and defn, this layer, and the layer that it extends
+// if there is one. Small inputs are useful because fuzzers try them most often.
 void add_parts(Seeds& seeds) {
   const dna::Dna face = risorius::testing_support::make_full_face();
   for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {

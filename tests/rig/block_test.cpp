@@ -225,8 +225,8 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
-// Kernels add whole vectors to the rows of wide groups, so that a vector must not contain rows of
-// another group.
+// Kernels add whole vectors to the rows of groups with many rows, so that such a vector must not
+// contain rows of another group.
 TEST(Block, LongGroupsHaveWholeVectorsToThemselves) {
   constexpr std::uint16_t kLong = 18;
   std::vector<std::uint16_t> outputs(kLong);

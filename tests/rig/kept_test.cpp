@@ -54,8 +54,9 @@ void add_maps(dna::Dna& dna) {
   table.cut_values = std::move(cut);
 }
 
-// A face with correctives of two to four raw controls, and joint groups that all controls drive.
-// The values are random, the sizes are fixed.
+// A face with correctives of two to four raw controls, and joint groups that list all controls. The
+// values and the factors of the correctives are random. Of the sizes, only the number of channels
+// depends on the seed.
 dna::Dna correcting_face(std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);

@@ -27,9 +27,9 @@ Copy copy(std::span<const std::uint8_t> block) {
   return {owner, {owner.get(), block.size()}};
 }
 
-// Limit of heap memory: kTimesTheBlock times the block's size, plus kBeside bytes. The limit is far
-// below the limit for forged blocks, because compile makes only rigs whose scratch memory is as
-// long as lists in their blocks.
+// Limits of heap memory. Opening a block takes at most its size plus kBeside bytes. Two workspaces
+// and a pose take at most kTimesTheBlock times its size plus kBeside bytes; forged blocks may take
+// far more, because only in rigs of compile is scratch memory as long as lists in the block.
 constexpr std::size_t kTimesTheBlock = 4, kBeside = 16 * 1024;
 
 class RigMemory : public testing::TestWithParam<Bomb> {};

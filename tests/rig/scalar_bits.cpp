@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Prints a hash of all linear results of the scalar path for generated rigs.
-// packaging/check/cross.sh compiles this program and the evaluator in several ways and demands one
-// hash.
+// Prints a hash of the raw controls, poses and skinned vertices that the scalar path computes for
+// generated rigs with Euler angles. packaging/check/cross.sh compiles this program and the
+// evaluator in several ways and demands one hash.
 #include <cstdio>
 #include <cstring>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One Rig in eight threads gives each thread the same poses as alone. The preset `tsan` runs the
-// same tests with the thread sanitizer.
+// tests of OneRig with the thread sanitizer.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -87,7 +87,8 @@ TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
 TEST(OneRig, GivesEveryInstanceItsOwnPast) {
   for (const CompileOptions& way : ways()) {
     const Rig rig = full_rig(way);
-    // The last pose of an Instance that evaluates kTurns frames from `first` on.
+    // The last pose of an Instance that evaluates kTurns frames from `first` on, and then frame
+    // `first` again.
     const auto film = [&rig](std::size_t first) {
       Instance face(rig);
       face.set_mask(0, static_cast<float>(first % 2));
@@ -215,7 +216,7 @@ TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
     all.push_back(out);
   }
   for (const auto& out : all) EXPECT_EQ(out, all[0]);
-  EXPECT_NE(all[0][0], all[0][2]);  // a different frame
+  EXPECT_NE(all[0][0], all[0][2]);  // face 1 shows another frame than face 0
 }
 
 // This test is not part of OneRig, which the tsan preset runs, because exceptions pass between

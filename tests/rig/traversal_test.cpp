@@ -17,8 +17,8 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Joint groups of 1 to 90 rows, with fewer rows at each LOD. Some groups write the same attributes,
-// and some attributes between them have no row.
+// Joint groups of 1 to 90 rows, with fewer rows at each coarser LOD. Some groups write the same
+// attributes, and some attributes between them have no row.
 dna::Dna many_groups() {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);

@@ -36,9 +36,9 @@ inline clip::Clip make_clip(std::size_t controls, std::size_t frames) {
   return clip;
 }
 
-/// One control of each kind that the codec distinguishes, computed by exact arithmetic: control 0
-/// is always 0, 1 is constant, 2 a line, 3 a polynomial, 4 steps, 5 equal to 3, 6 random bits, and
-/// 7 NaN payloads, -0 and denormals.
+/// One control of each kind that the codec distinguishes: control 0 is always 0, 1 is constant, 2 a
+/// line, 3 a polynomial, 4 steps, 5 equal to 3, 6 random bits, and 7 NaN payloads, 0, -0 and
+/// denormals.
 inline clip::Clip make_all_kinds(std::size_t frames) {
   clip::Clip clip = make_clip(8, frames);
   std::mt19937 random(7);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Finds files for tests: committed files, and files in RISORIUS_SHARED, which a clone lacks.
+// Finds files for tests: committed files, and files in the folder that the environment variable
+// RISORIUS_SHARED names, which a clone lacks.
 #pragma once
 
 #include <algorithm>

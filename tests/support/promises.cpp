@@ -110,9 +110,9 @@ float largest_joint_value(const Dna& dna) {
   return most;
 }
 
-// Whether the weights, biases and activation parameters of the networks are at most 10, and all
-// networks together have at most four layers. Even with 100 terms in each sum, the results of four
-// such layers stay far below the largest float.
+// Whether the weights, biases and activation parameters of the networks are at most 10 in size, all
+// networks together have at most four layers, and no operation is a weighted sum. Even with 100
+// terms in each sum, the results of four such layers stay far below the largest float.
 bool has_moderate_networks(const Dna& dna) {
   float most = 0;
   std::size_t layers = 0;

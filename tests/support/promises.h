@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Promises of the native code about any bytes, as functions that fuzz targets and tests of hostile
-// files share. Each returns the broken promise, or an empty text.
+// files share. Each function that returns a text returns the broken promise, or an empty text.
 #pragma once
 
 #include <cstdint>
