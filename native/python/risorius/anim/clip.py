@@ -217,7 +217,8 @@ class Clip:
         return int(np.floor(frames + rounding)) + 1 if self.frame_count else 0
 
     def _longest_step(self) -> str:
-        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
+        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"; the number of
+        frames if the frames have no individual times."""
         if self.times is None:
             return f"the clip has {self.frame_count:,} frames at {self.rate:g} a second"
         frame = int(np.argmax(np.diff(self.times)))

@@ -261,7 +261,8 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 def _close_lids(
     curves: dict[str, Doubles], times: Doubles, blinks: list[Blink], life: Life
 ) -> None:
-    """Set the lid controls of both sides from blinks and from the gaze, which the lids follow."""
+    """Set the lid controls of both sides from blinks and from the gaze, which the lids follow.
+    Each blink also lowers the brow a little."""
     for side, sign in (("L", 0.0), ("R", 1.0)):
         closed = np.zeros(times.size)
         for blink in blinks:
@@ -387,7 +388,8 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1], two octaves of cubic B-splines; periodic only if `loop` is True."""
+    """Slow noise in [-1, 1]: a random cubic B-spline with one point in each `step` seconds, plus a
+    quarter of a faster one. Periodic only if `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

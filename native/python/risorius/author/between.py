@@ -21,12 +21,14 @@ class Ways:
 
     Attributes:
         rest: float64[joints, 3], neutral positions of all joints.
-        whole: float64[C, joints, 3, 4], motions of the new face's joints with input C at 1, as
-            matrices from positions in the rest pose to posed positions.
-        made: share -> motions of the new face's joints with the input at this value.
-        before: share -> motions of the source's joints with the input at this value.
+        whole: float64[C, joints, 3, 4], motions of the new face's joints with each of C inputs at
+            1, as matrices from positions in the rest pose to posed positions.
+        made: control value of SHARES -> motions of the new face's joints, shaped as `whole`, with
+            each input at this value.
+        before: control value of SHARES -> motions of the source's joints, float64[C, J, 3, 4].
         turning: bool[C], whether an input moves joints of the source.
-        middles: row of an expression -> float64[3], the pivot of its motion.
+        middles: index of an input in the C inputs -> float64[3], the pivot about which the input
+            turns vertices; inputs without a pivot have no entry.
     """
 
     def __init__(self, work: Work) -> None:

@@ -25,8 +25,8 @@ from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
 _STEPS = 3  # number of Gauss-Newton steps
-_OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
-_MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
+_OFF_MM = 0.05  # vertices with a larger error are corrected; some other vertices must not move
+_MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of both kinds of vertices in a mesh
 # Largest number of joints in a Gauss-Newton step. A joint is left out if the weighted squared error
 # of its vertices is below _LEAST_SHARE of the largest such error of a joint.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
@@ -39,12 +39,13 @@ T = TypeVar("T")
 
 @dataclass
 class Combination:
-    """The errors in a corrective's pose on the finest meshes, mm."""
+    """Errors of the face of joints on the meshes of LOD 0, in mm, with all controls of a corrective
+    at 1."""
 
     name: str
-    before: float  # largest error of the joints without the corrective
-    joints_largest: float  # largest error of the joints with the corrective
-    largest: float  # largest error with blend shapes
+    before: float  # largest error without the corrective
+    joints_largest: float  # largest error with the corrective's joint values, without its shapes
+    largest: float  # largest error with the corrective's joint values and blend shapes
     column: int = -1  # index of its input
 
 
@@ -109,7 +110,7 @@ class _Skin:
         return out
 
     def touched(self, joints: Ints) -> Ints:
-        """Indices of the vertices on which one of these joints has a weight."""
+        """Indices of the vertices on which at least one of `joints` has a weight."""
         there = np.zeros(self._count, bool)
         there[joints] = True
         held = there[self._made.joints] & (self._made.weights > 0)
@@ -212,7 +213,8 @@ class Combinations:
         self._leave(column, active, rows, joints)
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
-        """Set to 0 the values of joints that move no vertex by least_effect_mm or more."""
+        """Set a corrective's values of a joint to 0 if they move each vertex of `rows` by less than
+        options.least_effect_mm."""
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -226,7 +228,8 @@ class Combinations:
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
         """Choose the vertices and the new joints of a corrective's equations.
 
-        Returns: vertices with an error, and some others, which must not move; the joints' indices.
+        Returns: vertices with an error, and some other vertices, which must not move; the indices
+            of the new joints.
         """
         motions = self.after.motions(self.after.worlds(active))
         parts, found, errors = [], [], []

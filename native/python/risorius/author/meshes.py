@@ -141,7 +141,7 @@ class Made:
             lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
-            wanted: its displacements.
+            wanted: displacements of the mesh.
             start: float64[V, joints], weights to start with; None keeps the mesh unchanged.
         """
         self._listed(lod, name)
@@ -353,7 +353,7 @@ def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
 
 
 def _kept_weights(rows: Doubles) -> Doubles:
-    """float64[V, joints]: weights without very small ones; the rows have the sum 1."""
+    """float64[V, joints]: the weights above 0.001, scaled so that each row has the sum 1."""
     kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
     kept[~kept.any(axis=1), 0] = 1  # vertices without weights follow the root
     kept /= kept.sum(axis=1, keepdims=True)

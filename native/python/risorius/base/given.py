@@ -172,7 +172,7 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
 
 
 def shown(value: object) -> str:
-    """A value as text for errors, shortened if it is long.
+    """A value as text for errors, shortened if it is long; only "a list" or "a table" for these.
 
     Args:
         value: a value of any type.

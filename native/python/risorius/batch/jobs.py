@@ -98,7 +98,17 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """The value of a key; a missing key gives `default`, or an error if `default` is None."""
+        """The value of a key, checked.
+
+        Args:
+            key: name of the key.
+            expected: the expected value in words, for the error.
+            check: whether a value is valid.
+            default: value of a missing key; None makes a missing key an error.
+
+        Raises:
+            JobsError: the value is invalid, or the key is missing and has no default.
+        """
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -239,9 +249,10 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files that match the patterns in `key`. Raises: JobsError: a pattern has no match.
+    """The files that match the patterns in `key`, sorted by path.
 
-    The files are sorted by path.
+    Raises:
+        JobsError: a pattern has no match, or two patterns match the same file.
     """
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):

@@ -118,7 +118,8 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each valid file's results whether its face can be mixed with the first valid one."""
+    """Add to each valid file's results whether its face can be mixed with the first valid one, and
+    print this unless `quiet`. A face that cannot be mixed is not ok."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

@@ -38,9 +38,10 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
     The text is compared with, in this order: full names; the parts of names after the last dot;
     ARKit units whose controls the file has; any part of a name, then of an ARKit unit; names in
-    other programs. Letter case counts for full names only. Two names that differ only in their
-    side (..L and ..R, ..Left and ..Right) are one meaning. The first comparison with a match
-    decides, and must give exactly one meaning.
+    other programs. Letter case counts for full names only; among parts after the last dot, equal
+    letter case comes first. If the text is a part of two names that differ only in their side (..L
+    and ..R, ..Left and ..Right), both are one meaning. The first comparison with a match decides,
+    and must give exactly one meaning.
 
     Args:
         text: text that a user typed.

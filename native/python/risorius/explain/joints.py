@@ -270,7 +270,8 @@ def explain_joints(
 
 
 def bone_length(dna: risorius.Dna) -> float:
-    """The median distance of a joint from its parent, in the file's translation unit."""
+    """The median distance of a joint from its parent, in the file's translation unit. Distances of
+    0 do not count; 1 if all are 0."""
     lengths = np.linalg.norm(np.asarray(dna.neutral_joint_translations, float), axis=1)
     lengths = lengths[lengths > 0]
     return float(np.median(lengths)) if len(lengths) else 1.0

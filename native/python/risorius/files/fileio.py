@@ -110,7 +110,8 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
             removed again if writing fails.
 
     Raises:
-        OSError: a file cannot be written; then no file is changed.
+        OSError: a file cannot be written. No file is changed then, except if the error occurs
+            while the complete files receive their names.
     """
     made: list[Path] = []
     try:

@@ -90,7 +90,7 @@ def read_png(data: bytes) -> Floats | None:
 
 
 def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
-    """The same as read_png, with values of uint8 from 0 to 255.
+    """Read an image that `png` wrote, as uint8 from 0 to 255; None for other or damaged files.
 
     Args:
         data: the bytes of the file.
@@ -112,7 +112,7 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
 def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | None:
     """Height, width and values per pixel that a file declares.
 
-    None if read_png cannot read the file.
+    None if these numbers, or the declared format, show that read_pixels cannot read the file.
 
     Args:
         data: the bytes of the file.

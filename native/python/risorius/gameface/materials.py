@@ -128,7 +128,8 @@ class Materials:
         return glb.pictures[label]
 
     def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
-        """Media type and bytes of a picture file, scaled and recompressed; None if unusable."""
+        """Media type and bytes of a picture file, scaled and recompressed. A PNG or JPEG whose
+        pixels cannot be read stays unchanged; None for other unusable files."""
         pixels = self._read(name)
         if pixels is None:
             return self._whole.get(name)

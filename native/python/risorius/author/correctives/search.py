@@ -124,7 +124,8 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """The faults that a combination may have, because its controls or their pairs have them."""
+        """The faults that a combination may have, because the neutral pose, one of its controls or,
+        for three or more controls, a pair of them has these faults."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)
@@ -191,7 +192,8 @@ class Search:
 
 
 def _level(dna: Dna) -> int:
-    """The coarsest LOD whose skin has shapes and at least _ENOUGH vertices."""
+    """The coarsest LOD whose skin has blend shapes and at least _ENOUGH (3000) vertices; 0 if there
+    is none."""
 
     def fine(lod: int) -> bool:
         skin = dna.meshes[skin_and_solids(dna, (), lod)[0]]

@@ -40,7 +40,8 @@ def blocks_of(positions: Doubles) -> list[Ints]:
 
 
 def split_mesh(mesh: Mesh, blocks: Sequence[Ints]) -> list[Mesh]:
-    """A mesh of each block with positions, skin weights and blend shapes, but without polygons.
+    """A mesh of each block with positions, skin weights and blend shapes, but without polygons; the
+    mesh itself if there is one block with all vertices.
 
     Args:
         mesh: the mesh.

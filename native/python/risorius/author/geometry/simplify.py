@@ -124,7 +124,8 @@ def fewer_triangles(
     The simplification preserves the shape of the surface, its texture coordinates and its
     displacements by expressions. Borders and seams stay in place. If seams prevent the reduction,
     they are welded, and each vertex keeps one texture coordinate. Each connected piece keeps some
-    vertices, or all small pieces are removed.
+    vertices, or all small pieces are removed. Of the cards of hair, some are kept whole, and the
+    others are removed.
 
     Args:
         mesh: the mesh; it is not changed.
@@ -219,7 +220,8 @@ def _fewer(
 
 
 def simplified(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
-    """A mesh that consists of given triangles of a fine mesh, without shapes.
+    """A mesh that consists of given triangles of a fine mesh, without shapes. The caller must
+    replace the skin weights, because the new mesh still has the weights of the fine mesh.
 
     Args:
         mesh: the fine mesh.

@@ -65,7 +65,7 @@ class SparseShapes(MutableMapping[K, Doubles]):
         return key in self._held
 
     def add(self, key: K, value: Doubles, first: int) -> None:
-        """Add displacements of some vertices to a key that these vertices do not have yet.
+        """Add displacements of some vertices to a key that has no displacements of them yet.
 
         Args:
             key: the key; it may be new.

@@ -81,9 +81,10 @@ def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
 
 
 def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
-    """Fit a sphere to vertices. Returns None if they do not lie on a sphere or cover too little.
+    """Fit a sphere to vertices. Returns None for fewer than 12 vertices, and for vertices that do
+    not lie on a sphere or cover too little of it.
 
-    They must extend over at least 1.2 radii along one axis and 0.8 radii along every axis.
+    The vertices must extend over at least 1.2 radii along one axis and 0.8 radii along every axis.
 
     Args:
         points: float64[V, 3], vertex positions of the mesh.

@@ -68,7 +68,8 @@ def _is(scene: Scene, number: int, kind: str) -> bool:
 
 
 def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
-    """int64[faces]: index of each polygon's material in the node's materials; 0 if unknown."""
+    """int64[faces]: index of each polygon's material in the node's materials, 0 if unknown; an
+    empty array if the node has no materials."""
     layer = mesh.first("LayerElementMaterial")
     found = layer.array("Materials") if layer is not None else np.zeros(0)
     if materials < 1:
@@ -98,7 +99,8 @@ def _material(scene: Scene, path: Path, number: int) -> Material:
 def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Material) -> None:
     """Add the picture of a role to a material, or a note if the picture is not found.
 
-    The picture is embedded in the FBX, or in its folder, its .fbm folder or the folder textures.
+    The picture is embedded in the FBX, or in the folder of the FBX, in its .fbm folder or in the
+    folder textures beside it.
     """
     for video in scene.children.get(texture, []):
         content = scene.objects[video].first("Content") if _is(scene, video, "Video") else None

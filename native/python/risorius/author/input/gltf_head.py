@@ -65,7 +65,8 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
     """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
-    of these nodes to this node. Skinned or unused meshes give one entry with the identity."""
+    of these nodes to this node. Skinned or unused meshes give one entry with the identity. A single
+    entry has the mesh's name."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)

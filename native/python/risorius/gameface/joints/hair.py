@@ -89,7 +89,8 @@ class Cards:
 
 
 def is_long(points: Doubles, triangles: Ints) -> bool:
-    """Whether a mesh of hair has a card that hangs farther than HANGS below its root.
+    """Whether a mesh of hair has a card less than 15 cm wide whose tip is more than HANGS (4 cm)
+    below its root.
 
     Args:
         points: float64[V, 3], metres, y up.
