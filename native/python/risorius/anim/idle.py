@@ -262,7 +262,14 @@ def _close_lids(
     curves: dict[str, Doubles], times: Doubles, blinks: list[Blink], life: Life
 ) -> None:
     """Set the lid controls of both sides from blinks and from the gaze, which the lids follow.
-    Each blink also lowers the brow a little."""
+    Each blink also lowers the brow a little.
+
+    Args:
+        curves: control name without prefix -> its curve; changed.
+        times: float64[frames], seconds.
+        blinks: the blinks.
+        life: gives the fraction of the gaze that the lids follow.
+    """
     for side, sign in (("L", 0.0), ("R", 1.0)):
         closed = np.zeros(times.size)
         for blink in blinks:
@@ -328,7 +335,13 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
     """The next gaze direction in degrees. If `place` is far from straight ahead, the next
-    direction is often near straight ahead (0, 0)."""
+    direction is often near straight ahead (0, 0).
+
+    Args:
+        dice: source of random numbers.
+        place: the current gaze direction in degrees, to the left and up.
+        scale: factor of the range of the gaze.
+    """
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale

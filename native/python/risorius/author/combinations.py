@@ -100,7 +100,12 @@ class _Skin:
         )
 
     def made(self, shaped: Doubles, motions: Doubles) -> Doubles:
-        """float64[V, 3]: the skinned vertices of the face of joints."""
+        """float64[V, 3]: the skinned vertices of the face of joints.
+
+        Args:
+            shaped: float64[V, 3], vertices before skinning, with the blend shapes.
+            motions: float64[joints, 3, 4], motions of the joints of the face of joints.
+        """
         return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
@@ -214,7 +219,14 @@ class Combinations:
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
         """Set a corrective's values of a joint to 0 if they move each vertex of `rows` by less than
-        options.least_effect_mm."""
+        options.least_effect_mm.
+
+        Args:
+            column: the corrective's input.
+            active: inputs at 1 in the pose of the corrective; the corrective is the last.
+            rows: the vertices of the corrective's equations.
+            joints: indices of the new joints whose values were solved.
+        """
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -227,6 +239,10 @@ class Combinations:
 
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
         """Choose the vertices and the new joints of a corrective's equations.
+
+        Args:
+            skins: the meshes.
+            active: inputs at 1 in the pose of the corrective; the corrective is the last.
 
         Returns: vertices with an error, and some other vertices, which must not move; the indices
             of the new joints.
@@ -322,7 +338,12 @@ class Combinations:
     def _targets(
         self, left: Sequence[BlendShapeTarget | None], channel: dict[int, int]
     ) -> list[BlendShapeTarget]:
-        """The blend shapes of the correctives that have a channel."""
+        """The blend shapes of the correctives that have a channel.
+
+        Args:
+            left: for each corrective, its blend shape, or None.
+            channel: input -> blend shape channel.
+        """
         out = []
         for target, column in zip(left, self.order, strict=True):
             if target is not None and column in channel:

@@ -320,7 +320,14 @@ def _new_joints(
 def _combine(
     work: Work, made: Made, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
-    """Add joint values and blend shapes for the correctives. Returns the correctives' errors."""
+    """Add joint values and blend shapes for the correctives. Returns the correctives' errors.
+
+    Args:
+        work: the face.
+        made: the meshes of all LODs.
+        regions: region -> names of its joints.
+        progress: gets the finished fraction of this step.
+    """
     if not work.combined:
         return []
     found = Combinations(work, made.options, made.fewer)
@@ -378,7 +385,15 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`."""
+    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`.
+
+    Args:
+        work: the face.
+        shaped: indices of the fitted meshes.
+        fit: the joints.
+        weights: mesh -> float64[V, joints].
+        o: options of the rig, with the number of joints of each LOD.
+    """
     used = given(work)
     count = len(fit.joints) - len(used)
     budgets = joint_budgets(o.lods, work.levels, count)
@@ -423,7 +438,16 @@ def _fit(
     options: FitOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh."""
+    """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh.
+
+    Args:
+        work: the face.
+        meshes: indices of the meshes.
+        wanted: mesh -> its displacements.
+        jaw: index of the joint that opens the mouth, or None.
+        options: options of the fit.
+        progress: gets the finished fraction of the fit.
+    """
     dna = work.source
     neutral = joined_positions(work, meshes)
     moved = joined_displacements(wanted, meshes).astype(np.float32)
@@ -471,7 +495,14 @@ def _pivots(
 
 
 def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[str]:
-    """Names of the new joints, from their places and the expressions that move them."""
+    """Names of the new joints, from their places and the expressions that move them.
+
+    Args:
+        work: the face.
+        fit: the joints.
+        effects: float64[C, new joints], largest displacement by each joint in each expression, mm.
+        places: float64[new joints, 3], middle of the vertices of each joint.
+    """
     dna = work.dna
     first = len(given(work))
     left = -1 if dna.coordinate_system[0] == "left" else 1
@@ -516,7 +547,14 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
 
 def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
     """float64[new joints, 3]: mean of the positions of each joint's vertices, weighted by squared
-    skin weights, or the position of a joint without vertices."""
+    skin weights, or the position of a joint without vertices.
+
+    Args:
+        work: the face.
+        meshes: indices of the fitted meshes.
+        fit: the joints.
+        held: float64[V, new joints], weights of the new joints on the vertices of these meshes.
+    """
     rows = held**2
     total = rows.sum(axis=0)[:, None]
     middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)
@@ -525,7 +563,14 @@ def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Do
 
 def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
     """float64[C, new joints]: largest displacement of a vertex by each joint alone, in mm, in each
-    of C expressions."""
+    of C expressions.
+
+    Args:
+        work: the face.
+        meshes: indices of the fitted meshes.
+        motions: float64[C, new joints, 3, 4], motions relative to the parents.
+        held: float64[V, new joints], weights of the new joints on the vertices of these meshes.
+    """
     positions = joined_positions(work, meshes)
     moves = motions - np.eye(3, 4)
     out = np.zeros(motions.shape[:2])
@@ -545,7 +590,16 @@ def _add_behavior(
     regions: dict[str, list[str]],
     options: RigOptions,
 ) -> None:
-    """Add a joint group of the new joints, and divide it into dense groups by region."""
+    """Add a joint group of the new joints, and divide it into dense groups by region.
+
+    Args:
+        work: the face.
+        motions: float64[C, new joints, 3, 4], motions relative to the parents.
+        effects: float64[C, new joints], largest displacement of a vertex in mm; a joint does not
+            move in an expression in which this is below options.least_effect_mm.
+        regions: region -> names of its joints.
+        options: options of the rig.
+    """
     dna = work.dna
     before = len(work.source.joint_names)
     # Express the motions, which are relative to the parents, in the parents' neutral frames.

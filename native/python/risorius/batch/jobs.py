@@ -119,7 +119,12 @@ class _Table:
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
-        """A list of strings; a single string counts as a list of one."""
+        """A list of strings; a single string counts as a list of one.
+
+        Args:
+            key: name of the key.
+            default: value of a missing key; None makes a missing key an error.
+        """
         value = self.take(
             key, "a string or a list of strings",
             lambda v: isinstance(v, str) or _all_of(v, str), default,
@@ -135,7 +140,13 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """The elements of `choices` that the table names, in the order of `choices`."""
+        """The elements of `choices` that the table names, in the order of `choices`.
+
+        Args:
+            key: name of the key.
+            choices: the allowed strings.
+            default: value of a missing key.
+        """
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -318,7 +329,14 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. Empty path parts, as in "a//b", are dropped."""
+    """A path below the output folder. Empty path parts, as in "a//b", are dropped.
+
+    Args:
+        table: the table, for the error.
+        key: the key, for the error.
+        output: the output folder.
+        name: path relative to the output folder.
+    """
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:

@@ -203,7 +203,12 @@ class _Look:
         return (np.asarray(np.cross(left, up)) if left is not None else guess), False
 
     def _forward(self, axis: Doubles, across: Doubles) -> float:
-        """A vote: positive if the face looks along an axis, negative if against it."""
+        """A vote: positive if the face looks along an axis, negative if against it.
+
+        Args:
+            axis: float64[3], the axis.
+            across: float64[3], the axis from side to side.
+        """
         depth = self.points @ axis
         if not self.rows:
             return 0.0
@@ -226,7 +231,12 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Indices of the vertices near the centres of the shapes; excludes the back of the head."""
+        """Indices of the vertices near the centres of the shapes; excludes the back of the head.
+
+        Args:
+            centers: float64[n, 3], the centre of each shape.
+            across: float64[3], the axis from side to side.
+        """
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle

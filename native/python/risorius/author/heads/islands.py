@@ -71,7 +71,13 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
 
 
 def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
-    """Add a note to the part's material if materials with pictures are left out."""
+    """Add a note to the part's material if materials with pictures are left out.
+
+    Args:
+        part: the mesh; its material gets the note.
+        looks: the materials of the file.
+        lost: indices of the materials that no part of the mesh has.
+    """
     names = [looks[place].name for place in sorted(lost) if looks[place].pictures]
     if names and part.material is not None:
         part.material.notes.append(

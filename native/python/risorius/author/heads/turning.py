@@ -90,7 +90,13 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a mesh that have the form and the size of eyes."""
+    """The islands of a mesh that have the form and the size of eyes.
+
+    Args:
+        part: the mesh.
+        islands: int64[V], island of each vertex.
+        height: height of the face.
+    """
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
@@ -133,6 +139,11 @@ def _pair(
     spheres lie like eyes.
 
     Meshes named like eyes come before other meshes, then larger spheres before smaller ones.
+
+    Args:
+        parts: the meshes.
+        found: index of the mesh, and sphere, of each candidate.
+        lids: L or R -> float64[3], the mean position of the vertices that a blink moves.
     """
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:

@@ -69,7 +69,13 @@ def _is(scene: Scene, number: int, kind: str) -> bool:
 
 def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
     """int64[faces]: index of each polygon's material in the node's materials, 0 if unknown; an
-    empty array if the node has no materials."""
+    empty array if the node has no materials.
+
+    Args:
+        mesh: the mesh.
+        faces: number of its polygons.
+        materials: number of materials of its node.
+    """
     layer = mesh.first("LayerElementMaterial")
     found = layer.array("Materials") if layer is not None else np.zeros(0)
     if materials < 1:
@@ -101,6 +107,13 @@ def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Materia
 
     The picture is embedded in the FBX, or in the folder of the FBX, in its .fbm folder or in the
     folder textures beside it.
+
+    Args:
+        scene: the open file.
+        path: path of the FBX.
+        texture: object number of the texture.
+        role: color, normal or roughness.
+        out: the material; changed.
     """
     for video in scene.children.get(texture, []):
         content = scene.objects[video].first("Content") if _is(scene, video, "Video") else None

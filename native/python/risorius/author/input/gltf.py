@@ -281,7 +281,15 @@ def _uvs(
     given: Mapping[str, Any],
     count: int,
 ) -> Doubles:
-    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none."""
+    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none.
+
+    Args:
+        document: the open file.
+        primitive: the primitive, with the number of its material.
+        packed: reads the attributes.
+        given: the attributes of the primitive: name -> accessor.
+        count: number of its vertices.
+    """
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")
     change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
