@@ -192,7 +192,8 @@ class Clip:
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with evenly spaced frames at its `rate`, from the time of its first frame on.
+        """The clip with evenly spaced frames at its `rate`, from the time of its first frame to the
+        time nearest to its last frame.
 
         Raises:
             BudgetError: too many frames, see resampled().
@@ -242,7 +243,8 @@ class Clip:
     def replaced(self, **changes: object) -> Clip:
         """The clip with other values for some of its attributes.
 
-        These are names, curves, rate, start, times, events and metadata.
+        Args:
+            changes: new values of names, curves, rate, start, times, events or metadata.
         """
         values: dict[str, object] = {
             "names": self.names,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Makes idle movement from a random seed: blinks, saccades with lids, and subtle motion.
+"""Makes idle movement from a random seed: blinks, saccades that the lids follow, and subtle motion.
 
 Randomness comes from the raw bits of PCG64, which NumPy keeps stable; all other arithmetic is sums,
-products and quotients. So every machine makes the same blinks at the same times.
+products, quotients and square roots, which every machine rounds in the same way. So every machine
+makes the same blinks at the same times.
 """
 
 from __future__ import annotations
@@ -287,7 +288,8 @@ def _close_lids(
 
 
 def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Saccade]:
-    """Make saccades, sorted by start; each begins where its predecessor ended.
+    """Make saccades, sorted by start; each begins at the gaze direction at which its predecessor
+    ended.
 
     Args:
         seed: 0 or more; the same seed gives the same saccades.
@@ -381,7 +383,8 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Curves of subtle motion; three quarters of the motion is equal on the left and right."""
+    """Curves of subtle motion. The curve of each side is three quarters common motion and one
+    quarter motion of its own; the jaw has one curve."""
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (

@@ -123,7 +123,7 @@ class _Skin:
 
     def wrong(self, triangles: Ints | None) -> str:
         """The fault of the skin of a LOD as text; "" if there is none or if the skin has more than
-        LARGE vertices, because such a skin is not checked.
+        LARGE (60,000) vertices, because such a skin is not checked.
 
         Args:
             triangles: int64[n, 3], layout indices; None if the LOD has no skin.

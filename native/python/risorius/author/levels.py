@@ -195,7 +195,8 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each LOD; at most LARGE for a new LOD without a given budget.
+    """The number of vertices of each LOD; at most LARGE (60,000) for a new LOD without a given
+    budget.
 
     Args:
         options: budgets, if given.

@@ -127,7 +127,8 @@ class Work:
 
 
 def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
-    """The face, and the displacements of its meshes.
+    """The Work of a face: the names and motions of its inputs, the displacements of its meshes, and
+    its head joint.
 
     Args:
         dna: a face with blend shapes; it is not changed.

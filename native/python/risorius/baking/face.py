@@ -77,7 +77,7 @@ class Face:
         return rest
 
     def check_lod(self, lod: int) -> None:
-        """Raises: ValueError: the character lacks this LOD."""
+        """Check that the character has a LOD. Raises: ValueError: it lacks the LOD."""
         last = max(1, self.rig.lod_count) - 1
         if not 0 <= lod <= last:
             raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
@@ -164,7 +164,8 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES. Neck joints get no curves
+    The rotations are computed from the clip's curves of ANGLES: yaw, pitch and roll of neck and
+    head in radians. Neck joints get no curves
     if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
     gets no curves if the clip already has a curve of one of its raw controls.
 

@@ -21,7 +21,8 @@ class UnknownControlError(RisoriusError):
 
 @dataclass(frozen=True)
 class Meaning:
-    """The controls that a typed name means: control -> factor of the typed value."""
+    """The controls that a typed name means: control -> factor of the typed value. `is_exact` is
+    True if the typed name is the full name of a control."""
 
     controls: dict[str, float]
     is_exact: bool
@@ -103,7 +104,8 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
 
 
 def _shapes_of_controls(dna: Dna) -> dict[int, str]:
-    """Control -> name of the first blend shape channel that it drives, in brackets."""
+    """Control -> name of the first blend shape channel that it drives, in brackets, with "..." if
+    it drives several."""
     table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
     driven: dict[int, list[int]] = {}
     for control, channel in zip(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing of files; the package writes files only through this module."""
+"""Atomic writing of files. Python code writes its outputs through this module, except journals,
+which grow line by line."""
 
 from __future__ import annotations
 

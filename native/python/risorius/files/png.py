@@ -25,7 +25,8 @@ def png(image: Floats) -> bytes:
 
 
 def pixels_to_png(image: Pixels) -> bytes:
-    """The same as png, for an image of uint8 from 0 to 255."""
+    """An 8-bit PNG of an image, uint8 [h, w], [h, w, 3] or [h, w, 4], from 0 to 255. Row 0 is the
+    bottom, as in png()."""
     height, width = image.shape[:2]
     values = 1 if image.ndim == 2 else image.shape[2]
     kind = {1: 0, 3: 2, 4: 6}[values]

@@ -144,7 +144,8 @@ class Sums:
         return self._points.at(np.clip(raw, -1.0, 1.0)) - linear
 
     def _missing_on_top(self, kind: str, top: Target, of: tuple[str, ...]) -> Doubles:
-        """`_missing` for a target such as mouthClose, which takes back a share of another target.
+        """float64[P, 3]: rig minus linear sum in metres, as _missing(), for a target such as
+        mouthClose, which takes back a share of another target.
 
         Args:
             kind: formula of the weight.

@@ -18,7 +18,8 @@ _CELLS = 16  # cells of the grid along each axis by which vertices are sorted
 
 
 def blocks_of(positions: Doubles) -> list[Ints]:
-    """Sorted vertex indices of each block: one block for at most LARGE vertices, else several.
+    """Sorted vertex indices of each block: one block for at most LARGE (60,000) vertices, else
+    several.
 
     The vertices of a block are near each other.
 

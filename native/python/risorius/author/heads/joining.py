@@ -364,7 +364,8 @@ class _Joining:
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
 
     def _empty(self, names: Mapping[str, None], count: int) -> MutableMapping[str, Doubles]:
-        """Shapes of `count` vertices that do not move, in the form of the face's shapes."""
+        """Shapes of `count` vertices that do not move; SparseShapes if the face's shapes are,
+        otherwise a dictionary."""
         ordered = self._in_order(names)
         if not isinstance(self.face.shapes, SparseShapes):
             return {name: np.zeros((count, 3)) for name in ordered}

@@ -52,7 +52,8 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
 def _by_materials(
     scene: Scene, path: Path, number: int, part: HeadPart, known: dict[int, Material]
 ) -> list[HeadPart]:
-    """The parts of a mesh, divided by materials; see islands.divided()."""
+    """The parts of a mesh: each connected piece gets the material of most of its polygons, and the
+    pieces of a material form a part, see islands.divided()."""
     owner = next((p for p, way in scene.parents.get(number, []) if not way), 0)
     listed = [i for i in scene.children.get(owner, []) if _is(scene, i, "Material")]
     for identity in listed:

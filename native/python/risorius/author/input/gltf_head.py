@@ -99,7 +99,8 @@ def _placed(part: HeadPart, turn: Doubles) -> HeadPart:
 def _parts(
     document: Document, number: int, source: str, materials: dict[int, Material]
 ) -> list[HeadPart]:
-    """The parts of a mesh, divided by materials; see islands.divided()."""
+    """The parts of a mesh: each connected piece gets the material of most of its polygons, and the
+    pieces of a material form a part, see islands.divided()."""
     row = document.json["meshes"][number]
     groups: dict[int, list[dict[str, Any]]] = {}
     for primitive in gltf.primitives(document, row, number):
