@@ -1397,8 +1397,8 @@ class SkinChecker:
     def shown(self) -> npt.NDArray[np.bool_]:
         """bool[V]: visible vertices; only these must stay outside."""
     def nearest(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> tuple[_U32, _F64, _F64]:
-        """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] barycentric
-        coordinates in these corners, float64[n] distance in mm."""
+        """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3]
+        barycentric coordinates in these corners, float64[n] distance in mm."""
     def look(self, skin: npt.ArrayLike, solids: Sequence[npt.ArrayLike]) -> SkinFaults:
         """SkinFaults of a pose."""
     def sum(self, faults: SkinFaults, allowed: SkinFaults) -> FaultSums:

@@ -20,7 +20,7 @@ from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames that are resampled at a time
 # Memory that the clip from one read may take, in bytes, in addition to BYTES_PER_BYTE times the
-# file's size. It suffices for 75 minutes of 1,000 controls at 60 frames per second.
+# file's size. This amount suffices for 75 minutes of 1,000 controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -378,8 +378,8 @@ class ClipReader:
         """Read the named controls (None: all) in `frames` (begin, exclusive end; None: all).
 
         Returns:
-            A clip that starts at the time of its first frame. It has the events within its time
-            span; a read of all frames has all events.
+            A clip that starts at the time of its first frame. The clip has the events within its
+            time span; a read of all frames has all events.
 
         Raises:
             ClipError: frames that do not exist, a damaged block, or more frames than one read of a

@@ -414,8 +414,8 @@ def _equations(
     arms = arms.copy()
     arms[..., 3] += arms[..., :3] @ middle
     places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
-    # Displacement of a vertex by a unit shift or rotation of a joint. It is linear in the vertex'
-    # position: three rows for x, y and z, and a constant.
+    # Displacement of a vertex by a unit shift or rotation of a joint. The displacement is linear in
+    # the vertex' position: three rows for x, y and z, and a constant.
     moves = np.zeros((4, count, 6, 3))
     moves[3, :, :3] = turns.transpose(0, 2, 1)
     crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]

@@ -19,8 +19,8 @@ from ..base.errors import ArgumentError
 from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
 
-# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. It falls more slowly
-# than the number of vertices does.
+# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. The fraction falls
+# more slowly than the number of vertices does.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # number of vertices relative to the next finer LOD
 _LEAST_JOINTS = 4

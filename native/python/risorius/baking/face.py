@@ -114,8 +114,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
-    a name that an earlier element has, e.g. "jaw#3".
+    An element without a name is called by its kind and index, e.g. "joint 3". If an earlier element
+    has the same name, the index is added to the later element's name, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()

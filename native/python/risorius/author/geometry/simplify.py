@@ -22,8 +22,8 @@ _STUCK = 1.5  # factor of the vertex budget above which seams of the texture are
 # _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
-# The fraction of kept hair cards is the fraction of kept vertices to this power. It is below 1, so
-# that more cards stay, because missing cards are more visible than a coarser skin.
+# The fraction of kept hair cards is the fraction of kept vertices to this power. The power is below
+# 1, so that more cards stay, because missing cards are more visible than a coarser skin.
 _THINNED = 0.6
 
 Floats = npt.NDArray[np.float32]

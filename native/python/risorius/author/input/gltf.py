@@ -345,8 +345,8 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
 def _node_matrix(document: Document, mesh: int) -> Doubles:
     """float64[4, 4]: matrix from a mesh to the world.
 
-    It is the matrix of the first node with the mesh. If this node has a skin, the bind pose
-    determines the matrix. It is the identity if no node has the mesh.
+    The result is the matrix of the first node with the mesh. If this node has a skin, the bind pose
+    determines the matrix instead. The result is the identity if no node has the mesh.
     """
     world = _World(document)
     found = world.of_mesh(mesh)
