@@ -20,7 +20,7 @@ from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames that are resampled at a time
 # Memory that the clip from one read may take, in bytes, in addition to BYTES_PER_BYTE times the
-# file's size. It suffices for 75 minutes of 1,000 controls at 60 frames per second.
+# file's size. This amount suffices for 75 minutes of 1,000 controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -192,7 +192,8 @@ class Clip:
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with evenly spaced frames at its `rate`, from the time of its first frame on.
+        """The clip with evenly spaced frames at its `rate`, from the time of its first frame to the
+        time nearest to its last frame.
 
         Raises:
             BudgetError: too many frames, see resampled().
@@ -217,7 +218,8 @@ class Clip:
         return int(np.floor(frames + rounding)) + 1 if self.frame_count else 0
 
     def _longest_step(self) -> str:
-        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
+        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"; the number of
+        frames if the frames have no individual times."""
         if self.times is None:
             return f"the clip has {self.frame_count:,} frames at {self.rate:g} a second"
         frame = int(np.argmax(np.diff(self.times)))
@@ -241,7 +243,8 @@ class Clip:
     def replaced(self, **changes: object) -> Clip:
         """The clip with other values for some of its attributes.
 
-        These are names, curves, rate, start, times, events and metadata.
+        Args:
+            changes: new values of names, curves, rate, start, times, events or metadata.
         """
         values: dict[str, object] = {
             "names": self.names,
@@ -375,8 +378,8 @@ class ClipReader:
         """Read the named controls (None: all) in `frames` (begin, exclusive end; None: all).
 
         Returns:
-            A clip that starts at the time of its first frame. It has the events within its time
-            span; a read of all frames has all events.
+            A clip that starts at the time of its first frame. The clip has the events within its
+            time span; a read of all frames has all events.
 
         Raises:
             ClipError: frames that do not exist, a damaged block, or more frames than one read of a

@@ -38,7 +38,8 @@ class ReactionPart:
 
 @dataclass(frozen=True)
 class Reaction:
-    """A movement that ends by itself; it rises and falls along x * x * (3 - 2 * x)."""
+    """A movement that ends by itself; it rises and falls along the curve x * x * (3 - 2 * x) for x
+    from 0 to 1."""
 
     name: str
     parts: tuple[ReactionPart, ...]

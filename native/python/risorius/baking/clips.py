@@ -42,7 +42,8 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         face: the character; curves of its raw controls are used directly, and curves of its GUI
             controls are converted to raw controls.
         mapping: name of a built-in mapping, or path of a TOML file; None: the mapping that fits
-            best; a .rzc file is then not mapped.
+            best. With None, a .rzc file is not mapped, and neither is a file with curves of raw
+            controls whose format has no mapping of its own.
 
     Raises:
         OSError, ValueError: the file is no animation, or no mapping fits it; the error names the

@@ -77,7 +77,7 @@ class Face:
         return rest
 
     def check_lod(self, lod: int) -> None:
-        """Raises: ValueError: the character lacks this LOD."""
+        """Check that the character has a LOD. Raises: ValueError: it lacks the LOD."""
         last = max(1, self.rig.lod_count) - 1
         if not 0 <= lod <= last:
             raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
@@ -114,8 +114,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
-    a name that an earlier element has, e.g. "jaw#3".
+    An element without a name is called by its kind and index, e.g. "joint 3". If an earlier element
+    has the same name, the index is added to the later element's name, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()
@@ -164,7 +164,8 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES. Neck joints get no curves
+    The rotations are computed from the clip's curves of ANGLES: yaw, pitch and roll of neck and
+    head in radians. Neck joints get no curves
     if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
     gets no curves if the clip already has a curve of one of its raw controls.
 

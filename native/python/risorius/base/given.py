@@ -172,7 +172,7 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
 
 
 def shown(value: object) -> str:
-    """A value as text for errors, shortened if it is long.
+    """A value as text for errors, shortened if it is long; only "a list" or "a table" for these.
 
     Args:
         value: a value of any type.
@@ -186,7 +186,15 @@ def shown(value: object) -> str:
 
 
 def _inside(value: float, found: object, low: float, high: float, *, above: bool) -> float:
-    """Return `value` if it is in range. Raises: GivenError with `found` in its text."""
+    """Return `value` if it is in range. Raises: GivenError with `found` in its text.
+
+    Args:
+        value: the number.
+        found: the value as it was given, for the error.
+        low: smallest allowed value.
+        high: largest allowed value.
+        above: True: `low` itself is not allowed.
+    """
     if isinstance(value, float) and not math.isfinite(value):
         known = low > -LARGEST and high < LARGEST
         expected = f"{low:g} to {high:g}" if known else "a finite number"

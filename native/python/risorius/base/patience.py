@@ -14,7 +14,7 @@ _EVERY = 0.5  # seconds between two questions
 def patiently(work: Callable[[], T], go_on: Callable[[], object]) -> T:
     """The result of a function that runs in another thread; its exceptions are raised here.
 
-    If the caller stops, the other thread ends by itself, and its result is lost.
+    If `go_on` raises an exception, the other thread ends by itself, and its result is lost.
 
     Args:
         work: the function; it must not change anything that the caller still uses after a stop.

@@ -13,8 +13,8 @@ from .errors import ArgumentError, RisoriusError
 
 MOST_BYTES = reading.TEXT
 DEEPEST = 64
-# Finds dotted keys of more than DEEPEST parts. They are refused, because the parser's time grows
-# with the square of the number of parts.
+# Finds dotted keys of more than DEEPEST parts. Such keys are refused, because the parser's time
+# grows with the square of the number of parts.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 

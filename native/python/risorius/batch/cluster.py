@@ -86,7 +86,13 @@ class Cluster:
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs. A few more are submitted than the workers can run, so that no worker waits."""
+        """Run jobs and yield their outcomes. About twice as many jobs are submitted as the workers
+        can run at once, so that no worker waits.
+
+        Args:
+            waiting: the jobs; they are removed.
+            suspects: gets the jobs that Dask gave up; these have no outcome.
+        """
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:

@@ -98,7 +98,17 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """The value of a key; a missing key gives `default`, or an error if `default` is None."""
+        """The value of a key, checked.
+
+        Args:
+            key: name of the key.
+            expected: the expected value in words, for the error.
+            check: whether a value is valid.
+            default: value of a missing key; None makes a missing key an error.
+
+        Raises:
+            JobsError: the value is invalid, or the key is missing and has no default.
+        """
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -109,7 +119,12 @@ class _Table:
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
-        """A list of strings; a single string counts as a list of one."""
+        """A list of strings; a single string counts as a list of one.
+
+        Args:
+            key: name of the key.
+            default: value of a missing key; None makes a missing key an error.
+        """
         value = self.take(
             key, "a string or a list of strings",
             lambda v: isinstance(v, str) or _all_of(v, str), default,
@@ -125,7 +140,13 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """The elements of `choices` that the table names, in the order of `choices`."""
+        """The elements of `choices` that the table names, in the order of `choices`.
+
+        Args:
+            key: name of the key.
+            choices: the allowed strings.
+            default: value of a missing key.
+        """
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -239,9 +260,10 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files that match the patterns in `key`. Raises: JobsError: a pattern has no match.
+    """The files that match the patterns in `key`, sorted by path.
 
-    The files are sorted by path.
+    Raises:
+        JobsError: a pattern has no match, or two patterns match the same file.
     """
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):
@@ -307,7 +329,14 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. Empty path parts, as in "a//b", are dropped."""
+    """A path below the output folder. Empty path parts, as in "a//b", are dropped.
+
+    Args:
+        table: the table, for the error.
+        key: the key, for the error.
+        output: the output folder.
+        name: path relative to the output folder.
+    """
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:

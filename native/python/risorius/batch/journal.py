@@ -19,7 +19,8 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """A finished job: hash of inputs; output files; offset and length in bytes of its line."""
+    """A finished job: hash of its inputs; its output files; offset and length in bytes of its line
+    in the journal."""
 
     stamp: str
     files: list[list[Any]]

@@ -77,6 +77,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
     """Run all unfinished jobs of a plan and write the summary.
 
     Args:
+        plan: all jobs, and the folder of the outputs.
         workers: number of processes; None for one per core.
         scheduler: address of a Dask scheduler to use instead of processes; None for none.
         restart: True: run finished jobs again.

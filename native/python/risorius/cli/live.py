@@ -78,7 +78,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the options before the program listens. Raises: CommandLineError."""
+    """Check the options before the program listens. Raises: CommandLineError; InputError if the
+    output cannot be written."""
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")

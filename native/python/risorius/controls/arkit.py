@@ -28,7 +28,7 @@ def mapping() -> dict[str, dict[str, float]]:
 def shares() -> dict[str, str]:
     """Raw control whose value is a fraction of another control -> the other control.
 
-    See `shares.share_of`.
+    For example, mouthClose, which keeps the lips together, is a fraction of jawOpen.
     """
     rows = mapping()
     return {

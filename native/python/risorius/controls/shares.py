@@ -30,7 +30,8 @@ def share_of(part: Numbers, whole: Numbers) -> Numbers:
 
 
 def part_of(share: Numbers, whole: Numbers) -> Numbers:
-    """The inverse of share_of, except for shares that it clamped.
+    """The value of a control from its share: the inverse of share_of(), except for shares that
+    share_of() clamped.
 
     Args:
         share: fractions from 0 to 1, in any shape.

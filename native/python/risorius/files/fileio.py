@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing of files; the package writes files only through this module."""
+"""Atomic writing of files. Python code writes its outputs through this module, except journals,
+which grow line by line."""
 
 from __future__ import annotations
 
@@ -110,7 +111,8 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
             removed again if writing fails.
 
     Raises:
-        OSError: a file cannot be written; then no file is changed.
+        OSError: a file cannot be written. No file is changed then, except if the error occurs
+            while the complete files receive their names.
     """
     made: list[Path] = []
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Measures values of VRM expressions on a face.
 
-These are the angles of the gaze, and the presets that must fade out while an emotion preset is
+The values are the angles of the gaze, and the presets that must fade out while an emotion preset is
 active, because the sum of the two presets' morph targets would deform the face.
 """
 

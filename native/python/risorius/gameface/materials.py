@@ -105,7 +105,15 @@ class Materials:
         )
 
     def _picture(self, name: str, role: str, longest: int, glb: Glb, alpha: str = "") -> int | None:
-        """The number of the texture made from a picture file; None if the file is unusable."""
+        """The number of the texture made from a picture file; None if the file is unusable.
+
+        Args:
+            name: name of the file; "" for none.
+            role: "color", "normal" or "roughness".
+            longest: largest number of pixels of the picture's longer side.
+            glb: the file that receives the texture.
+            alpha: name of the file of the opacity; "" for none.
+        """
         if not name:
             return None
         key = (name, role, longest)
@@ -128,7 +136,8 @@ class Materials:
         return glb.pictures[label]
 
     def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
-        """Media type and bytes of a picture file, scaled and recompressed; None if unusable."""
+        """Media type and bytes of a picture file, scaled and recompressed. A PNG or JPEG whose
+        pixels cannot be read stays unchanged; None for other unusable files."""
         pixels = self._read(name)
         if pixels is None:
             return self._whole.get(name)

@@ -133,7 +133,13 @@ class Refiner:
     def _choose(
         self, wanted: Sequence[Combination], poses: Doubles, most: int
     ) -> list[Combination]:
-        """Chooses greedily: each step adds the combination that most reduces the error left."""
+        """Chooses greedily: each step adds the combination that most reduces the error left.
+
+        Args:
+            wanted: the candidates.
+            poses: float64[n, targets], weights from 0 to 1.
+            most: largest number of combinations.
+        """
         left = self._main_directions(poses)
         own = self._weights(wanted, poses)
         at_first, whole = float(np.square(left).sum()), np.linalg.norm(own, axis=0)

@@ -40,7 +40,8 @@ class Poser:
         return [mesh.positions for mesh in self._meshes]
 
     def motions(self, on: Controls) -> Doubles | None:
-        """float64[joints, 3, 4]: matrices of the joints' motions from the rest pose to the pose.
+        """float64[joints, 3, 4]: matrices of the joints' motions from the rest pose to the pose
+        with the controls `on` at 1.
 
         None if no joint moves.
         """

@@ -118,7 +118,7 @@ class Mover:
         self._place = np.full(len(dna.joint_names), -1)
 
     def sums(self, amounts: Doubles) -> Doubles:
-        """float64[V]: for each vertex, the sum of its weights times its joints' amounts.
+        """float64[V]: for each vertex, the sum over its joints of weight times the joint's amount.
 
         Args:
             amounts: float64[joints], a number for each joint.

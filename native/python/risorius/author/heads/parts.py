@@ -130,7 +130,8 @@ def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[Hea
     """Divide a mesh by labels of its polygons. Vertices on a cut are duplicated.
 
     Args:
-        part: the mesh; it is not changed. names: label -> name of the new part.
+        part: the mesh; it is not changed.
+        names: name of the new part of each label; a label without polygons gives no part.
         of_face: int64[polygons], label of each polygon; -1 leaves the polygon out.
     """
     out = []

@@ -26,7 +26,8 @@ def face_height(
 ) -> float:
     """The height from the chin to the top of the mesh. A neck or a body does not count.
 
-    The chin is the lowest place that shapes of jaw and mouth move.
+    The chin is the lowest place that shapes of jawOpen move; without jawOpen, the lowest place that
+    shapes of jaw and mouth move.
 
     Args:
         points: float64[V, 3], y is up.

@@ -90,7 +90,13 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a mesh that have the form and the size of eyes."""
+    """The islands of a mesh that have the form and the size of eyes.
+
+    Args:
+        part: the mesh.
+        islands: int64[V], island of each vertex.
+        height: height of the face.
+    """
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
@@ -129,9 +135,15 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The pair of spheres that may be left and right eye, each with the index of its mesh.
+    """The left and the right eye among spheres, each with the index of its mesh; None if no two
+    spheres lie like eyes.
 
     Meshes named like eyes come before other meshes, then larger spheres before smaller ones.
+
+    Args:
+        parts: the meshes.
+        found: index of the mesh, and sphere, of each candidate.
+        lids: L or R -> float64[3], the mean position of the vertices that a blink moves.
     """
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
@@ -162,8 +174,8 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns the other
-    islands as a mesh.
+    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns a list of
+    one mesh of the other islands; the list is empty if there are none.
 
     Args:
         part: the mesh.
@@ -207,7 +219,7 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         controls: shape -> raw controls without prefix.
 
     Returns: the joint; and for each shape that turns the eye, its name -> the largest distance of a
-        vertex from its position after the rotation alone.
+        vertex from its position after the rigid motion alone.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}
@@ -243,7 +255,7 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
 def look_turn(look: str) -> Doubles:
     """float64[3, 3]: the usual rotation of an eye by a look control, from the rest pose.
 
-    It multiplies column vectors with x to the left, y up and z to the front.
+    The matrix multiplies column vectors with x to the left, y up and z to the front.
 
     Args:
         look: key of LOOKS, the control's name without its side.
@@ -263,7 +275,8 @@ def jaw_turn(
     opening: Doubles,
     whole: Sequence[str],
 ) -> Turn | None:
-    """The jaw's joint at its hinge, with the rigid motion of the chin in each shape.
+    """The jaw's joint at its hinge, with the rigid motion of the chin in each shape that moves the
+    chin and has a single control: a jaw control, or any control if the shape is in `whole`.
 
     Returns None if the mouth opens without a rotation.
 

@@ -175,6 +175,11 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
     """The vertices of each polygon, and of all corners concatenated.
 
     In the file, the last corner of a polygon is stored as ~index.
+
+    Args:
+        scene: the open file.
+        node: the mesh.
+        count: number of its vertices.
     """
     order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
     last = order < 0
@@ -187,7 +192,14 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
 
 def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, Ints]:
     """The first UV layer of a mesh, and for each corner its index in the layer; zeros if
-    missing."""
+    missing.
+
+    Args:
+        scene: the open file.
+        node: the mesh.
+        count: number of its corners.
+        corners: int64[count], vertex of each corner.
+    """
     layer = node.first("LayerElementUV")
     if layer is None:
         return np.zeros((1, 2)), np.zeros(count, np.int64)

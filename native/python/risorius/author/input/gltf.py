@@ -281,7 +281,15 @@ def _uvs(
     given: Mapping[str, Any],
     count: int,
 ) -> Doubles:
-    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none."""
+    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none.
+
+    Args:
+        document: the open file.
+        primitive: the primitive, with the number of its material.
+        packed: reads the attributes.
+        given: the attributes of the primitive: name -> accessor.
+        count: number of its vertices.
+    """
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")
     change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
@@ -337,8 +345,8 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
 def _node_matrix(document: Document, mesh: int) -> Doubles:
     """float64[4, 4]: matrix from a mesh to the world.
 
-    It is the matrix of the first node with the mesh. If this node has a skin, the bind pose
-    determines the matrix. It is the identity if no node has the mesh.
+    The result is the matrix of the first node with the mesh. If this node has a skin, the bind pose
+    determines the matrix instead. The result is the identity if no node has the mesh.
     """
     world = _World(document)
     found = world.of_mesh(mesh)

@@ -65,7 +65,8 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
     """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
-    of these nodes to this node. Skinned or unused meshes give one entry with the identity."""
+    of these nodes to this node. Skinned or unused meshes give one entry with the identity. A single
+    entry has the mesh's name."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
@@ -98,7 +99,8 @@ def _placed(part: HeadPart, turn: Doubles) -> HeadPart:
 def _parts(
     document: Document, number: int, source: str, materials: dict[int, Material]
 ) -> list[HeadPart]:
-    """The parts of a mesh, divided by materials; see islands.divided()."""
+    """The parts of a mesh: each connected piece gets the material of most of its polygons, and the
+    pieces of a material form a part, see islands.divided()."""
     row = document.json["meshes"][number]
     groups: dict[int, list[dict[str, Any]]] = {}
     for primitive in gltf.primitives(document, row, number):

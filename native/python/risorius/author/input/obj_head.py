@@ -20,8 +20,8 @@ def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
     Raises:
-        ShapeFileError: no file is named like a word of _NEUTRAL, and each of these words is part
-            of no file name or of several.
+        ShapeFileError: no file is named neutral, basis, base, rest, default, head or face, and each
+            of these words is part of no file name or of several.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:

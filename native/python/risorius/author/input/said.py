@@ -68,7 +68,7 @@ def _controls(part: str) -> list[str]:
 
 
 def check(value: object) -> Said:
-    """Check a value of the table and return it. Raises GivenError if it is invalid."""
+    """Check a value of the table [controls] and return it. Raises GivenError if it is invalid."""
     found: Said = list(several(value, of=text)) if isinstance(value, list) else text(value)
     meaning_of(found)
     return found

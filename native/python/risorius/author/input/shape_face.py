@@ -161,7 +161,8 @@ def combined_rows(
         raw: names of all raw controls.
 
     Returns: for each sculpt, the indices of its raw controls, and its displacements float64[V, 3]
-        without the displacements of its single expressions and of its smaller combinations.
+        without the displacements of its single expressions and of its smaller combinations. A
+        sculpt with a left-out expression has no entry.
 
     Raises:
         ShapeFileError: a combination names an unknown expression.

@@ -230,6 +230,7 @@ def read_face(spec: Spec) -> Read:
     Raises:
         DnaError: the DNA file is damaged.
         ShapeFileError: a mesh or an expression is unusable.
+        RisoriusError: another fault of the file, for example no expression moves a vertex.
         OSError: a file cannot be read.
     """
     folder = spec.path.parent

@@ -343,7 +343,7 @@ def as_json(rig: JointRig) -> dict[str, object]:
 
 
 def as_lines(rig: JointRig) -> list[str]:
-    """The errors of each mesh as lines of a table.
+    """Lines of text with the errors of each LOD, of each mesh at LOD 0, and of the combinations.
 
     Args:
         rig: the finished rig.

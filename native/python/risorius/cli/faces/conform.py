@@ -55,7 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, clock: Clock) -> int:
-    """risorius author --conform HEAD FACE.dna -o OUT.dna
+    """Run `risorius author --conform HEAD FACE.dna -o OUT.dna`: give FACE.dna the form of HEAD, and
+    write OUT.dna. Returns the exit code 0.
 
     Args:
         args: arguments of `risorius author`.

@@ -23,7 +23,8 @@ QUATERNION_ATTRIBUTES = ("tx", "ty", "tz", "qx", "qy", "qz", "qw", "sx", "sy", "
 
 
 class Comparison:
-    """The data that the modules of the layers share.
+    """The rigs A and B with common numbers for their matched elements; the modules of the layers
+    compare them.
 
     exact: True: compare bit for bit; False after a conversion, which rounds.
     """
@@ -37,7 +38,8 @@ class Comparison:
     def changed(self, a: Floats, b: Floats) -> Bools:
         """bool[...]: whether float32 arrays a and b of one shape differ.
 
-        They differ in any bit if the comparison is exact, otherwise by more than rounding.
+        In an exact comparison numbers differ if any bit differs, otherwise if they differ by more
+        than rounding.
         """
         different = amounts.differs(a, b)
         return different if self.exact else different & ~amounts.near(a, b)

@@ -166,7 +166,12 @@ def wanted(own: Iterable[str], kind: str) -> list[str]:
 
 
 def parent_of(name: str, there: list[str]) -> str:
-    """The nearest ancestor in `there`; "" for the hips. Args: name: bone; there: bones."""
+    """The nearest ancestor of a bone in `there`; "" if there is none, as for the hips.
+
+    Args:
+        name: name of the bone.
+        there: names of the available bones.
+    """
     above = BONES[name].parent
     while above and above not in there:
         above = BONES[above].parent

@@ -268,7 +268,8 @@ class _Lists:
 
 def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at: str) -> Doubles:
     """float64[V, 4, 4], per vertex the matrix from the mesh's coordinates to the scene: the mean of
-    `moves` by skin weights. Normalises the weights in `values`.
+    `moves` by skin weights. Normalises the weights in `values`; without weights, all vertices get
+    the weight 1 on the first joint.
     """
     count = len(values["POSITION"])
     sets = [name[8:] for name in values if name.startswith("WEIGHTS_")]

@@ -149,6 +149,12 @@ def _kept(
 ) -> tuple[list[int], list[str]]:
     """The nodes whose meshes are exported, and the names in `without` that are face meshes.
 
+    Args:
+        document: the file.
+        holders: numbers of the nodes that have a mesh.
+        without: names of meshes or nodes that the user leaves out.
+        faces: names of the face's meshes.
+
     Raises: GameFaceError: a name in `without` is no mesh of the body or the face.
     """
     rows, names = document.json["nodes"], dict[int, tuple[str, str]]()
@@ -174,7 +180,12 @@ def _scale_of(at: Mapping[str, Doubles]) -> float:
 
 
 def _facing(at: Mapping[str, Doubles], name: str) -> float:
-    """1 for a body that faces along +z, -1 for one that faces along -z, as VRM 0.x prescribes."""
+    """1 for a body that faces along +z, -1 for one that faces along -z, as VRM 0.x prescribes.
+
+    Args:
+        at: VRM name of a bone -> float64[3], its position in the file.
+        name: name of the file for errors.
+    """
     if "hips" in at and not at["head"][1] > at["hips"][1]:
         raise GameFaceError(
             f"{name}: a body that stands upright along y was expected, its head is not above its "

@@ -160,7 +160,14 @@ class _Reader:
     def _named(
         self, row: Mapping[str, Any], groups: list[list[int]], count: int, place: str
     ) -> list[int]:
-        """Indices of the colliders in the groups to which a chain's row refers."""
+        """Indices of the colliders in the groups to which a chain's row refers.
+
+        Args:
+            row: table of the chain.
+            groups: for each collider group, the indices of its colliders.
+            count: number of colliders.
+            place: name of the row for errors.
+        """
         found = row.get("colliderGroups")
         out = list[int]()
         for group in found if isinstance(found, list) else []:

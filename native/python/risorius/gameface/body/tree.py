@@ -40,8 +40,8 @@ def find_tree(document: Document) -> Tree:
         document: the file of the body.
 
     Raises:
-        AnimationFileError: there are no nodes, a node has two parents or is its own ancestor, or a
-            position is not a list of numbers.
+        AnimationFileError: there are no nodes or more than 20,000, a node has two parents or is its
+            own ancestor, or a position is not a list of numbers.
     """
     rows = document.json.get("nodes")
     if not isinstance(rows, list) or not rows:

@@ -89,7 +89,8 @@ class Cards:
 
 
 def is_long(points: Doubles, triangles: Ints) -> bool:
-    """Whether a mesh of hair has a card that hangs farther than HANGS below its root.
+    """Whether a mesh of hair has a card less than 15 cm wide whose tip is more than HANGS (4 cm)
+    below its root.
 
     Args:
         points: float64[V, 3], metres, y up.
@@ -186,7 +187,12 @@ def _bundle(away: Doubles) -> Ints:
 
 
 def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
-    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots."""
+    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots.
+
+    Args:
+        roots: float64[n, 3], the root of each hair card in metres.
+        head: float64[3], position of the head's joint in metres.
+    """
     guess = head + np.array([0.0, 0.07, 0.0])
     if len(roots) < _FEWEST:
         return guess, 0.08
@@ -205,6 +211,11 @@ def _line(
     """float64[n, 3], joints of a bundle at evenly spaced heights.
 
     Each joint is at the mean position of the bundle's hair near its height.
+
+    Args:
+        hairs: the meshes.
+        cards: the hair cards of each mesh.
+        members: for each mesh, bool[cards], whether a card belongs to the bundle.
     """
     picked = list(zip(hairs, cards, members, strict=True))
     top = float(np.mean(np.concatenate([one.root[member] for _, one, member in picked])))
@@ -222,7 +233,15 @@ def _line(
 def _woven(
     hair: Hair, cards: Cards, member: npt.NDArray[np.bool_], chain: list[int], heights: Doubles
 ) -> Hair:
-    """Hair in which the cards of one bundle have skin weights of the bundle's chain."""
+    """Hair in which the cards of one bundle have skin weights of the bundle's chain.
+
+    Args:
+        hair: the mesh.
+        cards: its hair cards.
+        member: bool[cards], whether a card belongs to the bundle.
+        chain: indices of the bundle's joints, from the root to the tip.
+        heights: float64[joints], heights of these joints in metres.
+    """
     vertices = np.flatnonzero(member[cards.of_vertex])
     if not len(vertices):
         return hair
