@@ -91,7 +91,8 @@ class Node:
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
     def length(self, name: str) -> int:
-        """The array's length that the file states, before the array is unpacked."""
+        """The length that the file states for the array of a nested record, before the array is
+        unpacked; 0 if there is none."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.count if isinstance(value, Packed) else 0
@@ -114,7 +115,7 @@ class Parser:
         data: the whole file.
         name: the file's name in errors.
         budget: limits memory and work.
-        skipped: kinds of objects whose records are not read.
+        skipped: kinds of objects whose nested records are not read.
     """
 
     def __init__(
@@ -142,7 +143,7 @@ class Parser:
         return AnimationFileError(self.name, f"byte {at}: {message}")
 
     def top(self) -> dict[str, Node]:
-        """The records named in _TOP, by name."""
+        """The records GlobalSettings, Objects and Connections, by name, if the file has them."""
         return {node.name: node for node in self._records(27, len(self.data), 0)}
 
     def _records(self, at: int, end: int, depth: int) -> Iterator[Node]:
@@ -343,7 +344,14 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
 def _curves(
     scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
 ) -> dict[str, Keys]:
-    """Name -> keyframes of the curves that a stack animates; all curves if `stack` is 0."""
+    """Name -> keyframes of the curves that a stack animates; all curves if `stack` is 0.
+
+    Args:
+        scene: the file; its notes get sentences about curves that are left out.
+        stack: id of the animation stack, or 0.
+        components: id of an AnimationCurveNode -> (component, id of the curve) per curve.
+        channels: names of the blend shape channels.
+    """
     out: dict[str, Keys] = {}
     bones = 0
     for identity, parts in components.items():
@@ -396,7 +404,17 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(name of a curve, its keyframes) for an animated property; empty for a bone's transform."""
+    """(name of a curve, its keyframes) for an animated property.
+
+    The list is empty for location, rotation and scale of a node, except the location of a node
+    whose name begins with CTRL_.
+
+    Args:
+        scene: the file.
+        owner: the object with the property.
+        way: name of the property.
+        parts: (component such as "d|X", id of the curve) of each component.
+    """
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -454,8 +472,9 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
     """int64[count] and float64[count, 2]: the flags of each keyframe, and two slopes.
 
-    They are the slope after the keyframe and the slope before the next one. The file stores them
-    once for each run of consecutive keyframes with the same flags and slopes.
+    The slopes are the one after the keyframe and the one before the next keyframe. The file stores
+    flags and slopes once for each run of consecutive keyframes that share them. If the runs do not
+    sum to `count`, all keyframes are linear.
     """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)

@@ -98,7 +98,8 @@ class Document:
             raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
-        """float64[count]: the values of a scalar accessor; normalised integers become fractions.
+        """float64[count]: the values of a scalar accessor; integers become fractions of the
+        largest integer of their type.
 
         Repeated calls return the same array, because a thousand channels may share one.
 
@@ -312,7 +313,7 @@ class Document:
     def linked(self, uri: object, place: str) -> bytes:
         """The bytes that a uri contains in base64, or the bytes of the file that it names.
 
-        The file must be in the folder of the glTF.
+        The file must be in the folder of the glTF, or in a folder inside that folder.
 
         Args:
             uri: uri of a buffer or a picture, as in the file; may be of any type.
@@ -330,7 +331,8 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # Only files in the glTF's folder are read, because a uri could name any file on the disk.
+        # Only files in the glTF's folder or below it are read, because a uri could name any file on
+        # the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(
                 place,
@@ -483,9 +485,9 @@ def read(document: Document, take: str | None = None) -> Take:
     """The curves of one animation.
 
     The curve of a morph target has the target's name from extras.targetNames of its mesh, which
-    exporters write, else "mesh.number". The curve of a property that KHR_animation_pointer animates
-    has the last name of its pointer. Meshes that share a target's name normally move together: only
-    one curve is taken.
+    exporters write, else "mesh.number". The curve of a custom property (in extras) that
+    KHR_animation_pointer animates has the last name of its pointer. Meshes that share a target's
+    name normally move together: only the first curve is taken.
 
     Args:
         document: from `open_glb` or `open_gltf`.
@@ -566,7 +568,14 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """Names of the curves of an animation channel; empty for a node's location, rotation, scale."""
+    """Names of the curves of an animation channel; empty if the channel animates neither morph
+    targets nor custom properties, but for example a node's location.
+
+    Args:
+        document: the glTF.
+        target: the table `target` of the channel.
+        place: place of the channel in the JSON, for errors.
+    """
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)

@@ -88,7 +88,7 @@ class Mapping:
             is divided by the value of B (controls.shares.share_of). A is left unchanged if no curve
             moves B.
         controls: pattern of control names -> adjustment; the last match counts.
-        strip: prefixes of curve names that are ignored.
+        strip: prefixes that are removed from curve names.
         vocabulary: name in controls.vocabulary; its other spellings are accepted too.
         is_loose: whether names match regardless of letter case, "_" and Left or L at the end.
         is_gui: whether the controls are GUI controls, which the rig's table converts to raw ones.
@@ -173,7 +173,8 @@ class Mapped:
 def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     """Applies a mapping to a clip of a file's curves; the result has curves of controls.
 
-    Weighted curves for the same control are summed. A control that is a share of another is divided
+    Weighted curves for the same control are summed. If several curves match one row, only the first
+    is used, and the others are listed as ignored. A control that is a share of another is divided
     by it, then adjusted. Values stay bitwise equal if one curve moves a control with weight 1,
     without share or adjustment.
 
@@ -266,7 +267,10 @@ def _between(times: Doubles) -> Doubles | None:
 
 
 def fits(control: str, pattern: str) -> bool:
-    """Whether a pattern with * and ? matches a control's name or its short name; case counts."""
+    """Whether a pattern with * and ? matches a control's name; case counts.
+
+    The name may be written without "CTRL_expressions." at its beginning.
+    """
     short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
     return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
 
@@ -358,7 +362,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         name: the mapping's name, unless the text has one.
 
     Raises:
-        MappingError: see load_mapping.
+        MappingError: not TOML, an unknown key, or inconsistent rows; the message names the place.
     """
     try:
         table = toml.parse(text)
@@ -574,11 +578,12 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows the most curves in `names`; None if no mapping knows any.
+    """The name of the built-in mapping that knows the most curves in `names`, or None.
 
     Ties go to the mapping that knows more names in `columns`, then to the one with fewer rows,
-    which is more specific. Single letters are no evidence, because several vocabularies use them as
-    mouth shapes; but the vowels A, I, U, E, O together mean VRM.
+    which is more specific. A mapping that knows only single letters is not chosen, because several
+    vocabularies use them as mouth shapes; but the vowels A, I, U, E, O together mean VRM. A file
+    with nearly all ARKit units is not VRM.
 
     Args:
         names: curves that are not constantly 0.

@@ -139,7 +139,8 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     frames.
 
     Args:
-        clip: any clip; it is returned unchanged if it has fewer frames than the window.
+        clip: any clip; it is returned unchanged if it has fewer frames than the window, or if the
+            window has at most order + 1 frames.
         window: duration of each fit in seconds, above 0.
         order: degree of the polynomial, 0 or more.
 
@@ -206,8 +207,9 @@ def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
     """Resamples at the clip's rate, so that missing frames are interpolated linearly.
 
     Args:
+        clip: any clip.
         longest: seconds; in a longer gap the last value is held until one frame before the gap's
-            end.
+            end. None: every gap is interpolated.
 
     Raises:
         BudgetError: a gap with too many frames.

@@ -74,7 +74,7 @@ class Imported:
     Attributes:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
             the start of the sound.
-        kind: one of KINDS.
+        kind: one of KINDS; "curves" for curves that are not from a file.
         mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
             the most curves; "" if none knows any.
         source: the file's name.
@@ -230,7 +230,8 @@ def read(
 
     Args:
         path: path of the file.
-        kind: one of KINDS, or None: inferred from the content, else from the suffix.
+        kind: one of KINDS, or None: inferred from the content. GLB and binary FBX are always
+            recognised by their content.
         rate: frames per second, for tables with frame numbers or without times.
         timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 means
             30000/1001, and so on.
@@ -347,8 +348,10 @@ def import_file(
     """Reads a file and maps it to a clip of raw controls; also reports the use of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: see `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: see `Imported.apply`.
+        path: path of the file.
+        kind, rate, timecode_rate, time_unit, take: options for reading the file, as in `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: options for the conversion to raw
+            controls, as in `Imported.apply`.
 
     Raises:
         ValueError: an error of `read` or `Imported.apply`.
@@ -381,7 +384,12 @@ def import_curves(
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
             values), linear between keyframes.
         source: name of the curves in the report.
-        rig_names, mapping, rig, rotations: see `Imported.apply`.
+        rig_names: raw controls of the rig; other controls are dropped and reported. None: all are
+            kept.
+        mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None: the built-in
+            mapping that knows the most curves.
+        rig: needed for a mapping of GUI controls.
+        rotations: angles to keep: "head", "all" (eyes too) or "none".
 
     Raises:
         ValueError: no curves, times that do not ascend, values that are not finite; errors of

@@ -87,7 +87,10 @@ class Table:
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points; if so, a comma in a cell is not a decimal comma."""
+        """Whether numbers have decimal points.
+
+        If so, a comma in a cell of a comma-separated table is not a decimal comma.
+        """
         return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
@@ -130,7 +133,7 @@ def read_table(text: str, name: str) -> Table:
     Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel.
 
     Args:
-        text: content of the file, with commas, semicolons or tabs between cells.
+        text: content of the file, with commas, tabs, semicolons or | between cells.
         name: the file's name in errors.
 
     Raises:
@@ -239,6 +242,11 @@ def _is_missing(cell: str) -> bool:
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
     """Drops rows without a time, unless the times come from the row numbers.
 
+    Args:
+        table: any table.
+        at: index of the column of times.
+        asked: the caller's options on time.
+
     Raises:
         AnimationFileError: more than MOST_LOST of the rows have no time.
     """
@@ -297,7 +305,16 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
     """Seconds of the timecodes in a column.
 
-    If the option `counts_rows` is set, the times come from the row numbers instead.
+    If the option `counts_rows` is set, the times come from the row numbers at the given rate.
+
+    Args:
+        table: any table.
+        column: index of the column.
+        asked: the caller's options on time.
+        notes: receives a sentence on the frames per second that the timecodes count.
+
+    Raises:
+        AnimationFileError: an invalid timecode, or no recognisable number of frames per second.
     """
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)

@@ -55,12 +55,12 @@ class Cue(NamedTuple):
 def flowing_curves(
     cues: Sequence[Cue], times: Doubles, blend: float = BLEND
 ) -> tuple[list[str], Doubles]:
-    """float64[shapes, frames]: the weight of each shape; weights add up to 1 in every frame.
+    """The shapes, and the weight of each shape in each frame; weights add up to 1 in every frame.
 
     Two neighbouring cues cross-fade along half a cosine that is `blend` seconds long and centred on
-    their border. It is shorter if the cues demand it: it may reach to the middle of a dominant cue,
-    and to the far end of a weak one. A dominant cue therefore has weight 1 in its middle, and a
-    short weak one between two others never reaches weight 1.
+    their border. The cross-fade is shorter if a cue is short: it reaches at most to the middle of a
+    dominant cue, and at most to the far end of a weak one. A dominant cue therefore has weight 1 in
+    its middle, and a short weak one between two others never reaches weight 1.
 
     Args:
         cues: in order of time; each ends where the next starts.
@@ -98,8 +98,8 @@ def _take(
     """Makes a take from cues: curves at RATE, and the cues themselves as events.
 
     Raises:
-        AnimationFileError: no cue has a length. BudgetError: too many shapes for a track of this
-            length.
+        AnimationFileError: no cue has a length, or a cue ends after LONGEST. BudgetError: too many
+            shapes for a track of this length.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -129,7 +129,8 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Whether at least half of the lines consist of a time and a Rhubarb shape."""
+    """Whether at least half of the lines consist of a time and a Rhubarb shape, and the first one
+    begins with a digit."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)
     return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)

@@ -360,7 +360,14 @@ class _Thinning:
     def made(
         self, gone: Sequence[int], leaving: Leaving, counts: Doubles, levels: Sequence[int]
     ) -> Dna:
-        """The face without the joints `gone`, with refitted weights at the LODs `levels`."""
+        """The face without the joints `gone`, with refitted weights at the LODs `levels`.
+
+        Args:
+            gone: indices of the removed joints.
+            leaving: the vertex weights after other joints took over vertices of removed joints.
+            counts: float64[poses], importance of each pose.
+            levels: LODs whose meshes get refitted weights; other meshes are not refitted.
+        """
         stays = np.ones(len(self.parents), bool)
         stays[list(gone)] = False
         out, meshes = copy.copy(self.dna), list(self.dna.meshes)

@@ -106,8 +106,14 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 
 
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
-    """Adds a channel for each input. The new channels are the first rows, so that all LODs with
-    channels use them."""
+    """Adds a channel for each input, and returns input -> index of its channel.
+
+    The rows of the new channels come first, so that all LODs with channels use them.
+
+    Args:
+        dna: the face; changed in place.
+        inputs: indices in the control vector of the controls that drive the new channels.
+    """
     if not inputs:
         return {}
     first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names

@@ -120,7 +120,8 @@ class Decoder:
             The faces that the packet completes.
 
         Raises:
-            LiveError: not OSC, or an impossible value; values of earlier messages are kept.
+            LiveError: not OSC, an impossible value (values of earlier messages are kept), or a new
+                sender for which no place is free.
         """
         found = list(messages(data))
         now = perf_counter() if now is None else now

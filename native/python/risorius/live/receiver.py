@@ -210,7 +210,8 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject that came first."""
+        """The latest frame of a subject; for "", of the first subject. None if the subject
+        has no frame yet."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None

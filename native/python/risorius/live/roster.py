@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A list of senders with limited places, and the rule by which a new sender takes a place.
 
-A flood of forged senders must not displace a phone. Therefore:
+A flood of forged senders must not displace a phone. A sender that is silent for a minute loses its
+place, unless it is wanted. If all places are taken:
     a wanted sender (named or recorded) always gets a place and keeps it
     a sender that has never streamed gives its place to any newcomer
     the first sender of an address, once it has streamed, gives its place only to a wanted one

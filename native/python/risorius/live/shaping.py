@@ -218,7 +218,8 @@ class Shaper:
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
-        # Shares use values before `gains`, because a gain of the jaw must not part the lips.
+        # The control of which a share is taken back is read before `gains`, because a gain of the
+        # jaw must not part the lips.
         for place, whole in plan.shares:
             result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:
@@ -234,7 +235,13 @@ class Shaper:
         return Controls(plan.controls, result)
 
     def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
-        """Values minus the neutral ones, rescaled so that a blend shape still reaches 1."""
+        """float32[names]: values minus the neutral ones; blend shapes are not below 0, and are
+        rescaled so that they still reach 1.
+
+        Args:
+            frame: the received values.
+            is_angle: bool[names], True for angles, which are not rescaled.
+        """
         if not self.neutral:
             return frame.values
         rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)

@@ -66,7 +66,7 @@ class Take:
         return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
-        """Names in the take's frames that a shaper's mapping does not know."""
+        """Names in the take's frames for which a shaper has no control."""
         kinds = dict.fromkeys(frame.names for frame in self._frames)
         plans = (Plan(names, shaper.mapping) for names in kinds)
         return sorted({name for plan in plans for name in plan.unmapped})

@@ -106,8 +106,13 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Merges joint groups into one, or into one for each set of rows with the same source
-    groups."""
+    """Merges joint groups into one, or into one for each set of rows with the same source groups.
+
+    Args:
+        parts: (index of a parent, one of its joint groups); the groups share joints.
+        share: weights of the parents for each joint; groups of parents with weight 0 are dropped.
+        levels: number of LODs.
+    """
     levels_of: dict[int, int] = {}  # row -> number of LODs that evaluate it
     of_row: dict[int, list[int]] = {}  # row -> indices of the source groups that have it
     used: list[_Source] = []
@@ -151,8 +156,15 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """Merges rows into one joint group with all columns of the sources; [] if there is no
-    column."""
+    """Merges rows into one joint group with all columns of the sources; [] if there is no column.
+
+    Args:
+        rows: rows of the joint matrix.
+        sources: joint groups of the parents.
+        share: weights of the parents for each joint.
+        levels_of: row -> number of LODs that evaluate it.
+        levels: number of LODs.
+    """
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

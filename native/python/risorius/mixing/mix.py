@@ -38,8 +38,8 @@ class Mix:
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: as
-        `table`."""
+        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: an
+        invalid share, or shares that are all 0."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
             raise ArgumentError("shares from 0 on were expected, one of them above 0")
@@ -49,7 +49,8 @@ class Mix:
         """float64[regions, P]: the parents' shares in each region; rows sum to 1.
 
         Raises:
-            ValueError: an invalid share, shares that are all 0, or above 1 in a region.
+            ValueError: an invalid share, an unknown region, shares that are all 0, or shares of a
+                region that sum to more than 1.
         """
         whole = self.whole()
         out = np.tile(whole, (len(REGIONS), 1))
@@ -82,8 +83,8 @@ def mix_faces(
         masks: masks of the first parent's regions; None: they are computed.
 
     Returns:
-        The mixed face. If one parent has all shares, it equals that parent bitwise. Metadata and
-        hair come from the parent with the largest share.
+        The mixed face. If one parent has all shares, the mix equals that parent bitwise, except
+        for a given `name`. Metadata and hair come from the parent with the largest share.
 
     Raises:
         ValueError: invalid shares, or a region without vertices in the first parent.

@@ -51,7 +51,8 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Mixes the textures in the metadata of the leading parent, which has the largest share.
+    """Mixes the textures in the metadata of the leading parent, which has the largest share, and
+    the wrinkle masks (*_msk.png) in its texture folder.
 
     Args:
         parents: compatible faces.
@@ -60,8 +61,8 @@ def mix_textures(
         masks: masks of the first parent's regions.
 
     Returns:
-        File name -> bytes; and file name -> reason (see WHY) for images of the leading parent
-        alone.
+        File name -> bytes; and file name -> key in WHY of the reason, for textures that come from
+        the leading parent alone.
 
     Raises:
         BudgetError: small files that declare huge images.

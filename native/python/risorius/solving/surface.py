@@ -121,8 +121,8 @@ class Surface:
         """float64[R]: largest displacement of a vertex from the neutral pose, per unit of each
         control.
 
-        It is measured once, on about two thousand vertices spread evenly over the meshes of the
-        LOD.
+        The displacements are measured once, for about two thousand vertices spread evenly over the
+        meshes of the LOD.
         """
         return self._far().max(axis=0, initial=0.0)
 

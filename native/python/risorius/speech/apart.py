@@ -9,8 +9,8 @@ separate process avoids this, turns a crash into an error message, and can be ki
     sends the task as a line of JSON     -->     calls speak()
     reads the lines                      <--     sends lines of JSON: the fraction of the work done,
                                                  again and again; then the clip or an error
-    closes the pipe: by cancel(), or     -->     ends
-    because this process has ended
+    kills the process after cancel(),    -->     ends
+    or ends, which closes the pipe
 """
 
 from __future__ import annotations

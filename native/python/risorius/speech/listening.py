@@ -69,7 +69,7 @@ def listen(
     """Finds the phonemes of a sound file.
 
     Args:
-        path: see audio.read_audio.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
         transcript: the spoken words in English, if known.
         progress: called repeatedly with the fraction of the work done, 0 to 1.
         cancel: called repeatedly; if it returns true, the work ends.
@@ -114,7 +114,7 @@ def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
     """Combines a sound file with known phonemes; PocketSphinx is not needed.
 
     Args:
-        path: see audio.read_audio.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
         found: phonemes in order; gaps become silence.
 
     Raises:
@@ -145,7 +145,18 @@ def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
 def _aligned(
     recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress, notes: list[str]
 ) -> list[Phoneme] | None:
-    """The transcript's phonemes with times, or None if too few of its words are heard."""
+    """The transcript's phonemes with times, or None if too few of its words are heard.
+
+    Between the words of the transcript, and in pieces where the alignment of phonemes fails, the
+    phonemes are recognised.
+
+    Args:
+        recogniser: decoders.
+        samples: float32[n], the whole voice at RATE samples per second.
+        words: words of the transcript.
+        tell: called with the fraction of the work done, 0 to 1.
+        notes: gets a sentence if some words are not heard.
+    """
     duration = len(samples) / RATE
     segments = recogniser.align_words(samples, words)
     if segments is not None:
@@ -167,7 +178,7 @@ def _aligned(
 def _piece(
     recogniser: Recogniser, samples: Samples, begin: float, end: float, said: Sequence[str]
 ) -> list[Phoneme]:
-    """The phonemes of a piece of the voice, in times of the whole sound.
+    """The phonemes from `begin` to `end` seconds of the voice, in times of the whole sound.
 
     The words `said` are aligned; if this fails or there are none, phonemes are recognised.
     """
@@ -179,7 +190,8 @@ def _piece(
 
 
 def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
-    """Converts times in a piece that begins at `begin` to times in the whole sound."""
+    """Converts times in a piece from `begin` to `end` seconds to times in the whole sound, at most
+    `end`."""
     return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
 
 
@@ -330,7 +342,13 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
 
 
 def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
-    """Whether a silence that starts at `begin` is the closure of a stop consonant inside a word."""
+    """Whether a silence that starts at `begin` is the closure of a stop consonant inside a word.
+
+    Args:
+        phones: phonemes in order.
+        last: index of the last phoneme that overlaps the silence.
+        begin: start of the silence in seconds.
+    """
     phone = phones[last]
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 

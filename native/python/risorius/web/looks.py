@@ -124,8 +124,11 @@ class _Finder:
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
         """The table of a material's wrinkles: numbers of the normal maps, and one picture of masks.
 
-        Its list `maps` contains [animated map, tile in the picture of masks, index of the normal
-        map or _FLUSH].
+        The list `maps` in the table contains [animated map, tile in the picture of masks, index of
+        the normal map or _FLUSH].
+
+        Args:
+            named: role of a picture of this material -> file name.
         """
         sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
         tiles = list[Pixels]()

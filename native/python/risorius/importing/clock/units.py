@@ -148,7 +148,8 @@ def seconds_of(
         values: float64[frames], as in the file.
         said: unit in the header.
         asked: the caller's options; the caller of this function handles `counts_rows`.
-        notes: receives a sentence if a unit is assumed.
+        notes: receives a sentence if a unit other than seconds is inferred, and if dates are
+            counted from the first frame.
         name: the file's name in errors.
         column: column of the times, for errors.
 

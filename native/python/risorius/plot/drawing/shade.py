@@ -60,7 +60,8 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
 
     Args:
         meshes: the meshes.
-        paints: paint of each mesh, see Surface.
+        paints: for each mesh, float64[V], a lightness per vertex, or float64[V, 3], a colour per
+            vertex; the colour of clay is multiplied by it.
         axes: float64[3, 3], from skeleton.view_axes: maps file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
@@ -84,7 +85,7 @@ def vertex_normals(points: Floats, triangles: Ints) -> Floats:
         triangles: int64[F, 3].
 
     Returns:
-        float64[V, 3] of length 1, or 0 if no triangle has an area.
+        float64[V, 3] of length 1, or 0 for a vertex whose triangles have no area.
     """
     a, b, c = (points[triangles[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
