@@ -36,9 +36,9 @@ def compile_cached(
         cache_dir: folder of the cache, created if missing; None: a folder in the user's caches. If
             others may write to it, its files are checked like DNA files (see Rig.load), because a
             hash detects damage but not forgery.
-        precision: as for Rig: number format of the compiled coefficients.
-        rotation: as for Rig: form of the evaluated joint rotations.
-        simd: as for Rig: instruction set of the evaluation; None: the best one.
+        precision: "float32" or "float16", number format of the joint coefficients.
+        rotation: "euler" or "quaternion", form of the evaluated joint rotations.
+        simd: instruction set of the evaluation; None: the best one of the processor.
 
     Raises:
         DnaError: a file that cannot be read or compiled.

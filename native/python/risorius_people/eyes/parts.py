@@ -176,7 +176,12 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _strip(rows: list[Row], across: int) -> tuple[list[Row], list[list[int]], Floats]:
-    """Adds quads between rows of `across` vertices each, counter-clockwise from the front."""
+    """Adds quads between rows of `across` vertices each, counter-clockwise from the front, and
+    texture coordinates from 0 to 1.
+
+    Returns:
+        The rows unchanged, faces, and texture coordinates float64[vertices, 2].
+    """
     length = len(rows) // across
     faces = []
     for k in range(length - 1):

@@ -120,8 +120,12 @@ class Turning:
     """Rotates cards where a blend shape tilts the skin.
 
     A joint rotates the cards by itself, but a blend shape only shifts their roots: without this
-    rotation the beard on a lip that rolls in would be inside the skin. See bind for the arguments
-    of the constructor.
+    rotation the beard on a lip that rolls in would be inside the skin.
+
+    Args:
+        head: the mesh of the skin.
+        places: place on the skin for each vertex of the cards.
+        mesh: the cards.
     """
 
     def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:

@@ -98,7 +98,12 @@ def _beard(surface: Surface, head: Part, person: Person) -> Strips:
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
-    """Replaces the scalp's cards by fewer and wider ones if all cards have too many vertices."""
+    """Replaces the scalp's cards by fewer and wider ones if all cards together have more than
+    _MOST_VERTICES vertices.
+
+    Args:
+        strips: mesh -> its strips at LOD 0.
+    """
     counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
     over = sum(counts.values()) - _MOST_VERTICES
     if over > 0 and "hair" in strips:

@@ -25,7 +25,8 @@ def paint_eye(person: Person) -> Floats:
     """float64[EYE_SIZE, EYE_SIZE, 3]: pupil, fibres of the iris, soft limbus, sclera; the gaze is
     at the centre.
 
-    The iris takes a larger part of the texture than of the ball, see side_map.
+    The radius of the iris is IRIS_AT (0.26) of the texture's side, so the iris takes a larger part
+    of the texture than of the ball.
     """
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5

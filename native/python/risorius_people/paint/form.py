@@ -64,8 +64,8 @@ def _neighbours(edges: Ints, values: Floats) -> Floats:
 def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels) -> Floats:
     """float32[n]: heights of the face's form at the texels, in decimetres.
 
-    They are 0 where lips or lids meet, because there the neighbourhood includes the surface behind
-    the rim, and on ears, scalp and neck.
+    The heights are 0 where lips or lids meet, because there the neighbourhood includes the surface
+    behind the rim, and on ears, scalp and neck.
 
     Args:
         polygons: polygons of the head.

@@ -48,7 +48,8 @@ def depth_of(person: Person) -> float:
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """float64[V]: as `hairline_height`, but smaller for sparse hair and on ears."""
+    """float64[V]: distance from the hairline in decimetres, positive on the side with hair; smaller
+    for sparse hair and on ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))

@@ -95,7 +95,16 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later ones on top."""
+    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later hairs are on top.
+
+    Args:
+        hairs: look of the hairs.
+        number: number of the tile, which selects the number of hairs.
+        size: width and height of the tile in texels.
+        colour: mean colour of the hairs.
+        grey: fraction of grey hairs.
+        random: generator of the hairs.
+    """
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height
