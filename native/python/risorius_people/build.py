@@ -68,7 +68,8 @@ def leave_maps(dna: Dna) -> None:
     """Removes wrinkle maps from LOD 4 and coarser LODs; only the maps of flushed skin stay there.
 
     Args:
-        dna: the face; changed. Its animated maps and their conditionals begin with the flush maps.
+        dna: the face; changed. Its list of animated maps begins with the flush maps, and so does
+            the table of their conditionals.
     """
     outputs = dna.animated_maps.conditionals.output_indices
     flush = int((np.asarray(outputs) < len(FLUSH)).sum())

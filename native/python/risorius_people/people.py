@@ -69,7 +69,7 @@ class Person:
     beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
-        """Name of a body shape of the data -> weight; features are separate, see Source.feature."""
+        """Name of a body shape of the data -> weight, without the shapes in `features`."""
         ages: dict[str, float] = {}
         for (low, young), (high, old) in itertools.pairwise(_AGES):
             if low <= self.age <= high:

@@ -135,8 +135,8 @@ class Mapping:
     def _spellings(self, name: str) -> Iterator[str]:
         """The spellings under which a name is searched.
 
-        These are the name itself, the name without known prefixes, the name without a mesh's name
-        before it, and the vocabulary's spelling.
+        The spellings are the name itself, the name without known prefixes, the name without a
+        mesh's name before it (if names match loosely), and the vocabulary's spelling.
         """
         yield name
         for start in self.strip:
@@ -230,7 +230,14 @@ def _divided(
 ) -> tuple[Clip, dict[str, Doubles]]:
     """Divides each control of `mapping.shares` by the control of which it takes back a share.
 
-    The clip gets more frames if its keyframes are far apart, see `_between`.
+    The clip gets more frames if its keyframes are far apart, because a quotient of linear curves is
+    not linear between keyframes.
+
+    Args:
+        mapping: the mapping with the shares.
+        clip: the clip, of which frame times are used and may be replaced.
+        sums: control -> float64[frames], its curve before the division.
+        budget: budget of the clip.
     """
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]

@@ -196,7 +196,7 @@ def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
     Args:
         clip: any clip.
         cutoff: cutoff frequency of `OneEuro` at speed 0, in Hz; lower is smoother.
-        beta: increase of the cutoff with speed, see `OneEuro`.
+        beta: increase of the cutoff with speed, Hz per (unit per second).
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]

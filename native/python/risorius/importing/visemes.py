@@ -21,8 +21,8 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves. It is fine enough, because files give the times of mouth shapes
-# to a hundredth of a second or to a frame.
+# Frames per second of the curves. More frames are not needed, because files give the times of mouth
+# shapes to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12

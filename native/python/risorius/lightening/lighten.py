@@ -238,8 +238,13 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A function that reports progress from `begin` to `end`. It raises DnaError if the caller
-    stops the work."""
+    """A function that reports progress from `begin` to `end`, and raises DnaError if the caller
+    stops the work.
+
+    Args:
+        progress: called with the fraction of the whole work done; returning False stops the work.
+        begin, end: fractions of the whole work at the beginning and at the end of this part.
+    """
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:

@@ -152,7 +152,7 @@ def motion_rows(
 ) -> Iterator[Doubles]:
     """The motions of joints in poses minus the identity, a block of poses at a time.
 
-    They are 0 in the neutral pose.
+    The results are 0 in the neutral pose.
 
     Args:
         dna: the face.

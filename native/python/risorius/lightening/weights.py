@@ -97,8 +97,8 @@ class Refit:
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
         """int64[n, k]: joints that a vertex may follow, with repetitions.
 
-        They are the joints that took over the vertex, the parent of the first one, and the nearest
-        joints.
+        The joints are the ones that took over the vertex, the parent of the first one, and the
+        nearest joints.
         """
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]

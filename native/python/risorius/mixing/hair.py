@@ -112,7 +112,7 @@ def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles
 
 
 def budget_of(dna: Dna) -> Budget:
-    """The budget for mixing a face, as large as for compiling it; see native/README.md.
+    """Limits on memory and work for mixing a face, by its size; as large as for compiling it.
 
     Args:
         dna: the face.

@@ -77,7 +77,7 @@ def mix_faces(
     """Makes the weighted mean of faces.
 
     Args:
-        parents: compatible faces, see check_compatible; they are not changed.
+        parents: faces with equal names, topology and behavior; they are not changed.
         mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
         masks: masks of the first parent's regions; None: they are computed.

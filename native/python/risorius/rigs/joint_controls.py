@@ -71,7 +71,8 @@ class JointControl:
 
 
 def one_sign(turns: Doubles) -> Doubles:
-    """Choose q or -q, which are the same rotation, so that the last nonzero component is positive.
+    """float64[..., 4]: q or -q, which are the same rotation, whichever has a positive last nonzero
+    component.
 
     RBF solvers with Euclidean distances distinguish q from -q.
 

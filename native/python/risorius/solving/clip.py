@@ -154,7 +154,7 @@ def solve_clip(
         limits: the controls that may change, and their ranges; None: all except rotation
             components, from 0 to 1.
         most_points: largest number of compared vertices; residuals cover all vertices.
-        threads: number of threads; 0: all cores. It does not influence the result.
+        threads: number of threads, which does not influence the result; 0: all cores.
         progress: called with the fraction of the work done, 0 to 1; returning False cancels.
         keywords: fields of ControlLimits, if `limits` is None.
 

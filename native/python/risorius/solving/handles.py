@@ -2,8 +2,8 @@
 """Places handles for dragging: few vertices by which as many controls as possible can be set.
 
 The idea is from Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
-Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles
-are chosen one after the other, each for controls that the earlier ones cannot move.
+Manipulation", ACM Transactions on Graphics 40 (4), 2021. The authors use integer programming; here
+handles are chosen one after the other, each for controls that the earlier ones cannot move.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ class Unknowns:
     scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
-        """The same unknowns, all with the same ease (see ControlSharing)."""
+        """The same unknowns, all with the ease 1, so that all controls change equally readily."""
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:

@@ -97,8 +97,8 @@ class Surface:
     ) -> Floats:
         """float32[V, 3, R]: derivatives of vertex positions by each control at a pose.
 
-        They are differences of evaluated poses, so that correctives, solvers and networks are
-        included; controls at their upper limit are decreased.
+        The derivatives are differences of evaluated poses, so that correctives, solvers and
+        networks are included; controls at their upper limit are decreased.
 
         Args:
             raw: float[R], the pose.

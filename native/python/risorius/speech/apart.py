@@ -70,8 +70,12 @@ def speak_apart(
     """Does the work of speak in a separate process, which is killed if cancel() returns true.
 
     Args:
-        path, transcript, progress, cancel, options: see speak. progress and cancel are called from
-            the calling thread, which waits.
+        path: path of a sound file.
+        transcript: the spoken words in English, if known.
+        progress: called with the fraction of the work done, 0 to 1, from the calling thread, which
+            waits.
+        cancel: called repeatedly from the calling thread.
+        options: further keyword arguments of speak.
 
     Raises:
         RecogniserError: the process could not be started, or ended unexpectedly; errors of speak.

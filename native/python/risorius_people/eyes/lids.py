@@ -82,7 +82,8 @@ class Lids:
 
     Attributes:
         side: "l" or "r".
-        rings: int64[13, COLUMNS], 13 = OUTER + 1 + INNER, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye: OUTER (8) rings
+            outside the lashes' roots, the ring of the roots, and INNER (4) rings inside.
         openness: height of the upper lid above the middle of the ball, in radii of the iris.
         middle: float64[3], middle of the ball in decimetres.
         radius: radius of the ball in decimetres.

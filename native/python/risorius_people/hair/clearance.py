@@ -195,7 +195,8 @@ class _Posed:
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
 
-        They move as the cards that binding.py binds to the skin.
+        The edges move like cards that follow their roots: with the joints of the skin there, and
+        rotated if a blend shape tilts the skin.
         """
         ground = self._ground
         roots = ground.roots(strips)
@@ -214,8 +215,8 @@ class _Posed:
     def rough(self, strips: Strips) -> Floats:
         """float64[n, rows]: approximate heights of the guides above the skin.
 
-        They are measured from the tangent plane of the nearest vertex. Only every fourth vertex is
-        considered.
+        The heights are measured from the tangent plane of the nearest vertex. Only every fourth
+        vertex is considered.
         """
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
@@ -266,7 +267,7 @@ def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
 def _nearest(points: Floats, others: Floats) -> Ints:
     """int64[n]: index of the point of `others` nearest to each point.
 
-    It is computed in float32, which halves the time; the rounding errors are about a micrometre.
+    The search uses float32, which halves the time; the rounding errors are about a micrometre.
 
     Args:
         points: float64[n, 3], in decimetres.

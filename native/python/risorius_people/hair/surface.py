@@ -156,7 +156,7 @@ def nearest_places(
     Args:
         positions: float64[V, 3], positions of the vertices.
         triangles: int64[T, 3], vertices of the triangles.
-        around: int64[V, n], numbers of the triangles at each vertex, see `about`.
+        around: int64[V, n], numbers of the triangles at each vertex; numbers may be repeated.
         points: float64[n, 3], the points.
         vertex: int64[n], nearest vertex of each point; None: it is searched.
     """
