@@ -393,7 +393,12 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """(object, property) for each of `links` that ends at a property of an object."""
+    """(object, property) for each of `links` that ends at a property of an object.
+
+    Args:
+        scene: the file.
+        links: (parent's id, connected property or "") of each connection.
+    """
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -439,6 +444,11 @@ def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
 def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
     """Reads the keyframes of an AnimationCurve.
 
+    Args:
+        scene: the file.
+        node: record of the AnimationCurve.
+        notes: receives a sentence if weighted tangents are read as unweighted ones.
+
     Raises:
         AnimationFileError: numbers of times and values differ, or times do not ascend.
     """
@@ -475,6 +485,10 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
     The slopes are the one after the keyframe and the one before the next keyframe. The file stores
     flags and slopes once for each run of consecutive keyframes that share them. If the runs do not
     sum to `count`, all keyframes are linear.
+
+    Args:
+        node: record of the AnimationCurve.
+        count: number of keyframes.
     """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)

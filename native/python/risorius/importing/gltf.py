@@ -189,7 +189,14 @@ class Document:
     def _put_sparse(
         self, sparse: Mapping[str, Any], at: str, dtype: np.dtype[Any], out: Doubles
     ) -> None:
-        """Writes the rows of a sparse accessor into `out`."""
+        """Writes the rows of a sparse accessor into `out`.
+
+        Args:
+            sparse: table `sparse` of the accessor.
+            at: place of the table in the JSON, for errors.
+            dtype: type of the stored components.
+            out: float64[count, n], values of the accessor; changed.
+        """
         count = self.whole(sparse, "count", at)
         parts = [sparse.get("indices"), sparse.get("values")]
         if not all(isinstance(part, dict) for part in parts):
@@ -212,7 +219,14 @@ class Document:
     def _viewed(
         self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
     ) -> npt.NDArray[Any]:
-        """An array of `shape` at a table's bufferView and byteOffset, with the view's stride."""
+        """An array of `shape` at a table's bufferView and byteOffset, with the view's stride.
+
+        Args:
+            table: table with a bufferView and byteOffset: an accessor, or a part of a sparse one.
+            at: place of the table in the JSON, for errors.
+            dtype: type of the stored components.
+            shape: number of rows, and of components per row.
+        """
         number = table.get("bufferView")
         view = self.item("bufferViews", number, at)
         view_at = f"bufferViews[{number}]"
@@ -234,7 +248,12 @@ class Document:
         return np.ndarray(shape, dtype, data, start + inside, (stride, dtype.itemsize))
 
     def _part(self, index: object, place: str) -> tuple[bytes, int, int]:
-        """(bytes, offset, length) of a buffer view's content, unpacked if it is packed."""
+        """(bytes, offset, length) of a buffer view's content, unpacked if it is packed.
+
+        Args:
+            index: index of the buffer view, as in the file.
+            place: place of the index in the JSON, for errors.
+        """
         view = self.item("bufferViews", index, place)
         view_at = f"bufferViews[{index}]"
         number = int(index)  # type: ignore[call-overload]  # item says it is one
@@ -253,7 +272,12 @@ class Document:
         return out, 0, len(out)
 
     def _stored(self, table: Mapping[str, Any], place: str) -> tuple[bytes, int, int]:
-        """(buffer, byteOffset, byteLength) of a table."""
+        """(buffer, byteOffset, byteLength) of a table.
+
+        Args:
+            table: table of the JSON that names a buffer and a range of its bytes.
+            place: place of the table in the JSON, for errors.
+        """
         data = self._buffer(table.get("buffer"), place)
         start, size = (self.whole(table, key, place) for key in ("byteOffset", "byteLength"))
         if start + size > len(data):
@@ -622,7 +646,15 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """The keyframes of each curve of an animation channel, in the order of `names`."""
+    """The keyframes of each curve of an animation channel, in the order of `names`.
+
+    Args:
+        document: the glTF.
+        animation: table of the animation.
+        channel: table of the animation channel.
+        names: names of the channel's curves.
+        place: place of the channel in the JSON, for errors.
+    """
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

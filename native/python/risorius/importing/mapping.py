@@ -178,6 +178,10 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     by it, then adjusted. Values stay bitwise equal if one curve moves a control with weight 1,
     without share or adjustment.
 
+    Args:
+        mapping: the mapping.
+        clip: curves with the file's own names.
+
     Raises:
         BudgetError: too many controls or patterns for the size of the clip.
     """
@@ -413,6 +417,10 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 
     "vocabulary NAME" means the names of a vocabulary of controls.vocabulary. For ARKit and VRM the
     ARKit units are included.
+
+    Args:
+        table: the mapping as TOML.
+        where: name of the mapping in errors.
     """
     base = _text(table, "base", where)
     if not base:
@@ -479,6 +487,12 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
     "@PP" means the controls of the expression PP. A control ending in * means the controls of both
     sides, one ending in ** the controls of the four lip quarters, unless the row's key contains a
     *. A name without a dot gets the prefix.
+
+    Args:
+        key: name of the curve in the source.
+        value: value of the row in the TOML.
+        prefix: text before names of controls without a dot.
+        where: name of the mapping in errors.
     """
     if isinstance(value, str):
         value = {"@" + value: 1.0}
@@ -509,7 +523,13 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
 
 
 def _expression(name: str, at: str, where: str) -> Table[str, float]:
-    """Control -> weight of an expression."""
+    """Control -> weight of an expression.
+
+    Args:
+        name: name of the expression.
+        at: place in the TOML, for errors.
+        where: name of the mapping in errors.
+    """
     try:
         return expressions.get(name).weights
     except ValueError as error:
@@ -521,6 +541,11 @@ def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
 
     "" instead of a control removes an entry of the base mapping. A share of a share is an error,
     because the result would depend on the order of the divisions.
+
+    Args:
+        table: the table `shares` of the TOML.
+        prefix: text before names of controls without a dot.
+        where: name of the mapping in errors.
     """
     out: dict[str, str] = {}
     for key, value in table.items():

@@ -295,7 +295,12 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key of a time, or of a list of times; a frame number only if there is no time."""
+    """The key of a time, or of a list of times; a frame number only if there is no time.
+
+    Args:
+        table: table of the JSON.
+        of_lists: whether to find a list of times instead of a single time.
+    """
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()

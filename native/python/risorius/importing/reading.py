@@ -170,6 +170,11 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     """Keeps the requested angles of head and eyes.
 
     Head angles that are all 0 are dropped, because their curves would only keep the head still.
+
+    Args:
+        done: the mapped clip.
+        rotations: angles to keep: "head" (head and neck), "all" (the eyes' angles too) or "none".
+        report: receives the dropped curves and a note; changed.
     """
     clip = done.clip
     drop = set()
@@ -191,7 +196,13 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 
 
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
-    """Converts GUI curves to raw controls, frame by frame, with the rig's table."""
+    """Converts GUI curves to raw controls, frame by frame, with the rig's table.
+
+    Args:
+        clip: curves of GUI controls and angles; the angles are kept.
+        rig: rig with the table from GUI controls to raw controls.
+        report: receives a note and the controls that the rig lacks; changed.
+    """
     index = {name: i for i, name in enumerate(rig.gui_control_names)}
     gui = np.zeros((clip.frame_count, len(index)), np.float32)
     angles = [name for name in clip.names if name in ANGLES]

@@ -275,7 +275,9 @@ def is_live_link_face(header: Sequence[str]) -> bool:
 
 
 def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
-    """Reads a take of Live Link Face; times come from the timecode, not from the row number.
+    """Reads a take of Live Link Face.
+
+    Times come from the timecode, or from the row number if the caller's options say so.
 
     Args:
         table: timecode and number of shapes, then 51 to 61 curves in any order.
@@ -360,7 +362,12 @@ def _note_count(table: Table, found: int, notes: list[str]) -> None:
 
 
 def _note_dropped(times: Doubles, notes: list[str]) -> None:
-    """Adds a note on gaps in the times: a phone under load does not record every frame."""
+    """Adds a note on gaps in the times: a phone under load does not record every frame.
+
+    Args:
+        times: float64[frames], seconds, ascending.
+        notes: receives the note.
+    """
     if times.size < 3:
         return
     steps = np.diff(times)
@@ -430,7 +437,13 @@ def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
-    """Whether a column is a curve, and not a row number, a count, a second time, or text."""
+    """Whether a column is a curve, and not a row number, a count, a second time, or text.
+
+    Args:
+        table: any table.
+        column: index of the column.
+        notes: receives a sentence if an empty column or a column of text is left out.
+    """
     header = plain(table.header[column])
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
@@ -485,7 +498,12 @@ def _by_curve(table: Table, at: int) -> tuple[Table, int]:
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
-    """Index of the column that contains only mouth shapes of Rhubarb; None if not exactly one."""
+    """Index of the column that contains only mouth shapes of Rhubarb; None if not exactly one.
+
+    Args:
+        table: any table.
+        at: index of the column of times, or None.
+    """
     found = [
         i
         for i in range(len(table.header))
@@ -495,7 +513,14 @@ def _shapes(table: Table, at: int | None) -> int | None:
 
 
 def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
-    """float64[columns, rows]; missing values are interpolated from other rows."""
+    """float64[columns, rows]; missing values are interpolated from other rows.
+
+    Args:
+        table: any table.
+        columns: indices of the columns with curves.
+        times: float64[rows], seconds.
+        notes: receives sentences about interpolated values.
+    """
     holes: list[tuple[str, int]] = []
     curves = np.array([_column(table, column, times, holes) for column in columns])
     if len(holes) > _HOLES_BY_NAME:

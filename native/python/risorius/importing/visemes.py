@@ -97,6 +97,13 @@ def _take(
 ) -> Take:
     """Makes a take from cues: curves at RATE, and the cues themselves as events.
 
+    Args:
+        cues: mouth shapes in order of time.
+        kind: one of `importing.KINDS`.
+        name: the file's name in errors.
+        notes: sentences for the user.
+        events: further events of the clip.
+
     Raises:
         AnimationFileError: no cue has a length, or a cue ends after LONGEST. BudgetError: too many
             shapes for a track of this length.
@@ -121,7 +128,13 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first."""
+    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first.
+
+    Args:
+        starts: (start in seconds, shape) of each cue, ascending.
+        end: end of the last cue in seconds.
+        rest: shape before the first start.
+    """
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -457,7 +470,13 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest".
+
+    Args:
+        voices: (name, words) of each voice.
+        rate: frames per second.
+        name: the file's name in errors.
+    """
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]

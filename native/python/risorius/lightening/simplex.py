@@ -45,7 +45,13 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0."""
+    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0.
+
+    Args:
+        grams: float64[n, k, k], matrix of each problem.
+        rights: float64[n, k], right side of each problem.
+        active: bool[n, k], weights that are not fixed to 0.
+    """
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

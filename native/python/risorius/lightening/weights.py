@@ -99,6 +99,10 @@ class Refit:
 
         The joints are the ones that took over the vertex, the parent of the first one, and the
         nearest joints.
+
+        Args:
+            points: float64[n, 3], the vertices relative to the face's centre.
+            rows: float64[n, J], weights after other joints took over vertices of removed joints.
         """
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
@@ -110,7 +114,12 @@ class Refit:
 
 
 def _with_rows(mesh: Mesh, rows: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with new joints and weights of some vertices."""
+    """The mesh with new joints and weights of some vertices.
+
+    Args:
+        mesh: the mesh; not changed.
+        rows: vertex -> (its joints, their weights).
+    """
     out = copy.copy(mesh)
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     joints = np.split(np.asarray(mesh.skin_joint_indices, np.int64), offsets[1:-1])

@@ -124,7 +124,13 @@ class Roster(Generic[Key, Item]):
         return True
 
     def _leaving(self, newcomer: Item, address: str, now: float) -> Key | None:
-        """Key of the sender that a newcomer displaces, or None."""
+        """Key of the sender that a newcomer displaces, or None.
+
+        Args:
+            newcomer: record of the new sender.
+            address: network address of the new sender.
+            now: present time in seconds.
+        """
         shares = Counter(place.address for place in self._places.values())
         firsts: dict[str, Key] = {}
         for key, place in self._places.items():

@@ -80,7 +80,13 @@ class Plan:
 
 
 def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
-    """{control: weight} of each name; empty for an ignored name, None for an unknown one."""
+    """{control: weight} of each name; empty for an ignored name, None for an unknown one.
+
+    Args:
+        names: names in a frame.
+        mapping: the mapping; names that it lacks may be raw controls, angles, or names of any
+            vocabulary.
+    """
     find = mapping.finder()
     rows = [found[1] if (found := find(name)) else None for name in names]
     units = sum(bool(row) for row in rows)
@@ -117,6 +123,10 @@ def _look(name: str, mapping: Mapping) -> Row:
     """{control: weight} for an eye's angle in radians.
 
     Positive angles move one look unit, such as eyeLookUpLeft, negative ones the opposite unit.
+
+    Args:
+        name: name of the angle, such as "eyeL.yaw".
+        mapping: converts ARKit units to controls.
     """
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):

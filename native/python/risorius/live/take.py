@@ -47,7 +47,7 @@ class Take:
                 later but not removed.
 
         Returns:
-            A Clip with a time per frame. Before a control first arrives its curve is 0.
+            A Clip with a time per frame. A curve is 0 in frames that do not give its control.
         """
         shaper = (shaper or Shaper()).without_smoothing()
         rows = [shaper.apply(frame) for frame in self._frames]

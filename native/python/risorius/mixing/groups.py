@@ -57,7 +57,12 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """The weighted mean of joint groups with equal rows and columns, one from each mixed face."""
+    """The weighted mean of joint groups with equal rows and columns, one from each mixed face.
+
+    Args:
+        groups: the joint group of each parent.
+        share: weights of the parents for each joint.
+    """
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
@@ -71,7 +76,13 @@ def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
 
 
 def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
-    """float64[n]: weights of one parent for rows; only translations include the region's scale."""
+    """float64[n]: weights of one parent for rows; only translations include the region's scale.
+
+    Args:
+        share: weights of the parents for each joint.
+        parent: index of the parent.
+        rows: int64[n], rows of the joint matrix: 9 * joint + attribute.
+    """
     joints = rows // 9
     return np.where(rows % 9 < 3, share.scaled[joints, parent], share.weights[joints, parent])
 

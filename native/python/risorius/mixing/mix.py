@@ -184,7 +184,12 @@ def _spread(points: Doubles, weights: Doubles) -> float:
 
 
 def _middles(points: Doubles, masks: Doubles) -> Doubles:
-    """float64[regions, 3]: the mean of the points, weighted by each region's mask."""
+    """float64[regions, 3]: the mean of the points, weighted by each region's mask.
+
+    Args:
+        points: float64[n, 3], the points.
+        masks: float64[n, regions], weight of each point in each region.
+    """
     total = masks.sum(axis=0)[:, None]
     return np.asarray(masks.T @ points / np.maximum(total, 1e-30))
 
@@ -233,7 +238,12 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
 
 def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget]:
-    """Blend shape targets with all vertices that any parent moves."""
+    """Blend shape targets with all vertices that any parent moves.
+
+    Args:
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents times the scale of their regions.
+    """
     own = [
         {int(t.blend_shape_channel_index): t for t in mesh.blend_shape_targets} for mesh in parents
     ]
@@ -261,7 +271,13 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights."""
+    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights.
+
+    Args:
+        out: the mixed mesh; changed.
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents.
+    """
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -321,7 +337,13 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
 
 
 def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
-    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations."""
+    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations.
+
+    Args:
+        out: the mix; changed.
+        parents: the mixed faces.
+        share: weights of the parents for each joint.
+    """
     weights = share.weights
     shifts = [np.asarray(p.neutral_joint_translations, np.float64) for p in parents]
     turns = [np.asarray(p.neutral_joint_rotations, np.float64) for p in parents]
@@ -349,7 +371,13 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
 
 
 def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
-    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ."""
+    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ.
+
+    Args:
+        out: the mix, whose rotation convention is used.
+        turns: float64[J, 3] of each parent, neutral rotations in the file's unit.
+        weights: float64[J, P], weights of the parents.
+    """
     convention = Convention.of(out)
     rows = turns[0].copy()
     for joint in range(len(rows)):

@@ -174,7 +174,12 @@ def _shares(amounts: Doubles) -> Doubles:
 
 
 def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
-    """Smooths masks over neighbouring vertices, then sharpens them towards the main region."""
+    """Smooths masks over neighbouring vertices, then sharpens them towards the main region.
+
+    Args:
+        mesh: the mesh.
+        masks: float64[V, regions], rows sum to 1.
+    """
     edges = sk.mesh_edges(mesh).astype(np.int64)
     if not len(edges):
         return masks

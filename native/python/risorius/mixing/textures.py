@@ -130,7 +130,12 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 
 
 def _bytes(path: Path, name: str) -> bytes | None:
-    """The bytes of a file in the texture folder or beside the DNA file; None if there is none."""
+    """The bytes of a file in the texture folder or beside the DNA file; None if there is none.
+
+    Args:
+        path: path of the DNA file.
+        name: name of the file to read.
+    """
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError, ReadingError):
             return read_file(folder / name, _MOST_BYTES, found=True)
@@ -138,7 +143,12 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can."""
+    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can.
+
+    Args:
+        data: bytes of the image of each parent, or None.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"
@@ -152,7 +162,12 @@ def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
 
 
 def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
-    """The weighted mean of images with equal sizes; empty if one is damaged."""
+    """The weighted mean of images with equal sizes; empty if one is damaged.
+
+    Args:
+        data: bytes of the image of each parent.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
         return next(iter(counted.values()))

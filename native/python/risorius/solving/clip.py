@@ -194,14 +194,25 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`."""
+    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`.
+
+    Args:
+        moved: index of a mesh -> float32[F, V, 3], its target positions.
+        points: int64[P, 2], mesh and vertex of each point, sorted by mesh.
+    """
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )
 
 
 def _curves(job: _Job, count: int, workers: int) -> Doubles:
-    """float64[F, R]: controls of all frames, solved frame by frame, then together."""
+    """float64[F, R]: controls of all frames, solved frame by frame, then together.
+
+    Args:
+        job: input of the solve; its expected error is raised to the remaining error.
+        count: number of frames F.
+        workers: number of threads.
+    """
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
     # The remaining error counts as noise, because the motion of another face is never
@@ -220,7 +231,14 @@ def _begins(job: _Job, count: int) -> dict[int, Doubles]:
 
 
 def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> Doubles:
-    """float64[F, R]: controls of all frames, each frame solved alone."""
+    """float64[F, R]: controls of all frames, each frame solved alone.
+
+    Args:
+        job: input of the solve.
+        count: number of frames F.
+        begins: first frame of each chunk -> float64[R], the controls in this frame.
+        workers: number of threads.
+    """
     curves = np.tile(job.rest, (count, 1))
 
     def chunk(begin: int) -> None:
@@ -235,7 +253,12 @@ def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> D
 
 
 def _prices(job: _Job, matrix: Doubles) -> Doubles:
-    """float64[R]: price per unit of each control, a multiple of the gradient from noise alone."""
+    """float64[R]: price per unit of each control, a multiple of the gradient from noise alone.
+
+    Args:
+        job: input of the solve.
+        matrix: float64[R, R], normal matrix J^T J of the derivatives.
+    """
     return job.sparse * _WORTH * np.sqrt(np.maximum(np.diag(matrix), 0)) / job.sigma
 
 
@@ -283,6 +306,11 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
     controls that differ from their initial values in some frame solved alone may change; the price
     of a change is only job.sparse per unit of the control.
+
+    Args:
+        job: input of the solve.
+        curves: float64[F, R], the frames solved alone.
+        workers: number of threads.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
@@ -320,6 +348,11 @@ def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Double
     The price is job.smooth / d^2, where d is the typical second difference of the control's curve
     without noise. Near a frame whose own second difference is clearly above the noise, d is at
     least that local value. A blink therefore stays sharp while a slow jaw is smoothed.
+
+    Args:
+        job: input of the solve.
+        curves: float64[F, R], the frames solved alone.
+        used: indices of the controls that may change.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))
@@ -496,7 +529,14 @@ def _moved(
     wanted: dict[int, Floats],
     neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None,
 ) -> dict[int, Floats]:
-    """Mesh -> float32[F, V, 3]: target positions for the face's own vertices."""
+    """Mesh -> float32[F, V, 3]: target positions for the face's own vertices.
+
+    Args:
+        surface: surface of the face.
+        wanted: mesh -> float32[F, V, 3], vertices of the moving mesh.
+        neutral: mesh -> float[V, 3], the moving mesh with a neutral face, whose displacements are
+            then added to the face's own neutral; None: `wanted` is returned.
+    """
     if neutral is None:
         return wanted
     own = _meshes("neutral", surface, neutral, 2)

@@ -203,6 +203,11 @@ def _both_on(
     """(weaker, stronger) controls of each opposite pair whose smaller value increased from `begin`.
 
     The weaker control has the smaller value in `begin`, or in `at` if both are equal in `begin`.
+
+    Args:
+        opposites: int64[N, 2], indices of opposite controls.
+        at: float64[R], a solved pose.
+        begin: float64[R], the pose at the beginning.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -212,7 +217,13 @@ def _both_on(
 
 
 def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
-    """Gradient descent within the limits; each step's length minimises the linearised error."""
+    """Gradient descent within the limits; each step's length minimises the linearised error.
+
+    Args:
+        drag: equations of the drag.
+        at: float64[R], the pose where the descent starts.
+        rounds: a third of the largest number of steps.
+    """
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
         toward = drag.unknowns.columns(jacobian).T @ missing
@@ -299,7 +310,13 @@ def best_controls(
 
 def _alone(drag: Drag, begin: Doubles, control: int) -> tuple[int, float, float]:
     """The control, its best value, and the remaining distance; solved by secants, because the face
-    is not linear."""
+    is not linear.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose of all other controls.
+        control: index of the control.
+    """
     low, high = float(drag.low[control]), float(drag.high[control])
     places = np.linspace(low, high, 5)
     at = begin.copy()

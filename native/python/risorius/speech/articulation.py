@@ -126,7 +126,12 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
 
 
 def _smoothed(curves: Curves, times: Times) -> Curves:
-    """Smooths with a Gaussian over time, without delay; the first and last values are extended."""
+    """Smooths with a Gaussian over time, without delay; the first and last values are extended.
+
+    Args:
+        curves: float64[frames, n].
+        times: float64[frames], seconds, ascending in equal steps.
+    """
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0
     reach = int(np.ceil(3.0 * _SMOOTHING / step))
     held = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")

@@ -181,6 +181,12 @@ def _piece(
     """The phonemes from `begin` to `end` seconds of the voice, in times of the whole sound.
 
     The words `said` are aligned; if this fails or there are none, phonemes are recognised.
+
+    Args:
+        recogniser: decoders.
+        samples: float32[n], the whole voice at RATE samples per second.
+        begin, end: first and last second of the piece.
+        said: words of the piece.
     """
     piece = samples[int(begin * RATE) : int(end * RATE)]
     phones = recogniser.align_phonemes(piece, said) if said else None
@@ -191,14 +197,24 @@ def _piece(
 
 def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
     """Converts times in a piece from `begin` to `end` seconds to times in the whole sound, at most
-    `end`."""
+    `end`.
+
+    Args:
+        found: phonemes with times in the piece.
+        begin, end: first and last second of the piece.
+    """
     return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
 
 
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words."""
+    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words.
+
+    Args:
+        segments: the words that were heard, with times.
+        duration: duration of the voice in seconds.
+    """
     parts: list[tuple[float, float, list[str]]] = []
     for segment in segments:
         last = parts[-1][1] if parts else 0.0
@@ -221,7 +237,12 @@ def confidence(found: Sequence[Phoneme]) -> float:
 
 
 def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[str]:
-    """Sentences for the user if the transcript seems not to belong to this voice."""
+    """Sentences for the user if the transcript seems not to belong to this voice.
+
+    Args:
+        found: aligned phonemes.
+        levels: float64[n], loudness in decibels every STEP seconds.
+    """
     notes = []
     if confidence(found) < _DOUBTFUL:
         notes.append("the transcript fits the voice badly: does it belong to another recording?")
@@ -240,7 +261,12 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
 def _word_pieces(
     segments: Sequence[Segment], duration: float
 ) -> Iterator[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece; pieces are cut in pauses and cover the whole duration."""
+    """(begin, end, words) of each piece; pieces are cut in pauses and cover the whole duration.
+
+    Args:
+        segments: all words with times, and silences between them.
+        duration: duration of the voice in seconds.
+    """
     begin = 0.0
     said: list[str] = []
     for segment in segments:

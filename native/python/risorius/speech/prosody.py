@@ -125,7 +125,13 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
 
 
 def _measure(phone: Phoneme, levels: Curve, heights: Curve) -> tuple[float, float, float]:
-    """(loudness in dB, pitch in semitones or NaN, duration in seconds up to 0.3) of a vowel."""
+    """(loudness in dB, pitch in semitones or NaN, duration in seconds up to 0.3) of a vowel.
+
+    Args:
+        phone: the vowel.
+        levels: float64[n], loudness in decibels every STEP seconds.
+        heights: float64[n], pitch in semitones every STEP seconds, or NaN.
+    """
     first = min(int(phone.begin / STEP), len(levels) - 1)
     last = max(first + 1, int(phone.end / STEP))
     voiced = heights[first:last][np.isfinite(heights[first:last])]

@@ -141,7 +141,12 @@ class Recogniser:
         return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
-        """The phonemes of the most likely English words; None if no words are recognised."""
+        """The phonemes of the most likely English words; None if no words are recognised, or their
+        phonemes cannot be timed.
+
+        Args:
+            samples: samples of a piece of a voice at RATE per second.
+        """
         decoder = self._decoder("words")
         decoder.activate_search()
         _decode(decoder, _pcm(samples))

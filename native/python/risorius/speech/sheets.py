@@ -96,7 +96,7 @@ def textgrid(found: Sequence[Phoneme]) -> str:
 
 
 def read(data: bytes, name: str) -> list[Phoneme]:
-    """Reads the phonemes of a file in either format, in order; gaps are silence.
+    """Reads the phonemes of a file in either format, in order; gaps between them mean silence.
 
     Args:
         data: content of the file in UTF-8, or in UTF-16 with a byte order mark.

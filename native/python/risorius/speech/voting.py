@@ -100,7 +100,12 @@ def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
-    """Sets each word at the phoneme that begins nearest to it, at most one word per phoneme."""
+    """Sets each word at the phoneme that begins nearest to it, at most one word per phoneme.
+
+    Args:
+        found: phonemes; changed.
+        words: the words with their times.
+    """
     spoken = [i for i, phone in enumerate(found) if phone.name != "SIL"]
     if not spoken:
         return found

@@ -102,7 +102,13 @@ class _Finder:
         return material
 
     def _picture(self, name: str, role: str, kind: str = "") -> dict[str, int]:
-        """Role -> number of a picture; a colour picture with opacity is split into two pictures."""
+        """Role -> number of a picture; a colour picture with opacity is split into two pictures.
+
+        Args:
+            name: file name of the picture.
+            role: role of the picture, such as color.
+            kind: kind of the mesh, such as hair.
+        """
         if (name, role) in self.numbers:
             return self.numbers[name, role]
         data = self.textures.read(name)

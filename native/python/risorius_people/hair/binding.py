@@ -230,7 +230,14 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: whether all controls and neck joints move a place by less than `least`."""
+    """bool[n]: whether all controls and neck joints move a place by less than `least`.
+
+    Args:
+        dna: the face.
+        head: the mesh of the skin.
+        places: the places on the skin.
+        least: length in the unit of the mesh.
+    """
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

@@ -244,7 +244,12 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Shortens or drops the hairs `some` that come too near to the skin in a pose."""
+        """Shortens or drops the hairs `some` that come too near to the skin in a pose.
+
+        Args:
+            pose: the skin in the pose.
+            some: indices of hairs.
+        """
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]
@@ -258,7 +263,12 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose."""
+    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose.
+
+    Args:
+        heights: float64[n, rows, 2], heights of the hairs' edges above the skin in a pose.
+        rest: float64[n, rows, 2], the heights in the neutral pose.
+    """
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))

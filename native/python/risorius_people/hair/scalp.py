@@ -250,7 +250,14 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """A fringe: hair from behind the hairline falls over the forehead, and ends at one height."""
+    """A fringe: hair from behind the hairline falls over the forehead, and ends at one height.
+
+    Args:
+        surface: surface of the head.
+        person: the person; `hair_fringe` is the length of the fringe, 0 to 1.
+        rows: number of points of a guide.
+        random: generator of the strips.
+    """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T

@@ -178,7 +178,13 @@ def nearest_places(
 
 
 def _apart(points: Floats, density: Floats, spacing: float) -> Ints:
-    """Indices of points that are not too near to each other; earlier points have priority."""
+    """Indices of points that are not too near to each other; earlier points have priority.
+
+    Args:
+        points: float64[n, 3].
+        density: float64[n], 0 to 1; the smallest distance is spacing / sqrt(density).
+        spacing: smallest distance at density 1.
+    """
     reach = (spacing / np.sqrt(np.maximum(density, 1e-6))) ** 2
     keep = np.zeros(0, np.int64)
     rest = np.flatnonzero(density > 0.02)

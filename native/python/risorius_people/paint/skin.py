@@ -310,7 +310,13 @@ class Skin:
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
-    """Blends a colour over linear light by a mask from 0 to 1."""
+    """Blends a colour over linear light by a mask from 0 to 1.
+
+    Args:
+        light: float32[n, 3], linear light.
+        colour: float[3] or [n, 3], linear light of the colour.
+        mask: float[n]; values are clipped to 0 to 1.
+    """
     mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
     out = np.asarray(light * (1 - mask))
     out += colour.astype(np.float32) * mask

@@ -80,7 +80,14 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
 
 
 def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
-    """float64[count, 3]: colours of single hairs, some of them grey."""
+    """float64[count, 3]: colours of single hairs, some of them grey.
+
+    Args:
+        colour: mean colour of the hairs, sRGB in [0, 1].
+        grey: fraction of grey hairs.
+        count: number of hairs.
+        random: generator of the colours.
+    """
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
     own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some hairs are redder
     white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))

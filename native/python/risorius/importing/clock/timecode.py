@@ -89,6 +89,11 @@ def _measured(
 
     The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
     unusual rate is accepted only if several drops agree or no rows are lost.
+
+    Args:
+        frames: float64[codes], frame number of each timecode.
+        seconds: int[codes], whole seconds since midnight of each timecode.
+        largest: largest frame number, which the result must exceed.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]

@@ -188,7 +188,16 @@ def seconds_of(
 
 
 def _shown(values: Doubles, name: str, column: str | None) -> str:
-    """Infers the unit of times from their size and steps. Raises: AnimationFileError: none fits."""
+    """Infers the unit of times from their size and steps.
+
+    Args:
+        values: float64[frames], times as in the file.
+        name: the file's name in errors.
+        column: column of the times, for errors.
+
+    Raises:
+        AnimationFileError: none fits.
+    """
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
         if np.isfinite(smallest) and smallest > least:
