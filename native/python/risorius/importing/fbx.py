@@ -362,7 +362,8 @@ def _curves(
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                # a copy of the blend shape's percentage, which exporters add for other software
+                # This is a copy of the blend shape's percentage, which exporters add for other
+                # software.
                 continue
             scene.budget.work(len(parts), "connections")
             named = _named(scene, owner, way, parts)

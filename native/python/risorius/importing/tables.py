@@ -145,7 +145,7 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
     content, delimiter, comment = _without_comments(re.split(r"\r\n|\n|\r", text))
     delimiter = delimiter or sniff(next((line for line in content if line.strip()), ""))
-    # strict, because an unclosed quote would swallow the rest of the file
+    # The reader is strict, because an unclosed quote would swallow the rest of the file.
     reader = csv.reader(content, delimiter=delimiter, strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []

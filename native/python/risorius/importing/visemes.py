@@ -142,7 +142,7 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Whether at least half of the lines consist of a time and a Rhubarb shape, and the first one
+    """Whether at least half of the lines consist of a time and a Rhubarb shape, and the first line
     begins with a digit."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)

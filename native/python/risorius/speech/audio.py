@@ -126,7 +126,7 @@ def _format(chunk: bytes, offset: int) -> _Format:
         raise AudioError(f"byte {offset}: a fmt chunk of 16 bytes was expected, found {len(chunk)}")
     code, channels, rate, _, block, bits = struct.unpack_from("<HHIIHH", chunk)
     if code == _EXTENSIBLE and len(chunk) >= 26:
-        # the format code at the beginning of the sub-format's GUID
+        # The format code is at the beginning of the sub-format's GUID.
         code = struct.unpack_from("<H", chunk, 24)[0]
     if not 1 <= channels <= _MOST_CHANNELS:
         raise AudioError(
@@ -170,11 +170,11 @@ def _decode(body: bytes, form: _Format) -> Samples:
 
 
 def _one_channel(channels: Samples) -> Samples:
-    """Converts float32[samples, channels] to float32[samples]."""
+    """float32[samples]: the mean of float32[samples, channels], or the loudest channel if the mean
+    loses the voice."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # If microphones have opposite polarity, the mean of the channels loses the voice, so the
-    # loudest channel is used.
+    # Channels of microphones with opposite polarity cancel out in the mean.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean

@@ -230,7 +230,10 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: whether all controls and neck joints move a place by less than `least`.
+    """bool[n]: whether a place stays still relative to the head joint.
+
+    A place does if all controls except those of head and neck move it by less than `least`, and if
+    its weights of joints other than the head joint and its descendants are negligible.
 
     Args:
         dna: the face.

@@ -117,7 +117,7 @@ class Surface:
 
 
 def about(triangles: Ints, count: int) -> Ints:
-    """int64[count, n]: numbers of the triangles at each vertex; short rows repeat the last number.
+    """int64[count, n]: numbers of the triangles at each vertex; short rows repeat their last one.
 
     Args:
         triangles: int64[T, 3], vertices of the triangles.

@@ -129,7 +129,7 @@ def lips_of(rings: Floats) -> Floats:
     """float64[V]: 1 on the lips and in the mouth, where no hair grows, else 0.
 
     Args:
-        rings: float64[V], as `Face.mouth`.
+        rings: float64[V], `Face.mouth`.
     """
     return smooth(LIPS_RINGS + 1.0, LIPS_RINGS, rings)
 
