@@ -1196,7 +1196,7 @@ def quaternion_column_orders(dna: Dna) -> list[npt.NDArray[np.uint32]]:
     """
 
 def available_simd() -> str:
-    """The instruction sets of this processor, in the words of `simd=`, separated by blanks."""
+    """The instruction sets of this processor, in the words of `simd=`, separated by ", "."""
 
 class GroupSizes:
     """Number of joint groups, rows, stored coefficients (with zeros), and nonzero coefficients."""

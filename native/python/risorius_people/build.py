@@ -68,7 +68,8 @@ def leave_maps(dna: Dna) -> None:
     """Removes wrinkle maps from LOD 4 and coarser LODs; only the maps of flushed skin stay there.
 
     Args:
-        dna: the face; changed. Its animated maps and their conditionals begin with the flush maps.
+        dna: the face; changed. Its list of animated maps begins with the flush maps, and so does
+            the table of their conditionals.
     """
     outputs = dna.animated_maps.conditionals.output_indices
     flush = int((np.asarray(outputs) < len(FLUSH)).sum())
@@ -400,7 +401,7 @@ def build_sample(
         correctives: options of the search for correctives in addition to the built-in ones.
         data: path of the data wheel; None: it is downloaded.
         offline: whether to use only cached data.
-        texture_size: largest number of texels of a texture, as the side of a square.
+        texture_size: a texture has at most as many texels as a square with this side.
         say: called with a line of text per step.
         progress: called with the fraction of the work done, 0 to 1; returning False stops the
             build.

@@ -55,11 +55,11 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 
 
 def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
-    """Cuts a mesh by a plane and removes the part below; cut edges get a new vertex.
+    """Removes the part of a mesh below a height; edges that cross this height get a new vertex.
 
     Args:
         mesh: the mesh; not changed.
-        heights: float64[V], height of each vertex above the plane.
+        heights: float64[V], height of each vertex, by any measure.
         level: height at which the mesh is cut.
 
     Returns:

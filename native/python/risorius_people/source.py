@@ -106,7 +106,8 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
     Args:
         command: the command to run.
         folder: folder of the download and of pip's temporary files.
-        fetched: see `fetch`.
+        fetched: called repeatedly with the number of bytes so far; returning False stops the
+            download.
 
     Returns:
         The last line of its error output if it failed, else None.

@@ -174,7 +174,10 @@ def _frames(triangles: Floats) -> Floats:
 def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
-    """Name of a mask -> float64[V, 4], folds as in Surface.folds.
+    """Name of a mask -> float64[V, 4]: compression at each vertex (0 to 1), and the direction of
+    the folds as a tensor xx, xy, yy, multiplied by the compression.
+
+    The folds of a mask come from the first of its controls at 1.
 
     Args:
         part: the head mesh.
@@ -316,7 +319,8 @@ def fold_heights(folds: Floats, strength: Floats) -> Floats:
     """float64[h, w]: the relief of all folds of a texture set, in decimetres, 0 without folds.
 
     Args:
-        folds: float64[h, w, 4], sum of vertex_folds in the texture.
+        folds: float64[h, w, 4], sum of the folds of the set's masks at each texel: compression, and
+            xx, xy, yy of their direction.
         strength: float64[h, w], factor on the depth: 1 for a forehead at 30 years.
     """
     depth = np.clip(folds[..., 0], 0, 1)

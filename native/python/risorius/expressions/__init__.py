@@ -134,7 +134,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
     """Convert an expression to raw controls of a rig.
 
     Args:
-        expression: an Expression, or the name of one of load().
+        expression: an Expression, or the name of an expression that load() returns.
         rig_names: names of the rig's raw controls, Rig.raw_control_names.
 
     Returns:

@@ -121,7 +121,8 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count]: seconds of frames, from given times, else from 0 at the rate.
+        """float64[count]: seconds of frames, from given times; without times, or if the caller's
+        unit is rows, from 0 at the rate.
 
         Args:
             given: a list of times from the JSON, or None.
@@ -149,12 +150,12 @@ class Reader:
 
         Args:
             names: names of the curves, each once.
-            rows: float[controls, frames]; NaN for missing values.
+            rows: float[names, frames]; NaN for missing values, which are interpolated.
             times: float64[frames], seconds.
             rate: frames per second; None: inferred from the times.
 
         Raises:
-            AnimationFileError: a repeated name.
+            AnimationFileError: a repeated name, or a curve in which all values are missing.
         """
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)

@@ -57,8 +57,10 @@ def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str |
     Args:
         clip: curves of controls and ANGLES.
         name: the file's name in errors.
-        full: as in `rescaled`; None: the option was not given, so controls are checked.
-        angles: as in `rescaled`; None: the option was not given, so angles are checked.
+        full: the file's value of a full movement, if the user gave it; None: not given, so controls
+            are checked.
+        angles: the unit of the file's angles, if the user gave it; None: not given, so angles are
+            checked.
 
     Raises:
         AnimationFileError: a control above 4, or an angle above 2 radians.

@@ -74,7 +74,7 @@ class Imported:
     Attributes:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
             the start of the sound.
-        kind: one of KINDS.
+        kind: one of KINDS; "curves" for curves that are not from a file.
         mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
             the most curves; "" if none knows any.
         source: the file's name.
@@ -170,6 +170,11 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     """Keeps the requested angles of head and eyes.
 
     Head angles that are all 0 are dropped, because their curves would only keep the head still.
+
+    Args:
+        done: the mapped clip.
+        rotations: angles to keep: "head" (head and neck), "all" (the eyes' angles too) or "none".
+        report: receives the dropped curves and a note; changed.
     """
     clip = done.clip
     drop = set()
@@ -191,7 +196,13 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 
 
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
-    """Converts GUI curves to raw controls, frame by frame, with the rig's table."""
+    """Converts GUI curves to raw controls, frame by frame, with the rig's table.
+
+    Args:
+        clip: curves of GUI controls and angles; the angles are kept.
+        rig: rig with the table from GUI controls to raw controls.
+        report: receives a note and the controls that the rig lacks; changed.
+    """
     index = {name: i for i, name in enumerate(rig.gui_control_names)}
     gui = np.zeros((clip.frame_count, len(index)), np.float32)
     angles = [name for name in clip.names if name in ANGLES]
@@ -230,7 +241,8 @@ def read(
 
     Args:
         path: path of the file.
-        kind: one of KINDS, or None: inferred from the content, else from the suffix.
+        kind: one of KINDS, or None: inferred from the content. GLB and binary FBX are always
+            recognised by their content.
         rate: frames per second, for tables with frame numbers or without times.
         timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 means
             30000/1001, and so on.
@@ -258,7 +270,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # for example, a number in the file causes an overflow
+    # This happens, for example, if a number in the file causes an overflow.
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
@@ -347,8 +359,10 @@ def import_file(
     """Reads a file and maps it to a clip of raw controls; also reports the use of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: see `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: see `Imported.apply`.
+        path: path of the file.
+        kind, rate, timecode_rate, time_unit, take: options for reading the file, as in `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: options for the conversion to raw
+            controls, as in `Imported.apply`.
 
     Raises:
         ValueError: an error of `read` or `Imported.apply`.
@@ -381,7 +395,12 @@ def import_curves(
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
             values), linear between keyframes.
         source: name of the curves in the report.
-        rig_names, mapping, rig, rotations: see `Imported.apply`.
+        rig_names: raw controls of the rig; other controls are dropped and reported. None: all are
+            kept.
+        mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None: the built-in
+            mapping that knows the most curves.
+        rig: needed for a mapping of GUI controls.
+        rotations: angles to keep: "head", "all" (eyes too) or "none".
 
     Raises:
         ValueError: no curves, times that do not ascend, values that are not finite; errors of

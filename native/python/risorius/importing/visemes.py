@@ -21,8 +21,8 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves. It is fine enough, because files give the times of mouth shapes
-# to a hundredth of a second or to a frame.
+# Frames per second of the curves. More frames are not needed, because files give the times of mouth
+# shapes to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
@@ -55,12 +55,12 @@ class Cue(NamedTuple):
 def flowing_curves(
     cues: Sequence[Cue], times: Doubles, blend: float = BLEND
 ) -> tuple[list[str], Doubles]:
-    """float64[shapes, frames]: the weight of each shape; weights add up to 1 in every frame.
+    """The shapes, and the weight of each shape in each frame; weights add up to 1 in every frame.
 
     Two neighbouring cues cross-fade along half a cosine that is `blend` seconds long and centred on
-    their border. It is shorter if the cues demand it: it may reach to the middle of a dominant cue,
-    and to the far end of a weak one. A dominant cue therefore has weight 1 in its middle, and a
-    short weak one between two others never reaches weight 1.
+    their border. The cross-fade is shorter if a cue is short: it reaches at most to the middle of a
+    dominant cue, and at most to the far end of a weak one. A dominant cue therefore has weight 1 in
+    its middle, and a short weak one between two others never reaches weight 1.
 
     Args:
         cues: in order of time; each ends where the next starts.
@@ -97,9 +97,16 @@ def _take(
 ) -> Take:
     """Makes a take from cues: curves at RATE, and the cues themselves as events.
 
+    Args:
+        cues: mouth shapes in order of time.
+        kind: one of `importing.KINDS`.
+        name: the file's name in errors.
+        notes: sentences for the user.
+        events: further events of the clip.
+
     Raises:
-        AnimationFileError: no cue has a length. BudgetError: too many shapes for a track of this
-            length.
+        AnimationFileError: no cue has a length, or a cue ends after LONGEST. BudgetError: too many
+            shapes for a track of this length.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -121,7 +128,13 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first."""
+    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first.
+
+    Args:
+        starts: (start in seconds, shape) of each cue, ascending.
+        end: end of the last cue in seconds.
+        rest: shape before the first start.
+    """
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -129,7 +142,8 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Whether at least half of the lines consist of a time and a Rhubarb shape."""
+    """Whether at least half of the lines consist of a time and a Rhubarb shape, and the first line
+    begins with a digit."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)
     return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)
@@ -456,7 +470,13 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest".
+
+    Args:
+        voices: (name, words) of each voice.
+        rate: frames per second.
+        name: the file's name in errors.
+    """
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]

@@ -25,8 +25,9 @@ _NEEDED = re.compile(
 
 
 def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
-    """Indices of joints that must stay: neck, head, jaw, eyes and root by their names, joints with
-    rotation controls, joints that networks, twists and swings move, and all their ancestors.
+    """Indices of joints that must stay: root, hips, spine, neck, head, jaw and eyes by their names,
+    joints without a parent, joints with rotation controls, joints that networks, twists and swings
+    move, and all their ancestors.
 
     Args:
         dna: the face.

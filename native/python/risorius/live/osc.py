@@ -120,7 +120,8 @@ class Decoder:
             The faces that the packet completes.
 
         Raises:
-            LiveError: not OSC, or an impossible value; values of earlier messages are kept.
+            LiveError: not OSC, an impossible value (values of earlier messages are kept), or a new
+                sender for which no place is free.
         """
         found = list(messages(data))
         now = perf_counter() if now is None else now
@@ -165,7 +166,17 @@ class _Face:
         self.quaternion = False
 
     def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
-        """Processes a message. Returns: the face that this message completes, or None."""
+        """Processes a message.
+
+        Args:
+            address: address of the message, such as /VMC/Ext/Blend/Val.
+            values: arguments of the message.
+            time: time tag of its bundle in seconds since 1970, or None.
+
+        Returns:
+            The face that this message completes, or None. For a sender without Apply messages, that
+            is the face before the message if the message repeats one of its names.
+        """
         if address == "/VMC/Ext/Blend/Apply":
             self.applies = True
             return self.finish()

@@ -89,7 +89,12 @@ class _Subject:
         self.arrivals: deque[float] = deque(maxlen=512)
 
     def accept(self, packet: Packet, arrival: float) -> Frame | None:
-        """The packet as the subject's next frame, or None if it came late."""
+        """The packet as the subject's next frame, or None if it came late.
+
+        Args:
+            packet: a decoded packet of this subject.
+            arrival: time of arrival in seconds of perf_counter.
+        """
         time = self._own_time(packet.time, arrival)
         if time is None:
             return None
@@ -105,6 +110,10 @@ class _Subject:
         """The time of a frame: the sender's time with jumps of its clock removed.
 
         If the packet has no sender's time, the time is the time of arrival.
+
+        Args:
+            sent: the sender's time in seconds, or None.
+            arrival: time of arrival in seconds of perf_counter.
 
         Returns:
             Seconds; None if the packet came late.
@@ -136,6 +145,10 @@ class _Subject:
 
         The gain is measured from the first frame. A tolerance for each frame would add up and make
         a recording longer than the real time.
+
+        Args:
+            time: time of the frame by the sender's clock, in seconds.
+            arrival: time of arrival in seconds of perf_counter.
         """
         passed = arrival - self._began[1]
         return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
@@ -210,7 +223,8 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject that came first."""
+        """The latest frame of a subject; for "", of the first subject. None if the subject
+        has no frame yet."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -364,7 +378,12 @@ class Receiver:
         return subject if added else None
 
     def _free_label(self, packet: Packet, address: str) -> str:
-        """A label for a new subject: its name, with additions if another subject has that label."""
+        """A label for a new subject: its name, with additions if another subject has that label.
+
+        Args:
+            packet: the first packet of the subject.
+            address: address of the sender.
+        """
         name, taken = (
             packet.subject or packet.device or "unnamed",
             {s.label for s in self._subjects},

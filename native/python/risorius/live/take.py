@@ -47,7 +47,7 @@ class Take:
                 later but not removed.
 
         Returns:
-            A Clip with a time per frame. Before a control first arrives its curve is 0.
+            A Clip with a time per frame. A curve is 0 in frames that do not give its control.
         """
         shaper = (shaper or Shaper()).without_smoothing()
         rows = [shaper.apply(frame) for frame in self._frames]
@@ -66,7 +66,7 @@ class Take:
         return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
-        """Names in the take's frames that a shaper's mapping does not know."""
+        """Names in the take's frames for which a shaper has no control."""
         kinds = dict.fromkeys(frame.names for frame in self._frames)
         plans = (Plan(names, shaper.mapping) for names in kinds)
         return sorted({name for plan in plans for name in plan.unmapped})

@@ -38,8 +38,8 @@ class Mix:
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: as
-        `table`."""
+        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: an
+        invalid share, or shares that are all 0."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
             raise ArgumentError("shares from 0 on were expected, one of them above 0")
@@ -49,7 +49,8 @@ class Mix:
         """float64[regions, P]: the parents' shares in each region; rows sum to 1.
 
         Raises:
-            ValueError: an invalid share, shares that are all 0, or above 1 in a region.
+            ValueError: an invalid share, an unknown region, shares that are all 0, or shares of a
+                region that sum to more than 1.
         """
         whole = self.whole()
         out = np.tile(whole, (len(REGIONS), 1))
@@ -76,14 +77,14 @@ def mix_faces(
     """Makes the weighted mean of faces.
 
     Args:
-        parents: compatible faces, see check_compatible; they are not changed.
+        parents: faces with equal names, topology and behavior; they are not changed.
         mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
         masks: masks of the first parent's regions; None: they are computed.
 
     Returns:
-        The mixed face. If one parent has all shares, it equals that parent bitwise. Metadata and
-        hair come from the parent with the largest share.
+        The mixed face. If one parent has all shares, the mix equals that parent bitwise, except
+        for a given `name`. Metadata and hair come from the parent with the largest share.
 
     Raises:
         ValueError: invalid shares, or a region without vertices in the first parent.
@@ -183,7 +184,12 @@ def _spread(points: Doubles, weights: Doubles) -> float:
 
 
 def _middles(points: Doubles, masks: Doubles) -> Doubles:
-    """float64[regions, 3]: the mean of the points, weighted by each region's mask."""
+    """float64[regions, 3]: the mean of the points, weighted by each region's mask.
+
+    Args:
+        points: float64[n, 3], the points.
+        masks: float64[n, regions], weight of each point in each region.
+    """
     total = masks.sum(axis=0)[:, None]
     return np.asarray(masks.T @ points / np.maximum(total, 1e-30))
 
@@ -232,7 +238,12 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
 
 def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget]:
-    """Blend shape targets with all vertices that any parent moves."""
+    """Blend shape targets with all vertices that any parent moves.
+
+    Args:
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents times the scale of their regions.
+    """
     own = [
         {int(t.blend_shape_channel_index): t for t in mesh.blend_shape_targets} for mesh in parents
     ]
@@ -260,7 +271,13 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights."""
+    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights.
+
+    Args:
+        out: the mixed mesh; changed.
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents.
+    """
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -320,7 +337,13 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
 
 
 def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
-    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations."""
+    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations.
+
+    Args:
+        out: the mix; changed.
+        parents: the mixed faces.
+        share: weights of the parents for each joint.
+    """
     weights = share.weights
     shifts = [np.asarray(p.neutral_joint_translations, np.float64) for p in parents]
     turns = [np.asarray(p.neutral_joint_rotations, np.float64) for p in parents]
@@ -348,7 +371,13 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
 
 
 def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
-    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ."""
+    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ.
+
+    Args:
+        out: the mix, whose rotation convention is used.
+        turns: float64[J, 3] of each parent, neutral rotations in the file's unit.
+        weights: float64[J, P], weights of the parents.
+    """
     convention = Convention.of(out)
     rows = turns[0].copy()
     for joint in range(len(rows)):

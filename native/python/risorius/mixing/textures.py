@@ -51,7 +51,8 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Mixes the textures in the metadata of the leading parent, which has the largest share.
+    """Mixes the textures in the metadata of the leading parent, which has the largest share, and
+    the wrinkle masks (*_msk.png) in its texture folder.
 
     Args:
         parents: compatible faces.
@@ -60,8 +61,8 @@ def mix_textures(
         masks: masks of the first parent's regions.
 
     Returns:
-        File name -> bytes; and file name -> reason (see WHY) for images of the leading parent
-        alone.
+        File name -> bytes; and file name -> key in WHY of the reason, for textures that come from
+        the leading parent alone.
 
     Raises:
         BudgetError: small files that declare huge images.
@@ -129,7 +130,12 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 
 
 def _bytes(path: Path, name: str) -> bytes | None:
-    """The bytes of a file in the texture folder or beside the DNA file; None if there is none."""
+    """The bytes of a file in the texture folder or beside the DNA file; None if there is none.
+
+    Args:
+        path: path of the DNA file.
+        name: name of the file to read.
+    """
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError, ReadingError):
             return read_file(folder / name, _MOST_BYTES, found=True)
@@ -137,7 +143,12 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can."""
+    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can.
+
+    Args:
+        data: bytes of the image of each parent, or None.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"
@@ -151,7 +162,12 @@ def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
 
 
 def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
-    """The weighted mean of images with equal sizes; empty if one is damaged."""
+    """The weighted mean of images with equal sizes; empty if one is damaged.
+
+    Args:
+        data: bytes of the image of each parent.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
         return next(iter(counted.values()))

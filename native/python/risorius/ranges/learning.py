@@ -134,7 +134,12 @@ def _without_spikes(curve: Doubles, rate: float) -> Doubles:
 
 
 def _peaks(curve: Doubles, neutral: float) -> Doubles:
-    """The maximum of each interval in which the curve is above half of its range."""
+    """The maximum of each interval in which the curve is above half of its range.
+
+    Args:
+        curve: float64[frames].
+        neutral: value of the control at rest.
+    """
     above = curve - neutral > 0.5 * (curve.max(initial=neutral) - neutral)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]]).astype(np.int8)))
     pairs = edges.reshape(-1, 2)
@@ -157,7 +162,14 @@ def _together(pair: list[_Measured]) -> _Measured:
 
 
 def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> Learned:
-    """The range of a control, with the reason if it is not used."""
+    """The range of a control, with the reason if it is not used.
+
+    Args:
+        name: name of the control.
+        found: measurements of the control, of both sides together.
+        performance: whether the take shows acting instead of one extreme after another.
+        most_gain: largest gain of controls other than lids.
+    """
     moved = found.extreme - found.neutral
     gain = max(most_gain, _LID_GAIN) if _is_lid(name) else most_gain
     reasons = {

@@ -41,7 +41,7 @@ class Convention:
 
     def angles(self, q: Doubles) -> Doubles:
         """Quaternion float64[4] -> Euler angles float64[3] in the file's unit; in gimbal lock the
-        last angle is 0."""
+        last angle of the order is 0."""
         m = _matrix(q)
         i, j, k = self.order
         parity = 1 if j == (i + 1) % 3 else -1

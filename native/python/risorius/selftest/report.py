@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes the self-test's report as text. It describes the machine, but names no folders."""
+"""Writes the self-test's report as text. The report describes the machine, but names no folders."""
 
 from __future__ import annotations
 

@@ -69,7 +69,8 @@ class ControlSharing:
     amount, such as left and right in a symmetric drag. None: no partners."""
     opposites: Sequence[tuple[int, int]] = ()
     """Pairs of controls of which at most one may be on, such as mouthLeft and mouthRight. On an
-    asymmetric face both together would fit best but look wrong. Pairs of partners are ignored."""
+    asymmetric face both together would fit best but look wrong. Opposites that are also partners
+    keep their values."""
 
 
 class LimitFields(TypedDict, total=False):

@@ -54,8 +54,8 @@ def read_performance(
     Args:
         path: path of the file.
         name: name of the mesh in an Alembic file; None: the first mesh that fits.
-        counts: mesh of the face -> its number of vertices; a mesh fits if its number is among
-            these. None: any mesh fits.
+        counts: mesh of the face -> its number of vertices; a mesh of an Alembic file fits if its
+            vertex count is one of these numbers. None: any mesh fits. Not used for an .npz file.
 
     Raises:
         PerformanceError: an unknown kind of file, a damaged file, an unknown mesh.

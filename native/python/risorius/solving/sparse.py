@@ -113,7 +113,12 @@ class _Path:
         self.state[which], self.sign[which] = _MOVES, np.sign(self.pull[which])
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
-        """The value at which each moving unknown stops, and the price's decrease until then."""
+        """float64[n] each: the value at which each moving unknown stops, and the price's decrease
+        until then (infinite if it does not move).
+
+        Args:
+            rate: float64[n], change of each unknown per decrease of the price.
+        """
         stop = np.where(rate > 0, self.high, self.low)
         back = (self.x * rate < 0) | ((self.x == 0) & (rate * self.sign < 0))
         stop = np.where(back, 0.0, stop)
@@ -122,8 +127,12 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """For each unknown that stays at 0, the price's decrease until the unknown begins to move,
-        and the direction of its motion."""
+        """float64[n] each: for each unknown that stays at 0, the price's decrease until the unknown
+        begins to move, and the direction of its motion (1 or -1).
+
+        Args:
+            slope: float64[n], decrease of `pull` per decrease of the price.
+        """
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -137,7 +146,11 @@ class _Path:
         return np.minimum(up, down), np.where(up <= down, 1.0, -1.0)
 
     def _moves_again(self, slope: Doubles) -> Doubles:
-        """The decrease of the price until each unknown at a bound leaves it."""
+        """float64[n]: the decrease of the price until each unknown at a bound leaves it.
+
+        Args:
+            slope: float64[n], decrease of `pull` per decrease of the price.
+        """
         falls = self.sign * slope - 1
         there = (self.state == _BOUND) & (falls > _LEVEL)
         if self.left >= 0:
@@ -211,7 +224,13 @@ def cheapest_to(
 
 
 def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:
-    """The length of the residual at the point of the path with this price."""
+    """The length of the residual at the point of the path with the price `price`.
+
+    Args:
+        nodes: (x, residual) at each corner of the path.
+        prices: price at each corner, falling.
+        price: price of the wanted point; a lower price than all corners have means the last corner.
+    """
     for (_, long), (_, short), before, after in zip(
         nodes, nodes[1:], prices, prices[1:], strict=False
     ):
@@ -222,7 +241,13 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """float64[n]: the first point on a path at which the residual is at most `aim` long."""
+    """float64[n]: x at the first point of a path at which the residual is at most `aim` long, or at
+    the end of the path.
+
+    Args:
+        nodes: (x, residual) at each corner of the path.
+        aim: length of the residual.
+    """
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

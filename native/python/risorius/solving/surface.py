@@ -97,8 +97,8 @@ class Surface:
     ) -> Floats:
         """float32[V, 3, R]: derivatives of vertex positions by each control at a pose.
 
-        They are differences of evaluated poses, so that correctives, solvers and networks are
-        included; controls at their upper limit are decreased.
+        The derivatives are differences of evaluated poses, so that correctives, solvers and
+        networks are included; controls at their upper limit are decreased.
 
         Args:
             raw: float[R], the pose.
@@ -121,8 +121,8 @@ class Surface:
         """float64[R]: largest displacement of a vertex from the neutral pose, per unit of each
         control.
 
-        It is measured once, on about two thousand vertices spread evenly over the meshes of the
-        LOD.
+        The displacements are measured once, for about two thousand vertices spread evenly over the
+        meshes of the LOD.
         """
         return self._far().max(axis=0, initial=0.0)
 

@@ -9,8 +9,8 @@ separate process avoids this, turns a crash into an error message, and can be ki
     sends the task as a line of JSON     -->     calls speak()
     reads the lines                      <--     sends lines of JSON: the fraction of the work done,
                                                  again and again; then the clip or an error
-    closes the pipe: by cancel(), or     -->     ends
-    because this process has ended
+    kills the process after cancel(),    -->     ends
+    or ends, which closes the pipe
 """
 
 from __future__ import annotations
@@ -70,8 +70,12 @@ def speak_apart(
     """Does the work of speak in a separate process, which is killed if cancel() returns true.
 
     Args:
-        path, transcript, progress, cancel, options: see speak. progress and cancel are called from
-            the calling thread, which waits.
+        path: path of a sound file.
+        transcript: the spoken words in English, if known.
+        progress: called with the fraction of the work done, 0 to 1, from the calling thread, which
+            waits.
+        cancel: called repeatedly from the calling thread.
+        options: further keyword arguments of speak.
 
     Raises:
         RecogniserError: the process could not be started, or ended unexpectedly; errors of speak.

@@ -64,7 +64,8 @@ def surface(angle: Floats) -> Floats:
 
 
 def side_map(angle: Floats) -> Floats:
-    """float64[...]: distance from the middle of the texture for points outside the iris.
+    """float64[...]: distance from the middle of the texture for points outside the iris, in texture
+    widths.
 
     Args:
         angle: float64[...], angle from the gaze in radians, at least the angle of the limbus.
@@ -240,7 +241,10 @@ def seat(
 
 
 def pupil_wide(radius: float, side: str) -> Floats:
-    """float64[ball vertices, 3]: displacement that widens the pupil over the whole iris.
+    """float64[ball vertices, 3]: displacement that moves the pupil's rim outwards by the radius of
+    the iris.
+
+    The rings of the iris move the less the farther out they are; the root of the iris stays.
 
     Args:
         radius: radius of the ball in decimetres.

@@ -82,7 +82,8 @@ class Lids:
 
     Attributes:
         side: "l" or "r".
-        rings: int64[13, COLUMNS], 13 = OUTER + 1 + INNER, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye: OUTER (8) rings
+            outside the lashes' roots, the ring of the roots, and INNER (4) rings inside.
         openness: height of the upper lid above the middle of the ball, in radii of the iris.
         middle: float64[3], middle of the ball in decimetres.
         radius: radius of the ball in decimetres.
@@ -206,7 +207,8 @@ def _lower_lid(grid: Floats) -> Floats:
 
 
 def _lower_closed(lids: Lids) -> Floats:
-    """float64[13, COLUMNS, 3]: the grid with the lower lid raised to meet the upper lid."""
+    """float64[13, COLUMNS, 3]: the grid with the lower lid as in a blink: the middle of its rim is
+    0.7 mm higher and 0.7 mm nearer to the nose than in the rest pose."""
     grid = lids.grid(lids.rest)
     way = np.array([-0.7 * np.sign(lids.middle[0]), 0.7, 0.0]) * MM
     return np.asarray(grid + _lower_lid(grid) * way)
@@ -284,7 +286,10 @@ def _meeting(start: Floats, way: Floats, line: Floats) -> float:
 
 
 def _even(share: Floats, known: Floats) -> Floats:
-    """Fractions by column: unknown columns get the nearest known one, then all are smoothed.
+    """float64[COLUMNS]: fractions by column, from 0.2 to 1.2 and smoothed.
+
+    A column that is unknown, or not of the upper lid, gets the fraction of the nearest known column
+    of the upper lid.
 
     Args:
         share: float64[COLUMNS], fractions.
@@ -301,7 +306,7 @@ def _even(share: Floats, known: Floats) -> Floats:
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
     """float64[V, 3]: the shortened blink from the rest pose, for skin outside the grid.
 
-    It also undoes the displacement that opened the lids to their rest pose.
+    The returned displacement also undoes the one that opened the lids to their rest pose.
 
     Args:
         lids: the lids in their rest pose.
@@ -332,6 +337,8 @@ def between(lids: Lids, way: Floats) -> Floats:
 
 def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
     """float64[V, 3]: a displacement of the skin, corrected so that the lids touch the eye.
+
+    A displacement that hardly moves the rims is returned unchanged if the eye does not rotate.
 
     Args:
         lids: the lids in their rest pose.

@@ -144,7 +144,7 @@ def _root(points: Floats, share: Floats, begin: float) -> Floats:
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Shifts the tongue in the direction of the vector `by`; the tip moves most."""
+    """Shifts the tongue by the vector `by`; towards the root the shift falls to 0."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 

@@ -129,10 +129,10 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of one lip that touch the other lip.
+    """int64[n]: vertices of each lip at which it touches the other lip.
 
-    Near such a vertex is a vertex of the other lip. The opening jaw parts both vertices, and no
-    face has both.
+    Within _TOUCHING of such a vertex is a vertex of the other lip. The opening jaw parts both
+    vertices, and no face has both.
 
     Args:
         positions: float64[V, 3], in decimetres.

@@ -95,7 +95,15 @@ def _ways(
     units: Mapping[str, Floats],
     keys: Mapping[str, Any],
 ) -> Floats:
-    """float64[V, 3]: displacement of a row before it is multiplied by its weights."""
+    """float64[V, 3]: displacement of a row before it is multiplied by its weights.
+
+    Args:
+        source: the data with the shapes.
+        origin: one of ORIGINS (parts of the world) -> its share in the person.
+        places: regions of the face.
+        units: raw control -> float64[V, 3], of the controls that exist already.
+        keys: keys of the row in further.toml.
+    """
     count = len(places.positions)
     out = np.zeros((count, 3))
     for name, weight in keys.get("data", {}).items():

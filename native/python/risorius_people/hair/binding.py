@@ -120,8 +120,12 @@ class Turning:
     """Rotates cards where a blend shape tilts the skin.
 
     A joint rotates the cards by itself, but a blend shape only shifts their roots: without this
-    rotation the beard on a lip that rolls in would be inside the skin. See bind for the arguments
-    of the constructor.
+    rotation the beard on a lip that rolls in would be inside the skin.
+
+    Args:
+        head: the mesh of the skin.
+        places: place on the skin for each vertex of the cards.
+        mesh: the cards.
     """
 
     def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
@@ -226,7 +230,17 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: whether all controls and neck joints move a place by less than `least`."""
+    """bool[n]: whether a place stays still relative to the head joint.
+
+    A place does if all controls except those of head and neck move it by less than `least`, and if
+    its weights of joints other than the head joint and its descendants are negligible.
+
+    Args:
+        dna: the face.
+        head: the mesh of the skin.
+        places: the places on the skin.
+        least: length in the unit of the mesh.
+    """
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

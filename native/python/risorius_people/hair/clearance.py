@@ -195,7 +195,8 @@ class _Posed:
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
 
-        They move as the cards that binding.py binds to the skin.
+        The edges move like cards that follow their roots: with the joints of the skin there, and
+        rotated if a blend shape tilts the skin.
         """
         ground = self._ground
         roots = ground.roots(strips)
@@ -214,8 +215,8 @@ class _Posed:
     def rough(self, strips: Strips) -> Floats:
         """float64[n, rows]: approximate heights of the guides above the skin.
 
-        They are measured from the tangent plane of the nearest vertex. Only every fourth vertex is
-        considered.
+        The heights are measured from the tangent plane of the nearest vertex. Only every fourth
+        vertex is considered.
         """
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
@@ -243,7 +244,12 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Shortens or drops the hairs `some` that come too near to the skin in a pose."""
+        """Shortens or drops the hairs `some` that come too near to the skin in a pose.
+
+        Args:
+            pose: the skin in the pose.
+            some: indices of hairs.
+        """
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]
@@ -257,14 +263,25 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose."""
+    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose.
+
+    Args:
+        heights: float64[n, rows, 2], heights of the hairs' edges above the skin in a pose.
+        rest: float64[n, rows, 2], the heights in the neutral pose.
+    """
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))
 
 
 def _nearest(points: Floats, others: Floats) -> Ints:
-    """Does the same as nearest_rows in half the time, with float32, whose rounding errors are about
-    a micrometre."""
+    """int64[n]: index of the point of `others` nearest to each point.
+
+    The search uses float32, which halves the time; the rounding errors are about a micrometre.
+
+    Args:
+        points: float64[n, 3], in decimetres.
+        others: float64[m, 3], in decimetres.
+    """
     middle = others.mean(axis=0)
     return nearest_rows((points - middle).astype(np.float32), (others - middle).astype(np.float32))

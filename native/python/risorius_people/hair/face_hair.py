@@ -169,7 +169,15 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
 
 
 def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float) -> Floats:
-    """float64[n, 5, 3]: lashes that curl from one elevation to another, both in radians."""
+    """float64[n, 5, 3]: points of lashes that curl from one elevation to another.
+
+    Args:
+        root: float64[n, 3], roots in decimetres.
+        fan: float64[n], distance to the side (+x) per distance to the front.
+        length: float64[n], length of each lash in decimetres.
+        first: float64[n], elevation at the root in radians.
+        last: elevation at the tip in radians.
+    """
     flat = unit(np.column_stack([fan, np.zeros(len(fan)), np.ones(len(fan))]))
     points = [root]
     for k in range(4):

@@ -242,7 +242,7 @@ def add_crown(
         arch: arch of the tooth.
         tooth: measures of the tooth.
         way: position of the tooth's middle on the arch, decimetres from the arch's middle.
-        scale: factor on its width.
+        scale: factor on its width and thickness.
         around: number of vertices per ring.
     """
     place, along, outward = (v[0] for v in arch.at(np.array([way])))

@@ -80,7 +80,14 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
 
 
 def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
-    """float64[count, 3]: colours of single hairs, some of them grey."""
+    """float64[count, 3]: colours of single hairs, some of them grey.
+
+    Args:
+        colour: mean colour of the hairs, sRGB in [0, 1].
+        grey: fraction of grey hairs.
+        count: number of hairs.
+        random: generator of the colours.
+    """
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
     own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some hairs are redder
     white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))
@@ -95,7 +102,16 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later ones on top."""
+    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later hairs are on top.
+
+    Args:
+        hairs: look of the hairs.
+        number: number of the tile, which selects the number of hairs.
+        size: width and height of the tile in texels.
+        colour: mean colour of the hairs.
+        grey: fraction of grey hairs.
+        random: generator of the hairs.
+    """
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height

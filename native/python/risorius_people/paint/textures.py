@@ -218,7 +218,7 @@ def paint_textures(
         own: float64[V, 3], all vertices of the person.
         units: raw control -> expression.
         parts: the meshes of the face.
-        largest: largest number of texels of a texture, as the side of a square.
+        largest: a texture has at most as many texels as a square with this side.
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name.
@@ -265,7 +265,7 @@ def packable(name: str, image: Floats, largest: int) -> Floats:
     Args:
         name: file name of the texture.
         image: float64[h, w, ...] in [0, 1].
-        largest: largest number of texels, as the side of a square.
+        largest: a texture has at most as many texels as a square with this side.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
     if largest > 1024 or not name.startswith(("head_", "eye_")):

@@ -89,6 +89,11 @@ def _measured(
 
     The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
     unusual rate is accepted only if several drops agree or no rows are lost.
+
+    Args:
+        frames: float64[codes], frame number of each timecode.
+        seconds: int[codes], whole seconds since midnight of each timecode.
+        largest: largest frame number, which the result must exceed.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -122,7 +127,8 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
-    # Drop-frame skips the first 2 of 30 frame numbers (4 of 60) in each minute except every tenth.
+    # Drop-frame skips the first 2 frame numbers of each minute (4 at 60 frames per second), except
+    # in every tenth minute.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)

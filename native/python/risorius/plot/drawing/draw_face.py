@@ -75,7 +75,13 @@ def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]
 
 
 def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
-    """float64[V]: lightness of each vertex; an eyeball gets an iris and a pupil."""
+    """float64[V]: lightness of each vertex; an eyeball gets an iris and a pupil.
+
+    Args:
+        name: name of the mesh.
+        mesh: the mesh.
+        axes: float64[3, 3], maps file axes to right, up, front.
+    """
     points = np.asarray(mesh.positions, float).reshape(-1, 3) @ axes
     tone = np.ones(len(points))
     if not name.lower().startswith("eye") or not len(points):
